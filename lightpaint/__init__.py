@@ -1,0 +1,59 @@
+"""lightpaint: paint how a scene should look; get the lighting that comes closest.
+
+The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg, SIGGRAPH
+1993) in image space on Mitsuba 3. Data walks through six rooms in one direction:
+
+    call                        in → out                             question
+    load_scene                  scene XML → Scene                    which lights are there?
+    render_basis, read_basis    Scene → Basis                        what does each do alone?
+    read_target                 painted EXR → Target                 what is wanted, and where?
+    solve                       Basis, Target → Solution             which lighting is closest?
+    combine                     Basis, Lighting → Estimate           what will it look like?
+    relight                     Scene, Lighting → relit Scene        write it into the scene
+    verify                      Estimate, relit Scene → Verification does it look like that?
+
+`paint_with_light` is all of it in one call. Importing this sets no Mitsuba variant; that
+happens when the first scene is loaded.
+"""
+
+from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.render import render_basis
+from lightpaint.errors import LightpaintError
+from lightpaint.images.display import display_picture
+from lightpaint.images.estimate import Estimate
+from lightpaint.pipeline import Look, paint_with_light
+from lightpaint.relight.relight import relight
+from lightpaint.relight.verify import Verification, verify
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.variant import use_variant
+from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
+from lightpaint.solve.solve import Solution, solve
+from lightpaint.target.target import Target, read_target
+from lightpaint.version import __version__
+
+__all__ = [
+    "Basis",
+    "Estimate",
+    "Lighting",
+    "LightpaintError",
+    "Look",
+    "Scene",
+    "Solution",
+    "Target",
+    "Verification",
+    "__version__",
+    "combine",
+    "display_picture",
+    "load_scene",
+    "paint_with_light",
+    "read_basis",
+    "read_lighting",
+    "read_target",
+    "relight",
+    "render_basis",
+    "solve",
+    "use_variant",
+    "verify",
+    "write_basis",
+    "write_lighting",
+]

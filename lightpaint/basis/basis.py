@@ -1,0 +1,179 @@
+"""The basis: one image per light at unit emission, and its file.
+
+On disk a basis is one multi-part OpenEXR file. Part k is named after light k and holds its
+image as R, G, B; other programs can open it as it is. docs/formats.md has the details.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.estimate import HALF_DIFFERENCE
+from lightpaint.images.exr import Floats, Part, read_parts, rgb_channels, write_parts
+from lightpaint.version import __version__
+
+RGB = tuple[float, float, float]
+
+FORMAT = "lightpaint-basis 1"
+FORMAT_KEY = "lightpaint.format"
+ORIGIN_KEY = "lightpaint.origin"
+LIGHT_KEY = "lightpaint.light"
+EMITTERS_SEEN = "emitters seen"
+
+
+@dataclass(frozen=True)
+class BasisLight:
+    """What a basis knows of a light.
+
+    parameter, unit: what one unit of weight is (`radiance`, `W/(m² sr)`).
+    emission: its present RGB emission in the scene, in that unit.
+    form: its place and size, for people.
+    """
+
+    name: str
+    plugin: str
+    parameter: str
+    unit: str
+    emission: RGB
+    form: str = ""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a basis comes from: what makes two of them comparable."""
+
+    scene: str
+    scene_identity: str
+    sensor: str
+    spp: int
+    seed: int
+    method: str
+    lightpaint: str = __version__
+
+
+@dataclass(frozen=True)
+class Basis:
+    """The images of a scene lit by one light at a time.
+
+    lights: n of them; their order is the order of everything else.
+    images: (n, h, w, 3) float32, linear Rec.709 radiance under unit-white emission.
+    half_differences: (n, h, w, 3) float32, half the difference of two independent halves
+    of the samples: the noise of `images`.
+    emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
+    """
+
+    lights: tuple[BasisLight, ...]
+    images: Floats
+    half_differences: Floats
+    emitters_seen: npt.NDArray[np.bool_]
+    origin: Origin
+
+    def __post_init__(self) -> None:
+        n = len(self.lights)
+        if self.images.ndim != 4 or self.images.shape[0] != n or self.images.shape[3] != 3:
+            shape = self.images.shape
+            raise BasisError(f"images of shape {shape} for {n} lights: need (n, h, w, 3)")
+        if self.half_differences.shape != self.images.shape:
+            raise BasisError("half differences and images differ in shape")
+        if self.emitters_seen.shape != self.size:
+            raise BasisError("the mask of seen emitters has another size than the images")
+        if len(set(self.names)) != n:
+            raise BasisError(f"light names repeat: {', '.join(self.names)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the lights, in the order of the images."""
+        return tuple(light.name for light in self.lights)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self.images.shape[1], self.images.shape[2]
+
+    @property
+    def present_weights(self) -> npt.NDArray[np.float64]:
+        """(n, 3) weights of the scene as it is."""
+        return np.array([light.emission for light in self.lights], dtype=np.float64)
+
+
+def write_basis(path: Path, basis: Basis) -> None:
+    """Write `basis` as a multi-part EXR, whole or not at all."""
+    parts = []
+    for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
+        attributes = {LIGHT_KEY: json.dumps(asdict(light), ensure_ascii=False)}
+        channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
+        parts.append(Part(light.name, channels, attributes))
+    seen = basis.emitters_seen.astype(np.float16)
+    # The format's rule: a part name never repeats, so a light may not take this one.
+    parts.append(Part(_free_name(basis.names), {"Y": seen}))
+    head = {
+        FORMAT_KEY: FORMAT,
+        ORIGIN_KEY: json.dumps(asdict(basis.origin), ensure_ascii=False),
+    }
+    parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
+    write_parts(path, parts)
+
+
+def read_basis(path: Path) -> Basis:
+    """Read what `write_basis` wrote.
+
+    Raises ImageError if the file is damaged, BasisError if it is not a basis.
+    """
+    path = Path(path)
+    parts = read_parts(path)
+    head = next((p.attributes for p in parts if FORMAT_KEY in p.attributes), {})
+    if head.get(FORMAT_KEY) != FORMAT:
+        found = head.get(FORMAT_KEY, "no such mark")
+        raise BasisError(
+            f"{path} is not a basis this version can read: expected {FORMAT!r}, found {found!r}; "
+            "make one with lightpaint basis"
+        )
+    lit = [p for p in parts if LIGHT_KEY in p.attributes]
+    seen = [p for p in parts if LIGHT_KEY not in p.attributes and "Y" in p.channels]
+    if not lit or not seen:
+        raise BasisError(f"{path} has lost parts of its basis: make it again with lightpaint basis")
+    try:
+        lights = tuple(_light(json.loads(p.attributes[LIGHT_KEY])) for p in lit)
+        origin = Origin(**json.loads(head[ORIGIN_KEY]))
+        basis = Basis(
+            lights=lights,
+            images=np.stack([p.rgb() for p in lit]),
+            half_differences=np.stack([p.rgb(HALF_DIFFERENCE) for p in lit]),
+            emitters_seen=seen[0].channels["Y"] > 0,
+            origin=origin,
+        )
+    except (
+        AttributeError,
+        KeyError,
+        OverflowError,
+        RecursionError,
+        TypeError,
+        ValueError,
+        ImageError,
+    ) as error:
+        raise BasisError(f"{path} is damaged as a basis: {error}") from error
+    if not np.isfinite(basis.images).all():
+        raise BasisError(f"{path} holds values that are not finite: make it again")
+    return basis
+
+
+def is_basis_file(path: Path) -> bool:
+    """Whether the name says so: a basis is an EXR, a scene is XML."""
+    return path.suffix.lower() == ".exr"
+
+
+def _light(data: dict[str, Any]) -> BasisLight:
+    r, g, b = (float(v) for v in data.pop("emission"))
+    return BasisLight(emission=(r, g, b), **data)
+
+
+def _free_name(taken: tuple[str, ...]) -> str:
+    name = EMITTERS_SEEN
+    while name in taken:
+        name += "_"
+    return name

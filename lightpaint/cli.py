@@ -1,0 +1,181 @@
+"""The command line: one sub-command per room. Parses, calls, prints; no more.
+
+Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: `verify` found
+a disagreement; 2: something the user can mend, said in one line; 130: interrupted.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from lightpaint.errors import LightpaintError
+from lightpaint.version import __version__
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(given)
+    # What a command needs is imported when it runs: --help answers at once.
+    from lightpaint import commands
+
+    try:
+        return int(getattr(commands, options.command)(options, given))
+    except LightpaintError as error:
+        print(f"lightpaint {options.command}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"lightpaint {options.command}: interrupted", file=sys.stderr)
+        return 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="lightpaint",
+        description="Paint how a scene should look; get the lighting that comes closest.",
+    )
+    parser.add_argument("--version", action="version", version=f"lightpaint {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    lights = _command(commands, "lights", "list the lights of a scene")
+    _add_scene(lights)
+    lights.add_argument("--json", action="store_true", help="as JSON, for other programs")
+
+    basis = _command(commands, "basis", "render the image of each light alone")
+    _add_scene(basis)
+    _add_sampling(basis)
+    _add_output(basis, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
+
+    template = _command(commands, "template", "render the current look, to paint over")
+    _add_scene(template)
+    _add_sampling(template)
+    _add_output(template, "F.exr", "file to write, a PNG beside it (default: <scene>.exr)")
+
+    solve = _command(commands, "solve", "find the lighting that comes closest to a painting")
+    solve.add_argument("source", metavar="SCENE|BASIS", help="scene XML, or a *.basis.exr")
+    solve.add_argument("targets", metavar="TARGET", nargs="+", help="painted EXR")
+    _add_output(solve, "DIR", "result folder (default: named after the target)")
+    solve.add_argument("--mask", metavar="M.exr", help="what counts, instead of the alpha")
+    solve.add_argument(
+        "--unpainted",
+        type=_weight,
+        default=0.0,
+        metavar="W",
+        help="weight of unpainted pixels against the current look (default: %(default)s)",
+    )
+    solve.add_argument(
+        "--resize", action="store_true", help="resample a target of another size (default: refuse)"
+    )
+    _add_sampling(solve)
+    _add_view(solve)
+
+    relight = _command(commands, "relight", "write lightings into the scene and render it")
+    _add_scene(relight)
+    relight.add_argument("lightings", metavar="lighting.json", nargs="+", help="as solve left them")
+    _add_sampling(relight)
+    _add_output(relight, "DIR", "result folder (default: named after the lighting's target)")
+
+    verify = _command(commands, "verify", "render results anew and compare with the prediction")
+    verify.add_argument("folders", metavar="DIR", nargs="+", help="result folder of solve")
+    _add_sampling(verify)
+    _add_variant(verify)
+
+    doctor = _command(commands, "doctor", "say what works here and what to install")
+    _add_variant(doctor)
+    return parser
+
+
+def _command(commands: "argparse._SubParsersAction[_Parser]", name: str, about: str) -> _Parser:
+    return commands.add_parser(name, help=about, description=about[0].upper() + about[1:] + ".")
+
+
+def _add_scene(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE", help="Mitsuba scene XML")
+    _add_view(parser)
+
+
+def _add_view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "-s", "--sensor", metavar="SENSOR", help="sensor by index or id (default: the first)"
+    )
+    parser.add_argument(
+        "-D",
+        dest="parameters",
+        type=_key_value,
+        action="append",
+        default=[],
+        metavar="key=value",
+        help="set a $parameter of the scene; may be repeated",
+    )
+    _add_variant(parser)
+
+
+def _add_variant(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "-m",
+        "--variant",
+        metavar="VARIANT",
+        help="Mitsuba variant (default: llvm_ad_rgb, or scalar_rgb without LLVM)",
+    )
+
+
+def _add_sampling(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--spp", type=_at_least(2), metavar="N", help="samples per pixel (default: the scene's)"
+    )
+    parser.add_argument(
+        "--seed",
+        type=_at_least(0),
+        default=0,
+        metavar="S",
+        help="random seed (default: %(default)s)",
+    )
+
+
+def _add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
+    parser.add_argument("-o", "--output", metavar=metavar, help=about)
+
+
+def _key_value(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not key or not equals:
+        raise argparse.ArgumentTypeError(f"{text!r} is not key=value")
+    return key, value
+
+
+class _at_least:  # noqa: N801 (used as a function)
+    """An integer no smaller than a bound."""
+
+    def __init__(self, bound: int) -> None:
+        self.bound = bound
+
+    def __call__(self, text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = self.bound - 1
+        if value < self.bound:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number >= {self.bound}")
+        return value
+
+
+def _weight(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number >= 0")
+    return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""What of lightpaint works on this machine, and the line that installs what is missing."""
+
+import ctypes
+import importlib.metadata
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import dataclass
+from typing import Literal
+
+from lightpaint.errors import BackendError
+from lightpaint.scene.variant import INSTALL_LLVM, llvm_candidates, use_variant
+from lightpaint.version import __version__
+
+State = Literal["ok", "missing", "info"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at. remedy: what to type, where something is missing."""
+
+    what: str
+    state: State
+    found: str
+    remedy: str = ""
+
+
+def examine(variant: str | None = None) -> list[Finding]:
+    """Look at everything lightpaint needs here. `variant`: as in `use_variant`."""
+    findings = [
+        Finding("lightpaint", "info", __version__),
+        Finding("Python", "info", f"{platform.python_version()} ({sys.executable})"),
+        Finding("system", "info", f"{platform.system()} {platform.machine()}"),
+        Finding("cores", "info", str(len(_usable_cores()))),
+    ]
+    findings += [_package(n) for n in ("mitsuba", "drjit", "numpy", "OpenEXR", "colour-science")]
+    findings += _llvm()
+    findings.append(_gpu())
+    findings.append(_backend(variant))
+    return findings
+
+
+def _usable_cores() -> list[int]:
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))
+
+
+def _package(name: str) -> Finding:
+    try:
+        return Finding(name, "ok", importlib.metadata.version(name))
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(name, "missing", "not installed", f"pip install {name}")
+
+
+def _llvm() -> list[Finding]:
+    findings = []
+    for llvm in llvm_candidates():
+        if llvm.version is not None:
+            version = ".".join(map(str, llvm.version))
+            findings.append(Finding("LLVM", "ok", f"{version} from {llvm.origin}: {llvm.path}"))
+        else:
+            skipped = f"passed over, {llvm.problem}: {llvm.path} ({llvm.origin})"
+            findings.append(Finding("LLVM", "info", skipped))
+    if not any(finding.state == "ok" for finding in findings):
+        findings.append(Finding("LLVM", "missing", "none that is usable", INSTALL_LLVM))
+    return findings
+
+
+def _gpu() -> Finding:
+    """Whether an NVIDIA GPU answers. Nothing here needs one."""
+    try:
+        ctypes.CDLL("libcuda.so.1")
+        names = subprocess.run(
+            ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"],
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=True,
+        ).stdout.split("\n")
+    except (OSError, subprocess.SubprocessError):
+        return Finding("GPU", "info", "none found, none needed")
+    listed = ", ".join(name.strip() for name in names if name.strip())
+    return Finding("GPU", "info", f"{listed}: used with -m cuda_ad_rgb")
+
+
+def _backend(variant: str | None) -> Finding:
+    try:
+        backend = use_variant(variant)
+    except BackendError as error:
+        return Finding("backend", "missing", str(error), "pip install mitsuba")
+    if backend.note:
+        return Finding("backend", "missing", backend.note, INSTALL_LLVM)
+    return Finding("backend", "ok", f"{backend.variant} starts and computes")

@@ -1,0 +1,63 @@
+"""Every exception lightpaint raises on purpose.
+
+    LightpaintError
+    ├── BackendError     Mitsuba or LLVM cannot run here
+    ├── SceneError       the scene XML, a sensor, a light
+    ├── ImageError       an image file that cannot be read as what it should be
+    ├── BasisError       a basis file, or one that does not fit what it is used with
+    ├── TargetError      a painting or mask that cannot be solved for
+    │   └── SizeError    … because its size differs from the basis
+    ├── LightingError    a lighting.json
+    └── OutputError      a place that cannot be written
+
+Each message is one line: what came, what was expected, and what to do. The command
+line prints it and exits with 2.
+"""
+
+__all__ = [
+    "BackendError",
+    "BasisError",
+    "ImageError",
+    "LightingError",
+    "LightpaintError",
+    "OutputError",
+    "SceneError",
+    "SizeError",
+    "TargetError",
+]
+
+
+class LightpaintError(Exception):
+    """Base of all errors that a user of lightpaint can cause and mend."""
+
+
+class BackendError(LightpaintError):
+    """Mitsuba or the LLVM library it compiles with is missing or unusable."""
+
+
+class SceneError(LightpaintError):
+    """A scene that cannot be loaded, or that lacks what was asked of it."""
+
+
+class ImageError(LightpaintError):
+    """An image file that is missing, damaged, or of a kind that is not supported."""
+
+
+class BasisError(LightpaintError):
+    """A basis that is damaged or belongs to something else."""
+
+
+class TargetError(LightpaintError):
+    """A painting or an importance mask that no lighting can be solved for."""
+
+
+class SizeError(TargetError):
+    """A painting or mask whose size is not that of the basis."""
+
+
+class LightingError(LightpaintError):
+    """A lighting file that is damaged or names other lights than the scene has."""
+
+
+class OutputError(LightpaintError):
+    """A file or folder that cannot be written."""

@@ -1,0 +1,82 @@
+"""An image made by Monte Carlo, with what is known of its noise."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.errors import ImageError
+from lightpaint.images.exr import Floats, Part, read_parts, rgb_channels, write_parts
+
+#: EXR layer that holds half the difference of two independent halves of the samples.
+HALF_DIFFERENCE = "half_difference"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The mean of two independent renders A and B, and half their difference.
+
+    image: (h, w, 3) float32, (A + B) / 2, linear Rec.709 radiance.
+    half_difference: (h, w, 3) float32, (A − B) / 2. Its square is an unbiased estimate of
+    the variance of `image`, one per pixel and channel.
+    """
+
+    image: Floats
+    half_difference: Floats
+
+    def __post_init__(self) -> None:
+        if self.image.shape != self.half_difference.shape:
+            raise ImageError(
+                f"image {self.image.shape} and half difference "
+                f"{self.half_difference.shape} differ in shape"
+            )
+
+    @classmethod
+    def of_halves(cls, a: Floats, b: Floats) -> "Estimate":
+        """From two independent renders of equal sample count."""
+        return cls((a + b) / 2, (a - b) / 2)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self.image.shape[0], self.image.shape[1]
+
+    def variance(self, *, radius: int = 2) -> Floats:
+        """Variance of each pixel of `image`, (h, w, 3), pooled over its neighbours.
+
+        One pair of halves gives one squared difference per pixel, far too rough to divide
+        by; the mean over (2 radius + 1)² pixels of a window is used instead.
+        """
+        return box_mean(np.square(self.half_difference, dtype=np.float64), radius)
+
+
+def box_mean(values: Floats, radius: int) -> Floats:
+    """Mean over a square window, cut off at the borders. values: (h, w, …)."""
+    for axis in (0, 1):
+        length = values.shape[axis]
+        total = np.cumsum(values, axis=axis, dtype=np.float64)
+        total = np.concatenate([np.zeros_like(np.take(total, [0], axis)), total], axis)
+        low = np.maximum(np.arange(length) - radius, 0)
+        high = np.minimum(np.arange(length) + radius + 1, length)
+        count = (high - low).reshape([-1 if k == axis else 1 for k in range(values.ndim)])
+        values = (np.take(total, high, axis) - np.take(total, low, axis)) / count
+    # A running sum leaves round-off where the truth is 0.
+    return np.maximum(values, 0)
+
+
+def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -> None:
+    """Write R, G, B in float32 and the half difference as a half-float layer."""
+    channels = rgb_channels(estimate.image)
+    channels |= rgb_channels(estimate.half_difference, HALF_DIFFERENCE, half=True)
+    write_parts(path, [Part("rgb", channels, attributes)])
+
+
+def read_estimate(path: Path) -> Estimate:
+    """Read what `write_estimate` wrote."""
+    part = read_parts(path)[0]
+    if f"{HALF_DIFFERENCE}.R" not in part.channels:
+        raise ImageError(
+            f"{path} carries no {HALF_DIFFERENCE} layer, so its noise is unknown: "
+            "give an image that lightpaint rendered"
+        )
+    return Estimate(part.rgb(), part.rgb(HALF_DIFFERENCE))

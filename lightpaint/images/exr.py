@@ -1,0 +1,174 @@
+"""OpenEXR files in and out, over the OpenEXR project's own module.
+
+A file is a list of `Part`s; a part is a set of named channels of one size. What the
+reference library lets pass silently (a cut-off file, missing parts, deep pixels) is an
+ImageError here.
+"""
+
+import io
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+
+from lightpaint.errors import ImageError, OutputError
+from lightpaint.files import replacing
+
+Floats = npt.NDArray[np.floating[Any]]
+
+#: Above this many values in one file, reading is refused before any pixel is decoded.
+MAX_VALUES = 2**31
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of an EXR file.
+
+    channels: name → (height, width) array, float16 or float32 (uint32 when read so).
+    attributes: text attributes of the header.
+    """
+
+    name: str
+    channels: Mapping[str, npt.NDArray[Any]]
+    attributes: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        height, width = next(iter(self.channels.values())).shape
+        return height, width
+
+    def rgb(self, layer: str = "") -> Floats:
+        """The R, G and B channels of `layer` as (height, width, 3) float32."""
+        prefix = f"{layer}." if layer else ""
+        names = [prefix + c for c in "RGB"]
+        missing = [n for n in names if n not in self.channels]
+        if missing:
+            raise ImageError(
+                f"no channel {', '.join(missing)} in part {self.name!r}, "
+                f"which has {', '.join(self.channels)}"
+            )
+        return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32)
+
+
+def read_parts(path: Path) -> list[Part]:
+    """All parts of the EXR file at `path`.
+
+    Raises ImageError if the file is missing, no EXR, cut off, deep, or larger than
+    MAX_VALUES pixel values.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ImageError(f"no such image file: {path}")
+    with _silenced():
+        try:
+            header = OpenEXR.File(str(path), header_only=True)
+        except Exception as error:
+            reason = _first_line(error)
+            raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
+        declared = [(part.name(), dict(part.header)) for part in header.parts]
+        _check_headers(path, declared)
+        try:
+            parts = OpenEXR.File(str(path), separate_channels=True).parts
+        except Exception as error:
+            raise ImageError(f"{path} is damaged: {_first_line(error)}") from error
+    if len(parts) != len(declared):
+        raise ImageError(
+            f"{path} is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
+            "read; export it again"
+        )
+    result = []
+    for part in parts:
+        channels = {name: channel.pixels for name, channel in part.channels.items()}
+        if not channels:
+            raise ImageError(f"{path} has a part without channels")
+        attributes = {k: v for k, v in part.header.items() if isinstance(v, str)}
+        result.append(Part(part.name() or "", channels, attributes))
+    return result
+
+
+def write_parts(path: Path, parts: Sequence[Part]) -> None:
+    """Write a multi-part EXR with lossless ZIP compression, whole or not at all."""
+    exr_parts = []
+    for part in parts:
+        header = {
+            "type": OpenEXR.scanlineimage,
+            "compression": OpenEXR.ZIP_COMPRESSION,
+            **part.attributes,
+        }
+        channels = {n: np.ascontiguousarray(c) for n, c in part.channels.items()}
+        exr_parts.append(OpenEXR.Part(header, channels, part.name))
+    with replacing(path) as beside:
+        try:
+            OpenEXR.File(exr_parts).write(str(beside))
+        except RuntimeError as error:  # the library's word for a full disk and the like
+            raise OutputError(f"cannot write {path}: {_first_line(error)}") from error
+
+
+def rgb_channels(image: Floats, layer: str = "", *, half: bool = False) -> dict[str, Floats]:
+    """(height, width, 3) pixels as the channels R, G, B of `layer`; float16 if `half`."""
+    prefix = f"{layer}." if layer else ""
+    if half:
+        # The largest half is 65504: beyond it a value would become infinite.
+        image = np.clip(image, -65504, 65504).astype(np.float16)
+    else:
+        image = image.astype(np.float32, copy=False)
+    return {f"{prefix}{c}": image[..., k] for k, c in enumerate("RGB")}
+
+
+def write_rgb(path: Path, image: Floats, *, attributes: Mapping[str, str] | None = None) -> None:
+    """Write a (height, width, 3) linear image as one float32 RGB part."""
+    write_parts(path, [Part("rgb", rgb_channels(image), attributes or {})])
+
+
+def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]) -> None:
+    values = 0
+    for name, header in declared:
+        kind = header.get("type")
+        if kind in (OpenEXR.deepscanline, OpenEXR.deeptile):
+            raise ImageError(
+                f"{path} holds deep pixels (part {name or 0!r}): flatten it and export it again"
+            )
+        (x0, y0), (x1, y1) = header["dataWindow"]
+        width, height = int(x1) - int(x0) + 1, int(y1) - int(y0) + 1
+        if width < 1 or height < 1:
+            raise ImageError(f"{path} declares an empty image of {width}x{height} pixels")
+        values += width * height * max(len(header.get("channels", ())), 1)
+    if values > MAX_VALUES:
+        raise ImageError(f"{path} declares {values:.2g} pixel values: too many to read")
+
+
+def _first_line(error: BaseException) -> str:
+    text = str(error).strip()
+    return text.splitlines()[0] if text else type(error).__name__
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Keep what the C++ library prints about damaged files off the user's terminal.
+
+    It writes to the process's own descriptors and, by way of Python, to `sys.stdout`, which
+    is another place in a notebook. The same news comes as an ImageError.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    saved = [(fd, os.dup(fd)) for fd in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for fd, _ in saved:
+            os.dup2(nowhere, fd)
+        with redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        sys.stdout.flush()
+        for fd, copy in saved:
+            os.dup2(copy, fd)
+            os.close(copy)
+        os.close(nowhere)

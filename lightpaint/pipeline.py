@@ -1,0 +1,187 @@
+"""The corridor: load → basis → target → solve → relight → verify, in that order."""
+
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpaint.basis.basis import Basis, read_basis
+from lightpaint.basis.render import render_basis
+from lightpaint.errors import LightpaintError
+from lightpaint.files import check_writable
+from lightpaint.images.display import choose_exposure, write_png
+from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
+from lightpaint.images.exr import read_parts
+from lightpaint.progress import Progress, silent
+from lightpaint.relight.comparison import write_comparison
+from lightpaint.relight.relight import relight
+from lightpaint.relight.report import write_report
+from lightpaint.relight.verify import Verification, verify
+from lightpaint.scene.render import Stream, render
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.solve.lighting import Lighting, combine, write_lighting
+from lightpaint.solve.solve import Solution, solve
+from lightpaint.target.target import Target, read_target
+from lightpaint.target.template import write_template
+
+#: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
+VIEW_KEY = "lightpaint.view"
+
+
+@dataclass(frozen=True)
+class Look:
+    """One painting and its answer.
+
+    relit and verification are None where there was only a saved basis and no scene.
+    """
+
+    target: Target
+    basis: Basis
+    solution: Solution
+    predicted: Estimate
+    relit: Scene | None
+    verification: Verification | None
+
+    @property
+    def lighting(self) -> Lighting:
+        """The lighting that comes closest to the target."""
+        return self.solution.lighting
+
+
+def paint_with_light(
+    scene: str | Path | Scene | None,
+    target: str | Path | Target,
+    folder: str | Path,
+    *,
+    basis: str | Path | Basis | None = None,
+    mask: str | Path | None = None,
+    unpainted: float = 0.0,
+    spp: int | None = None,
+    seed: int = 0,
+    sensor: int | str | None = None,
+    parameters: Mapping[str, object] | None = None,
+    resize: bool = False,
+    command: str = "",
+    progress: Progress = silent,
+) -> Look:
+    """Find the lighting of `scene` that comes closest to a painting, and prove it.
+
+    scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer.
+    folder: receives lighting.json, predicted.exr, comparison.png and report.html and, with
+    a scene, relit.xml and verified.exr.
+    basis: one made before of the same scene; rendered if not given.
+    unpainted: weight of unpainted pixels against the current look.
+    spp, seed: of the basis and, with other random numbers, of the verification.
+
+    Raises LightpaintError; all that a user gives is checked before anything is rendered.
+    """
+    folder = Path(folder)
+    if isinstance(scene, str | Path):
+        scene = load_scene(scene, sensor=sensor, parameters=parameters)
+    if isinstance(basis, str | Path):
+        basis = read_basis(Path(basis))
+    if not isinstance(target, Target):
+        target = read_target(target, mask=mask)
+    size = basis.size if basis is not None else scene.size if scene is not None else target.size
+    target = target.fitted_to(size, resize=resize)
+    check_writable(folder)
+
+    if basis is None:
+        if scene is None:
+            raise LightpaintError("give a scene, a basis, or both")
+        basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
+    solution = solve(basis, target, unpainted=unpainted)
+    predicted = combine(basis, solution.lighting)
+    write_lighting(folder / "lighting.json", solution.lighting)
+    view = {"sensor": scene.sensor, "spp": basis.origin.spp} if scene is not None else {}
+    write_estimate(folder / "predicted.exr", predicted, {VIEW_KEY: json.dumps(view)})
+
+    relit, verification = None, None
+    if scene is not None:
+        relit = relight(scene, solution.lighting, folder / "relit.xml")
+        verification = verify(predicted, relit, spp=basis.origin.spp, seed=seed, progress=progress)
+        write_estimate(folder / "verified.exr", verification.verified, {})
+    look = Look(target, basis, solution, predicted, relit, verification)
+    show_look(look, folder, command=command)
+    return look
+
+
+def show_look(look: Look, folder: Path, *, command: str) -> None:
+    """Write the pictures people look at: comparison.png and report.html."""
+    verified = look.verification.verified.image if look.verification else None
+    write_comparison(
+        folder / "comparison.png",
+        basis=look.basis,
+        target=look.target,
+        solution=look.solution,
+        predicted=look.predicted.image,
+        verified=verified,
+    )
+    write_report(
+        folder / "report.html",
+        basis=look.basis,
+        target=look.target,
+        solution=look.solution,
+        predicted=look.predicted,
+        verification=look.verification,
+        command=command,
+    )
+
+
+def render_template(
+    scene: Scene,
+    path: Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Path:
+    """Render the current look of `scene` to an EXR, to be painted over.
+
+    Returns the path of the display-encoded PNG beside it.
+    """
+    look = render(
+        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
+    )
+    return write_template(path, look.image)
+
+
+def relight_look(
+    scene: Scene,
+    lighting: Lighting,
+    folder: Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Scene:
+    """Write relit.xml to `folder`, and its render as relit.exr and relit.png."""
+    relit = relight(scene, lighting, folder / "relit.xml")
+    image = render(
+        relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
+    )
+    write_estimate(folder / "relit.exr", image, {})
+    write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
+    return relit
+
+
+def verify_result(
+    folder: str | Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Verification:
+    """Render the relit.xml of a result folder anew and compare it with its predicted.exr."""
+    folder = Path(folder)
+    predicted = read_estimate(folder / "predicted.exr")
+    [part] = read_parts(folder / "predicted.exr")
+    view = json.loads(part.attributes.get(VIEW_KEY, "{}"))
+    relit = load_scene(folder / "relit.xml", sensor=view.get("sensor", 0))
+    return verify(predicted, relit, spp=spp or view.get("spp"), seed=seed, progress=progress)
+
+
+def command_line(arguments: list[str]) -> str:
+    """The shell command with these arguments, quoted so that it can be pasted."""
+    return shlex.join(["lightpaint", *arguments])

@@ -1,0 +1,138 @@
+"""Writing a lighting back into the user's own scene XML.
+
+The original text is edited, not written anew, so that comments, includes and defaults
+survive and a diff shows the lights and nothing else.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.errors import LightingError, OutputError, SceneError
+from lightpaint.files import write_bytes
+from lightpaint.relight.xml_edit import Element, XmlFile, tag
+from lightpaint.scene.emitters import RGB
+from lightpaint.scene.scene import Light, Scene, load_scene
+from lightpaint.solve.lighting import Lighting
+
+
+def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
+    """Write `scene` with the emissions of `lighting` to `path`, and load it back.
+
+    The file refers to the original folder by relative path, so it loads in plain Mitsuba
+    from where it lies. Included files that hold lights are copied beside it. A light that
+    is off keeps its emitter, is black and is never sampled.
+
+    Raises LightingError if the two name different lights, SceneError where the XML cannot
+    express the answer, OutputError if `path` cannot be written.
+    """
+    path = Path(path)
+    check_same_lights(scene, lighting)
+    if path.resolve() in {file.resolve() for file in scene.files}:
+        raise OutputError(f"{path} is the scene itself: write the relit scene somewhere else")
+    for file, data in relit_files(scene, lighting.emission, path).items():
+        write_bytes(file, data)
+    relit = load_scene(path, sensor=scene.sensor)
+    for light in scene.lights:
+        wanted, taken = lighting.emission[light.name], relit.light(light.name).emission
+        if not np.array_equal(np.asarray(wanted, np.float32), np.asarray(taken, np.float32)):
+            raise SceneError(f"{path} did not take the emission of light {light.name!r}")
+    return relit
+
+
+def check_same_lights(scene: Scene, lighting: Lighting) -> None:
+    """Raise LightingError unless `lighting` names exactly the lights of `scene`."""
+    given, there = set(lighting.emission), {light.name for light in scene.lights}
+    if given != there:
+        raise LightingError(
+            f"the lighting does not fit {scene.path}: it lacks "
+            f"{', '.join(sorted(there - given)) or 'no light'} and names "
+            f"{', '.join(sorted(given - there)) or 'none'} that the scene has not"
+        )
+
+
+@dataclass
+class _Edits:
+    """What changes in one file: the settings of the lights in it, by byte offset."""
+
+    original: Path
+    settings: dict[int, tuple[Light, RGB, float | None]] = field(default_factory=dict)
+
+
+def relit_files(scene: Scene, emission: Mapping[str, RGB], path: Path) -> dict[Path, bytes]:
+    """Content of the relit XML at `path` and of the included files it needs beside it."""
+    root = scene.files[0]
+    edits = {root.resolve(): _Edits(root)}
+    all_dark = not any(any(rgb) for rgb in emission.values())
+    for light in scene.lights:
+        file = scene.files[light.file]
+        rgb = emission[light.name]
+        setting = (light, rgb, _sampling_weight(light, rgb, all_dark))
+        here = edits.setdefault(file.resolve(), _Edits(file)).settings
+        if light.offset in here and here[light.offset][1:] != setting[1:]:
+            raise SceneError(
+                f"{file} is included more than once, and its light would have to be both "
+                f"{here[light.offset][0].name!r} and {light.name!r} with different emissions: "
+                "include two copies of it"
+            )
+        here[light.offset] = setting
+
+    written = {}
+    for edit in edits.values():
+        is_root = edit.original == root
+        target = path if is_root else path.parent / _place_of_include(edit.original, root)
+        defaults = scene.parameters if is_root else {}
+        written[target] = _edit(edit, target.parent, defaults)
+    return written
+
+
+def _sampling_weight(light: Light, rgb: RGB, all_dark: bool) -> float | None:
+    """The sampling weight to write, or None to leave it as it is."""
+    if any(rgb):
+        return 1.0 if light.sampling_weight == 0 else None
+    # Mitsuba refuses a scene in which no emitter may be sampled.
+    return None if all_dark else 0.0
+
+
+def _place_of_include(file: Path, root: Path) -> Path:
+    """Where the edited copy must lie, relative to relit.xml, to be found first."""
+    try:
+        return file.resolve().relative_to(root.resolve().parent)
+    except ValueError:
+        raise SceneError(
+            f"{file} holds lights but lies outside the folder of {root}, so an edited copy of it "
+            "would not be found: move it below that folder"
+        ) from None
+
+
+def _edit(edit: _Edits, folder: Path, defaults: Mapping[str, str]) -> bytes:
+    xml = XmlFile(edit.original)
+    if xml.root.tag == "scene":
+        # Assets and includes lie where the original lies; the first default wins.
+        origin = os.path.relpath(edit.original.resolve().parent, folder.resolve())
+        lines = [tag("path", value=Path(origin).as_posix())]
+        lines += [tag("default", name=k, value=v) for k, v in defaults.items()]
+        xml.insert_first(xml.root, lines)
+    for offset, (light, rgb, weight) in edit.settings.items():
+        element = xml.element_at(offset)
+        values = " ".join(f"{np.float32(v):.9g}" for v in rgb)
+        parameter = light.kind.parameter
+        missing = _set(xml, element, parameter, tag("rgb", name=parameter, value=values))
+        if weight is not None:
+            line = tag("float", name="sampling_weight", value=f"{weight:g}")
+            missing += _set(xml, element, "sampling_weight", line)
+        if missing:
+            xml.insert_first(element, missing)
+    return xml.edited()
+
+
+def _set(xml: XmlFile, element: Element, name: str, line: str) -> list[str]:
+    """Replace the child called `name` by `line`; if there is none, return it as missing."""
+    child = element.child_named(name)
+    if child is None:
+        return [line]
+    xml.replace(child, line)
+    return []

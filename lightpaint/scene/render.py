@@ -1,0 +1,106 @@
+"""Ordinary Mitsuba renders of a scene, in passes, as an `Estimate` with its noise."""
+
+import gc
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from lightpaint.errors import SceneError
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.exr import Floats
+from lightpaint.progress import Progress, silent
+from lightpaint.scene.emitters import RGB
+from lightpaint.scene.scene import Scene
+
+#: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
+#: memory is taken for, so passes are short.
+SAMPLES_PER_PASS = 2**21
+
+
+class Stream(IntEnum):
+    """What random numbers are drawn for; equal seeds in two streams share none."""
+
+    BASIS = 0
+    VERIFICATION = 1
+    TEMPLATE = 2
+    CHOICE = 3
+
+
+def pass_seed(seed: int, stream: Stream, index: int) -> int:
+    """The 32-bit seed of pass `index`: unrelated for any other seed, stream or index."""
+    return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
+
+
+def plan_passes(pixels: int, spp: int) -> tuple[int, int]:
+    """(number of passes, samples per pixel in each): an even number, for two equal halves."""
+    if spp < 2:
+        raise SceneError(f"{spp} samples per pixel are too few: two halves need at least 2")
+    halves = max(1, round(pixels * spp / (2 * SAMPLES_PER_PASS)))
+    passes = 2 * min(halves, spp // 2)
+    return passes, -(-spp // passes)
+
+
+def render(
+    scene: Scene,
+    emission: Mapping[str, RGB] | None = None,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    stream: Stream,
+    label: str = "render",
+    progress: Progress = silent,
+) -> Estimate:
+    """Render `scene` with its own integrator and the given emissions (its own by default).
+
+    spp: samples per pixel in all (the scene's own number by default).
+    Returns linear Rec.709 radiance, (h, w, 3).
+    """
+    loaded = scene.load(emission)
+    try:
+        return render_loaded(
+            loaded,
+            scene,
+            spp=spp or scene.spp,
+            seed=seed,
+            stream=stream,
+            label=label,
+            progress=progress,
+        )
+    finally:
+        del loaded
+        gc.collect()
+
+
+def render_loaded(
+    loaded: Any,
+    scene: Scene,
+    *,
+    spp: int,
+    seed: int,
+    stream: Stream,
+    label: str = "render",
+    progress: Progress = silent,
+) -> Estimate:
+    """As `render`, for a scene that is already loaded."""
+    import mitsuba as mi
+
+    height, width = scene.size
+    passes, spp_per_pass = plan_passes(height * width, spp)
+    halves = np.zeros((2, height, width, 3), np.float64)
+    progress(label, 0, passes)
+    for k in range(passes):
+        image = mi.render(
+            loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=spp_per_pass
+        )
+        # Integrators that wrap another add channels of their own behind R, G and B.
+        halves[k % 2] += np.array(image)[..., :3]
+        progress(label, k + 1, passes)
+    halves /= passes / 2
+    return Estimate.of_halves(as_float32(halves[0]), as_float32(halves[1]))
+
+
+def as_float32(image: Floats) -> Floats:
+    """The image in the precision that images are kept and written in."""
+    return image.astype(np.float32)

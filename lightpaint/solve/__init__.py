@@ -1,0 +1,1 @@
+"""Which lighting comes closest? `Basis` and `Target` become a `Solution`."""

@@ -1,0 +1,215 @@
+"""The answer: named lights with their emissions, and its file, lighting.json."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import RGB, Basis, BasisLight
+from lightpaint.errors import LightingError
+from lightpaint.files import write_text
+from lightpaint.images.estimate import Estimate
+from lightpaint.solve.normal_equations import Doubles
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-lighting 1"
+
+
+@dataclass(frozen=True)
+class LightSetting:
+    """One light of a lighting.
+
+    emission: linear RGB in `unit`, the parameter's own unit in Mitsuba.
+    weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
+    """
+
+    name: str
+    plugin: str
+    parameter: str
+    unit: str
+    emission: RGB
+    weight: RGB
+
+    def __post_init__(self) -> None:
+        for what, rgb in (("emission", self.emission), ("weight", self.weight)):
+            if not all(math.isfinite(v) and v >= 0 for v in rgb):
+                raise LightingError(
+                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
+                )
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How good a solve is, per colour channel (R, G, B).
+
+    kkt_residual: optimality measure of the solver (see solver.kkt_residual).
+    objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
+    unreached: lights that no weighted pixel sees, which keep their present emission.
+    """
+
+    kkt_residual: RGB
+    objective: RGB
+    relative_objective: RGB
+    sweeps: tuple[int, int, int]
+    converged: bool
+    unreached: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """Emissions for named lights. quality: of the solve they come from, if they do."""
+
+    lights: tuple[LightSetting, ...]
+    target: str = ""
+    scene_identity: str = ""
+    quality: Quality | None = None
+
+    def __post_init__(self) -> None:
+        names = [light.name for light in self.lights]
+        if len(set(names)) != len(names):
+            raise LightingError(f"light names repeat: {', '.join(names)}")
+
+    @property
+    def emission(self) -> Mapping[str, RGB]:
+        """RGB emission by name of light."""
+        return {light.name: light.emission for light in self.lights}
+
+    @classmethod
+    def of_weights(cls, basis: Basis, weights: Doubles, **about: Any) -> "Lighting":
+        """From weights (n, 3) in the order of `basis`."""
+        settings = tuple(
+            _setting(light, _rgb(weight))
+            for light, weight in zip(basis.lights, weights, strict=True)
+        )
+        return cls(settings, scene_identity=basis.origin.scene_identity, **about)
+
+    @classmethod
+    def present(cls, basis: Basis) -> "Lighting":
+        """The scene's lighting as it is."""
+        return cls.of_weights(basis, basis.present_weights)
+
+    def weights_for(self, basis: Basis) -> Doubles:
+        """(n, 3) weights in the order of `basis`.
+
+        Raises LightingError if the two do not name the same lights.
+        """
+        given = {light.name: light.weight for light in self.lights}
+        if set(given) != set(basis.names):
+            missing = sorted(set(basis.names) - set(given))
+            unknown = sorted(set(given) - set(basis.names))
+            raise LightingError(
+                "lighting and basis name different lights: "
+                f"missing {', '.join(missing) or 'none'}; unknown {', '.join(unknown) or 'none'}"
+            )
+        return np.array([given[name] for name in basis.names], dtype=np.float64)
+
+
+def combine(basis: Basis, lighting: Lighting) -> Estimate:
+    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it."""
+    weights = lighting.weights_for(basis).astype(np.float32)
+
+    def mix(images: Any) -> Any:
+        return np.einsum("nhwc,nc->hwc", images, weights, optimize=True)
+
+    return Estimate(mix(basis.images), mix(basis.half_differences))
+
+
+def write_lighting(path: Path, lighting: Lighting) -> None:
+    """Write lighting.json (docs/formats.md), whole or not at all."""
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "lightpaint": __version__,
+        "target": lighting.target,
+        "scene_identity": lighting.scene_identity,
+        "lights": {
+            light.name: {
+                "plugin": light.plugin,
+                "parameter": light.parameter,
+                "unit": light.unit,
+                "emission": list(light.emission),
+                "weight": list(light.weight),
+            }
+            for light in lighting.lights
+        },
+    }
+    if (q := lighting.quality) is not None:
+        data["solve"] = {
+            "kkt_residual": list(q.kkt_residual),
+            "objective": list(q.objective),
+            "relative_objective": list(q.relative_objective),
+            "sweeps": list(q.sweeps),
+            "converged": q.converged,
+            "unreached": list(q.unreached),
+        }
+    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_lighting(path: str | Path) -> Lighting:
+    """Read what `write_lighting` wrote. Raises LightingError for anything else."""
+    path = Path(path)
+    if not path.is_file():
+        raise LightingError(f"no such lighting file: {path}")
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise LightingError(f"{path} is not a JSON file: {error}") from None
+    found = data.get("format") if isinstance(data, dict) else None
+    if found != FORMAT:
+        raise LightingError(f"{path} has the format {found!r}: expected {FORMAT!r}")
+    try:
+        return Lighting(
+            lights=tuple(_read_setting(name, d) for name, d in data["lights"].items()),
+            target=str(data.get("target", "")),
+            scene_identity=str(data.get("scene_identity", "")),
+            quality=_read_quality(data["solve"]) if "solve" in data else None,
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise LightingError(f"{path} is no complete lighting: {error!r}") from None
+    except LightingError as error:
+        raise LightingError(f"{path}: {error}") from None
+
+
+def _setting(light: BasisLight, weight: RGB) -> LightSetting:
+    # One unit of weight is unit-white emission, so that here the two are the same numbers.
+    return LightSetting(
+        light.name, light.plugin, light.parameter, light.unit, emission=weight, weight=weight
+    )
+
+
+def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
+    return LightSetting(
+        name,
+        str(data["plugin"]),
+        str(data["parameter"]),
+        str(data["unit"]),
+        _read_rgb(data["emission"]),
+        _read_rgb(data["weight"]),
+    )
+
+
+def _read_quality(data: dict[str, Any]) -> Quality:
+    r, g, b = (int(v) for v in data["sweeps"])
+    return Quality(
+        _read_rgb(data["kkt_residual"]),
+        _read_rgb(data["objective"]),
+        _read_rgb(data["relative_objective"]),
+        (r, g, b),
+        bool(data["converged"]),
+        tuple(str(name) for name in data["unreached"]),
+    )
+
+
+def _rgb(values: Any) -> RGB:
+    r, g, b = (float(v) for v in values)
+    return r, g, b
+
+
+def _read_rgb(values: Any) -> RGB:
+    # float() would also take "1" and true, and a string of three digits for three numbers.
+    if not isinstance(values, list) or not all(type(v) in (int, float) for v in values):
+        raise TypeError(f"{values!r} is not a list of three numbers")
+    return _rgb(values)

@@ -1,0 +1,103 @@
+"""M w = b: the least-squares problem in the lights alone (Schoeneman et al. 1993, Eq 3, 5).
+
+The objective is ‖Ψ − Σ w_i Φ_i‖² under ⟨f, g⟩ = Σ_pixels D f g, one problem per colour
+channel. All sums run in float64 over float32 pixels.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import TargetError
+from lightpaint.images.exr import Floats
+from lightpaint.target.target import Target
+
+Doubles = npt.NDArray[np.float64]
+
+#: Pixels multiplied at a time: bounds the float64 copies.
+BLOCK = 2**15
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Inner products of basis and target, per colour channel.
+
+    M: (3, n, n), ⟨Φ_i, Φ_j⟩. b: (3, n), ⟨Φ_i, Ψ⟩. target_norm2: (3,), ‖Ψ‖².
+    """
+
+    M: Doubles
+    b: Doubles
+    target_norm2: Doubles
+
+    def objective(self, w: Doubles) -> Doubles:
+        """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3)."""
+        quadratic = np.einsum("ic,cij,jc->c", w, self.M, w)
+        value = self.target_norm2 - 2 * np.einsum("ci,ic->c", self.b, w) + quadratic
+        # A perfect fit leaves round-off of either sign.
+        return np.asarray(np.maximum(value, 0))
+
+    @classmethod
+    def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":
+        """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w)."""
+        return cls(*inner_products(basis.images, image, importance))
+
+
+def inner_products(
+    images: Floats, target: Floats, importance: Floats
+) -> tuple[Doubles, Doubles, Doubles]:
+    """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) under the pixel weights `importance`.
+
+    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), >= 0.
+    """
+    n = images.shape[0]
+    rows = images.reshape(n, -1, 3)
+    # Pixels without weight contribute nothing and need not be read.
+    counted = np.flatnonzero(importance.ravel())
+    weights = importance.ravel()
+    colours = target.reshape(-1, 3)
+    gram = np.zeros((3, n + 1, n + 1))
+    for start in range(0, counted.size, BLOCK):
+        pixels = counted[start : start + BLOCK]
+        # (3, n + 1, block): the target goes along as one more row.
+        block = np.empty((3, n + 1, pixels.size))
+        block[:, :n] = rows[:, pixels].transpose(2, 0, 1)
+        block[:, n] = colours[pixels].T
+        block *= np.sqrt(weights[pixels].astype(np.float64))
+        gram += block @ block.transpose(0, 2, 1)
+    return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
+
+
+def weighted_problem(
+    basis: Basis, target: Target, *, unpainted: float = 0.0
+) -> tuple[Floats, Floats]:
+    """The image and importance to solve for, of the size of the basis.
+
+    Pixels in which an emitter is seen directly count nothing unless somebody painted them:
+    at unit emission they would outshine everything the light falls on.
+
+    unpainted: weight of what is not painted against the current look. A pixel of
+    importance a then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖², which is one
+    residual of weight D = a + unpainted (1 − a) against the weighted mean of both images.
+    """
+    if unpainted < 0 or not np.isfinite(unpainted):
+        raise TargetError(f"--unpainted is a weight >= 0, not {unpainted:g}")
+    importance = target.importance.astype(np.float64)
+    image = target.image.astype(np.float64)
+    if target.everything:
+        importance = np.where(basis.emitters_seen, 0, importance)
+        if not importance.any():
+            raise TargetError(
+                f"target {target.name}: the camera sees an emitter in every pixel, so none "
+                "counts; give a mask of those that should"
+            )
+    if unpainted > 0:
+        current = np.einsum("nhwc,nc->hwc", basis.images, basis.present_weights, optimize=True)
+        rest = unpainted * np.maximum(1 - importance, 0)
+        rest = np.where(basis.emitters_seen, 0, rest)
+        total = importance + rest
+        mixed = importance[..., None] * image + rest[..., None] * current
+        image = mixed / np.where(total > 0, total, 1)[..., None]
+        importance = total
+    return image, importance

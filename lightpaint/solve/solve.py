@@ -1,0 +1,68 @@
+"""From basis and painting to lighting, in one call."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.images.exr import Floats
+from lightpaint.solve.lighting import Lighting, Quality
+from lightpaint.solve.normal_equations import NormalEquations, weighted_problem
+from lightpaint.solve.solver import solve_normal_equations
+from lightpaint.target.target import Target
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The lighting that comes closest to a target, and the problem it solves.
+
+    image: (h, w, 3), what was solved for; importance: (h, w), its weights. They differ from
+    the target's where unpainted pixels count or emitters are seen.
+    """
+
+    lighting: Lighting
+    image: Floats
+    importance: Floats
+
+    @property
+    def quality(self) -> Quality:
+        """How good the solve is."""
+        assert self.lighting.quality is not None
+        return self.lighting.quality
+
+
+def solve(
+    basis: Basis, target: Target, *, unpainted: float = 0.0, start: Lighting | None = None
+) -> Solution:
+    """Find the non-negative light colours whose image comes closest to `target`.
+
+    unpainted: weight of what is not painted, against the current look.
+    start: lighting to begin with (the present one by default): a good guess saves sweeps,
+    the answer is the same.
+
+    Raises SizeError if basis and target differ in size, TargetError if nothing counts.
+    """
+    target = target.fitted_to(basis.size, resize=False)
+    image, importance = weighted_problem(basis, target, unpainted=unpainted)
+    equations = NormalEquations.of(basis, image, importance)
+    begin = basis.present_weights if start is None else start.weights_for(basis)
+    result = solve_normal_equations(equations, begin)
+
+    objective = equations.objective(result.weights)
+    norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
+    unreached = tuple(n for n, ok in zip(basis.names, result.reached, strict=True) if not ok)
+    quality = Quality(
+        kkt_residual=_rgb(result.kkt_residual),
+        objective=_rgb(objective),
+        relative_objective=_rgb(objective / norm),
+        sweeps=result.sweeps,
+        converged=result.converged,
+        unreached=unreached,
+    )
+    lighting = Lighting.of_weights(basis, result.weights, target=target.name, quality=quality)
+    return Solution(lighting, image, importance)
+
+
+def _rgb(values: Floats) -> tuple[float, float, float]:
+    r, g, b = (float(v) for v in values)
+    return r, g, b

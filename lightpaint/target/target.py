@@ -1,0 +1,154 @@
+"""A painting as the solve sees it: linear pixels and how much each of them counts."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from lightpaint.errors import ImageError, SizeError, TargetError
+from lightpaint.images.exr import Floats, Part, read_parts
+
+#: Channel that holds importance in a file whose RGB is not premultiplied.
+WEIGHT_CHANNEL = "W"
+
+
+@dataclass(frozen=True)
+class Target:
+    """The painted image Ψ and its importance D.
+
+    image: (h, w, 3) float32, linear Rec.709, finite.
+    importance: (h, w) float32 >= 0, the weight of each pixel's squared residual.
+    everything: whether nobody said what was painted, so that every pixel counts 1.
+    not_finite: number of pixels with NaN or Inf, which have no importance.
+    """
+
+    name: str
+    image: Floats
+    importance: Floats
+    everything: bool
+    not_finite: int = 0
+
+    def __post_init__(self) -> None:
+        if self.image.shape != (*self.importance.shape, 3):
+            raise SizeError(
+                f"target {self.name}: image {self.image.shape} and importance "
+                f"{self.importance.shape} differ in size"
+            )
+        if not np.isfinite(self.image).all():
+            raise TargetError(f"target {self.name} holds NaN or Inf")
+        if not np.isfinite(self.importance).all() or (self.importance < 0).any():
+            raise TargetError(
+                f"target {self.name}: importance must be finite and not negative; it is between "
+                f"{np.min(self.importance):g} and {np.max(self.importance):g}"
+            )
+        if not self.importance.any():
+            raise TargetError(
+                f"target {self.name} has importance 0 everywhere, so nothing in it counts: "
+                "paint with some alpha, or give a mask that is not black"
+            )
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self.image.shape[0], self.image.shape[1]
+
+    def resized(self, size: tuple[int, int]) -> "Target":
+        """Resampled to `size` (height, width), in linear light, weighted by importance."""
+        if size == self.size:
+            return self
+        height, width = size
+        weighted = np.dstack([self.image * self.importance[..., None], self.importance])
+        shrinks = width <= self.size[1]
+        kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
+        planes = [
+            Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
+                (width, height), kernel
+            )
+            for plane in np.moveaxis(weighted, -1, 0)
+        ]
+        *rgb, importance = (np.asarray(p) for p in planes)
+        image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
+        return replace(self, image=image, importance=importance)
+
+    def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
+        """This target at `size` (height, width) of the basis.
+
+        Raises SizeError if it has another size and may not be resampled.
+        """
+        if self.size != size and not resize:
+            raise SizeError(
+                f"target {self.name} is {self.size[1]}x{self.size[0]} but the basis is "
+                f"{size[1]}x{size[0]}: export it at that size, or pass --resize"
+            )
+        return self.resized(size)
+
+
+def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
+    """Read a painted EXR: R, G, B in linear Rec.709.
+
+    What counts is, in this order: `mask` (its Y, W, A or R channel); the file's W channel;
+    its alpha, by which RGB is then taken to be premultiplied, as OpenEXR prescribes;
+    without any of them, every pixel alike.
+
+    Raises ImageError for files that cannot be read, TargetError for what cannot be solved
+    for, SizeError if target and mask differ in size.
+    """
+    path = Path(path)
+    part = _single_part(path)
+    try:
+        image = part.rgb()
+    except ImageError as error:
+        raise ImageError(f"{path} is no RGB image: {error}") from None
+    importance, alpha = None, part.channels.get("A")
+    if mask is not None:
+        importance = _read_mask(Path(mask))
+        if importance.shape != part.size:
+            raise SizeError(
+                f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
+                f"is {part.size[1]}x{part.size[0]}: export both at one size"
+            )
+    elif WEIGHT_CHANNEL in part.channels:
+        importance = part.channels[WEIGHT_CHANNEL].astype(np.float32)
+    elif alpha is not None:
+        importance = alpha.astype(np.float32)
+    if alpha is not None and WEIGHT_CHANNEL not in part.channels:
+        image = _unpremultiplied(image, alpha.astype(np.float32))
+
+    finite = np.asarray(np.isfinite(image).all(axis=-1))
+    weights = np.ones(part.size, np.float32) if importance is None else importance
+    return Target(
+        name=path.stem,
+        image=np.where(finite[..., None], image, 0).astype(np.float32),
+        importance=np.where(finite, weights, 0).astype(np.float32),
+        everything=importance is None,
+        not_finite=int(finite.size - finite.sum()),
+    )
+
+
+def _unpremultiplied(image: Floats, alpha: Floats) -> Floats:
+    safe = np.where(alpha > 0, alpha, 1)
+    # Over next to no alpha a colour may become infinite, and is then counted as such.
+    with np.errstate(over="ignore"):
+        return image / safe[..., None]
+
+
+def _read_mask(path: Path) -> npt.NDArray[np.float32]:
+    part = _single_part(path)
+    for name in ("Y", WEIGHT_CHANNEL, "A", "R"):
+        if name in part.channels:
+            return part.channels[name].astype(np.float32)
+    raise ImageError(
+        f"mask {path} has none of the channels Y, W, A, R: it has {', '.join(part.channels)}"
+    )
+
+
+def _single_part(path: Path) -> Part:
+    parts = read_parts(path)
+    if len(parts) > 1:
+        raise ImageError(
+            f"{path} has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of "
+            "them is the painting cannot be told: export a single image"
+        )
+    return parts[0]

@@ -1,0 +1,152 @@
+"""Loading scenes: which lights there are, what they are called, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from renderer import CORNELL, LIGHTS, write_room
+
+from lightpaint.errors import BackendError, SceneError
+from lightpaint.scene.scene import load_scene
+from lightpaint.scene.variant import use_variant
+
+
+def test_lights_in_document_order_with_what_they_emit(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    assert [light.name for light in scene.lights] == list(LIGHTS)
+    assert [light.plugin for light in scene.lights] == [
+        "area",
+        "point",
+        "spot",
+        "directional",
+        "constant",
+    ]
+    emissions = [light.emission for light in scene.lights]
+    expected = [(4, 3, 2), (0.5, 0.6, 0.7), (3, 3, 3), (1, 0.9, 0.8), (0.1, 0.2, 0.3)]
+    np.testing.assert_allclose(emissions, expected, rtol=1e-6)  # float32
+    assert scene.size == (20, 24)
+    assert scene.spp == 16
+
+
+def test_names_come_from_emitter_else_shape_else_plugin_and_number(tmp_path: Path) -> None:
+    lights = """
+        <emitter type="point"/>
+        <shape type="sphere" id="globe"><emitter type="area"/></shape>
+        <emitter type="point"/>
+        <shape type="sphere"><emitter type="area" id="lantern"/></shape>
+        <shape type="cube"><emitter type="area"/></shape>
+        <shape type="sphere" id="point_1"><emitter type="area"/></shape>"""
+    path = write_room(tmp_path, lights=lights)
+    names = [light.name for light in load_scene(path).lights]
+    assert names == ["point_0", "globe", "point_1", "lantern", "area_2", "point_1_2"]
+    assert [light.name for light in load_scene(path).lights] == names
+
+
+def test_emission_is_read_from_the_loaded_light_not_from_its_text(tmp_path: Path) -> None:
+    lights = """
+        <emitter type="point" id="grey"><spectrum name="intensity" value="3"/></emitter>
+        <emitter type="point" id="silent"/>
+        <emitter type="constant" id="preset"><spectrum name="radiance" type="d65"/></emitter>"""
+    lights = lights.replace('<spectrum name="radiance" type="d65"/>', "")
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    np.testing.assert_allclose(scene.light("silent").emission, [1, 1, 1], rtol=1e-6)
+    # A constant spectrum is not a grey colour in RGB: what Mitsuba makes of it counts.
+    assert all(v > 0 for v in scene.light("grey").emission)
+
+
+def test_parameters_and_includes(tmp_path: Path) -> None:
+    (tmp_path / "more.xml").write_text(
+        f'<scene version="3.0.0">{LIGHTS["bulb"]}</scene>', encoding="utf-8"
+    )
+    path = write_room(tmp_path, lights='<include filename="more.xml"/>' + LIGHTS["sky"])
+    scene = load_scene(path, parameters={"width": 10})
+    assert scene.size == (20, 10)
+    assert {light.name for light in scene.lights} == {"bulb", "sky"}
+    assert scene.light("bulb").file == 1
+
+
+def test_found_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert load_scene(CORNELL).lights  # its meshes are found beside it
+
+
+def test_identity_follows_content_and_not_dates(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    first = load_scene(path).identity
+    path.touch()
+    assert load_scene(path).identity == first
+    assert load_scene(path, parameters={"spp": 3}).identity != first
+    path.write_text(path.read_text(encoding="utf-8").replace("0.7 0.5 0.4", "0.7 0.5 0.5"))
+    assert load_scene(path).identity != first
+
+
+NO_SENSOR = f'<scene version="3.0.0">{LIGHTS["sky"]}</scene>'
+
+SEEN = NO_SENSOR.replace("<emitter", '<sensor type="perspective"/><emitter')
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("this is not XML", "refuses"),
+        ('<scene version="3.0.0">', "refuses"),
+        ("<scene/>", "version"),
+        ('<bsdf version="3.0.0" type="diffuse"/>', "<scene>"),
+        (NO_SENSOR, "no sensor"),
+        ('<scene version="3.0.0"><sensor type="perspective"/></scene>', "no lights"),
+        (SEEN.replace("constant", "no_such_plugin"), "no_such_plugin"),
+        (NO_SENSOR.replace("0.1 0.2 0.3", "$colour"), "-D colour=VALUE"),
+        ('<scene version="3.0.0"><include filename="gone.xml"/></scene>', "gone.xml"),
+        (
+            '<scene version="3.0.0"><sensor type="perspective"/>'
+            '<shape type="ply"><string name="filename" value="gone.ply"/></shape></scene>',
+            "gone.ply",
+        ),
+    ],
+)
+def test_what_cannot_be_loaded_is_refused_in_one_line(
+    tmp_path: Path, text: str, message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).count("Mitsuba refuses") <= 1
+    assert capfd.readouterr() == ("", "")
+
+
+def test_missing_file_unknown_sensor_and_light(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="no such scene file"):
+        load_scene(tmp_path / "gone.xml")
+    path = write_room(tmp_path)
+    for sensor in ("nobody", "7", -1):
+        with pytest.raises(SceneError, match=r"0 \(camera\)"):
+            load_scene(path, sensor=sensor)
+    assert load_scene(path, sensor="0").sensor == load_scene(path, sensor="camera").sensor == 0
+    with pytest.raises(SceneError, match="panel, bulb"):
+        load_scene(path).light("nobody")
+
+
+@pytest.mark.parametrize(
+    ("light", "named"),
+    [
+        ('<emitter type="sunsky" id="heaven"/>', "heaven"),
+        (
+            '<shape type="rectangle" id="screen"><emitter type="area"><texture type="checkerboard"'
+            ' name="radiance"/></emitter></shape>',
+            "screen",
+        ),
+    ],
+)
+def test_lights_it_cannot_solve_for_are_named(tmp_path: Path, light: str, named: str) -> None:
+    with pytest.raises(SceneError, match=named):
+        load_scene(write_room(tmp_path, lights=light))
+
+
+def test_a_process_keeps_its_variant() -> None:
+    backend = use_variant()
+    assert use_variant(backend.variant) is backend
+    with pytest.raises(BackendError, match="start a new one"):
+        use_variant("scalar_rgb" if backend.variant != "scalar_rgb" else "llvm_ad_rgb")

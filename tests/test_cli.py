@@ -1,0 +1,295 @@
+"""The command line as a user meets it: real processes, real files, exit codes."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from renderer import REPOSITORY, write_room
+
+from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+
+CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"
+WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
+COOL = REPOSITORY / "targets" / "cornell" / "cool.exr"
+COOL_MASK = REPOSITORY / "targets" / "cornell" / "cool.mask.exr"
+
+RESULTS = {
+    "lighting.json",
+    "relit.xml",
+    "predicted.exr",
+    "verified.exr",
+    "comparison.png",
+    "report.html",
+}
+
+
+def run(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """`lightpaint …` in `folder`."""
+    return subprocess.run(
+        [sys.executable, "-m", "lightpaint.cli", *map(str, arguments)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def succeed(folder: Path, *arguments: object) -> str:
+    done = run(folder, *arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def refused(folder: Path, *arguments: object) -> str:
+    """The one line a user gets for a mistake; nothing may be left in `folder`."""
+    before = sorted(p for p in folder.rglob("*"))
+    done = run(folder, *arguments)
+    assert done.returncode == 2, done.stdout + done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert sorted(p for p in folder.rglob("*")) == before
+    return lines[0]
+
+
+@pytest.fixture(scope="module")
+def basis_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("basis") / "cornell.basis.exr"
+    assert "5 lights" in succeed(path.parent, "basis", CORNELL, "-o", path, "--spp", 8)
+    return path
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The main job: a scene and a painting in, a verified lighting out."""
+    folder = tmp_path_factory.mktemp("solved")
+    return folder / "warm", succeed(folder, "solve", CORNELL, WARM, "--spp", 32)
+
+
+def test_solve_leaves_everything_it_promises(solved: tuple[Path, str]) -> None:
+    folder, output = solved
+    assert {p.name for p in folder.iterdir()} == RESULTS
+    assert "agree" in output
+    for name in ("ceiling", "left_spot", "right_spot", "lamp", "window"):
+        assert name in output
+    data = json.loads((folder / "lighting.json").read_text(encoding="utf-8"))
+    assert data["format"].startswith("lightpaint-lighting ")
+    assert max(data["solve"]["kkt_residual"]) <= 1e-10
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert f"lightpaint solve {CORNELL} {WARM} --spp 32" in page
+
+
+def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: Path) -> None:
+    folder, _ = solved
+    assert "agree within noise" in succeed(tmp_path, "verify", folder, "--seed", 5)
+    copies = []
+    for name in ("one", "two"):
+        data = json.loads((folder / "lighting.json").read_text(encoding="utf-8"))
+        data["target"] = name
+        copies.append(tmp_path / f"{name}.json")
+        copies[-1].write_text(json.dumps(data), encoding="utf-8")
+    succeed(tmp_path, "relight", CORNELL, *copies, "-o", "looks", "--spp", 4)
+    for name in ("one", "two"):
+        made = {p.name for p in (tmp_path / "looks" / name).iterdir()}
+        assert made == {"relit.xml", "relit.exr", "relit.png"}
+
+
+def test_verify_tells_a_tampered_scene(solved: tuple[Path, str], tmp_path: Path) -> None:
+    folder = tmp_path / "warm"
+    shutil.copytree(solved[0], folder)
+    # The copy lies elsewhere: point it at the original's assets.
+    relit = folder / "relit.xml"
+    origin = os.path.relpath(CORNELL.parent, folder)
+    lines = relit.read_text(encoding="utf-8").splitlines()
+    lines = [f'<path value="{origin}"/>' if "<path " in line else line for line in lines]
+    relit.write_text("\n".join(lines).replace('max_depth" value="6"', 'max_depth" value="3"'))
+    done = run(tmp_path, "verify", folder)
+    assert done.returncode == 1
+    assert "DISAGREE" in done.stdout
+
+
+def test_several_targets_share_one_basis(tmp_path: Path) -> None:
+    done = run(tmp_path, "solve", CORNELL, WARM, COOL, "--mask", COOL_MASK, "--spp", 4, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    for name in ("warm", "cool"):
+        assert {p.name for p in (tmp_path / "out" / name).iterdir()} == RESULTS
+    assert done.stderr.count("basis:") == 1
+
+
+def test_solving_from_a_basis_needs_no_mitsuba(basis_file: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys\n"
+        "class Wall:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('mitsuba', 'drjit'): raise ImportError(name)\n"
+        "sys.meta_path.insert(0, Wall())\n"
+        "from lightpaint.cli import main\n"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "solve", str(basis_file), str(WARM)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (tmp_path / "warm").iterdir()} == RESULTS - {
+        "relit.xml",
+        "verified.exr",
+    }
+
+
+def test_lights_as_table_and_json(tmp_path: Path) -> None:
+    assert "left_spot" in succeed(tmp_path, "lights", CORNELL)
+    data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json"))
+    assert [light["name"] for light in data["lights"]][0] == "ceiling"
+    np.testing.assert_allclose(data["lights"][0]["emission"], [7, 6.8, 6.4], rtol=1e-6)
+
+
+def test_template_is_the_current_look(tmp_path: Path) -> None:
+    succeed(tmp_path, "template", CORNELL, "-o", "t.exr", "--spp", 4)
+    [part] = read_parts(tmp_path / "t.exr")
+    assert part.rgb().shape == (128, 128, 3)
+    assert (tmp_path / "t.png").is_file()
+
+
+def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    done = run(tmp_path, "basis", room, "-m", "scalar_rgb", "--spp", 4, "-D", "width=8")
+    assert done.returncode == 0, done.stderr
+    assert "separately" in done.stderr
+    assert (tmp_path / "room.basis.exr").is_file()
+
+
+def test_doctor_names_what_it_found(tmp_path: Path) -> None:
+    output = succeed(tmp_path, "doctor")
+    for word in ("mitsuba", "LLVM", "cores", "GPU", "backend"):
+        assert word in output
+
+
+def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:
+    code = "import sys; from lightpaint.cli import main\ntry: main(['--help'])\nfinally: print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "solve" in done.stdout
+    loaded = done.stdout.split()
+    assert "mitsuba" not in loaded
+    assert "drjit" not in loaded
+    for command in ("lights", "basis", "template", "solve", "relight", "verify", "doctor"):
+        assert "--help" in succeed(tmp_path, command, "--help")
+
+
+def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path: Path) -> None:
+    image = np.ones((128, 128, 3), np.float32)
+    bad = tmp_path / "bad"
+    bad.mkdir()
+    write_rgb(bad / "small.exr", image[:64])
+    write_parts(bad / "unpainted.exr", [Part("", {**rgb_channels(image), "A": image[..., 0] * 0})])
+    write_parts(bad / "negative.exr", [Part("", {**rgb_channels(image), "W": -image[..., 0]})])
+    write_rgb(bad / "nan.exr", image * np.nan)
+    whole = WARM.read_bytes()
+    (bad / "cut.exr").write_bytes(whole[: len(whole) // 2])
+    (bad / "text.exr").write_text("no picture")
+    (bad / "file").write_text("in the way")
+    here = tmp_path
+    for target, words in {
+        "gone.exr": "no such image file",
+        "bad/small.exr": "128x64",
+        "bad/unpainted.exr": "importance 0 everywhere",
+        "bad/negative.exr": "not negative",
+        "bad/nan.exr": "importance 0 everywhere",
+        "bad/cut.exr": "cut off",
+        "bad/text.exr": "not a readable OpenEXR",
+    }.items():
+        assert words in refused(here, "solve", basis_file, target)
+        assert words in refused(here, "solve", CORNELL, target)
+    assert "cannot write into bad/file" in refused(
+        here, "solve", basis_file, WARM, "-o", "bad/file"
+    )
+    assert "cannot write" in refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
+    assert "is not a basis" in refused(here, "solve", WARM, WARM)
+    assert "no such scene" in refused(here, "solve", "gone.xml", WARM)
+    assert "refuses" in refused(here, "lights", "bad/text.exr")
+    assert "no sensor 'nobody'" in refused(here, "lights", CORNELL, "-s", "nobody")
+    assert "not key=value" in refused(here, "lights", CORNELL, "-D", "spp")
+    assert "spp" in refused(here, "basis", CORNELL, "--spp", "1")
+    assert "seed" in refused(here, "basis", CORNELL, "--seed", "-1")
+    assert "unpainted" in refused(here, "solve", basis_file, WARM, "--unpainted", "nan")
+    assert "overwrite" in refused(here, "solve", basis_file, WARM, WARM)
+    assert "must end in .exr" in refused(here, "basis", CORNELL, "-o", "basis.png")
+    assert "no such lighting" in refused(here, "relight", CORNELL, "gone.json")
+    assert "not a JSON" in refused(here, "relight", CORNELL, "bad/file")
+    assert "no such image" in refused(here, "verify", "bad")
+    assert "no variant" in refused(here, "lights", CORNELL, "-m", "llvm_ad_nonsense_rgb")
+    assert "not supported" in refused(here, "lights", CORNELL, "-m", "scalar_spectral")
+
+
+def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
+    pixels = np.empty((2, 2), dtype=object)
+    for index in np.ndindex(2, 2):
+        pixels[index] = np.ones(3, np.float32)
+    header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.deepscanline}
+    OpenEXR.File(header, {"R": pixels, "G": pixels, "B": pixels}).write(str(tmp_path / "deep.exr"))
+    assert "deep" in refused(tmp_path, "solve", CORNELL, "deep.exr")
+
+
+def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
+    [part] = read_parts(WARM)
+    wide = {k: np.repeat(np.repeat(v, 2, 0), 2, 1) for k, v in part.channels.items()}
+    write_parts(tmp_path / "wide.exr", [Part("", wide)])
+    succeed(tmp_path, "solve", basis_file, "wide.exr", "--resize")
+    succeed(tmp_path, "solve", basis_file, WARM)
+    answers = [
+        json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))["lights"]
+        for name in ("wide", "warm")
+    ]
+    for light in answers[0]:
+        # Each pixel stands four times and is averaged again: precision of half and float32.
+        np.testing.assert_allclose(
+            answers[0][light]["emission"], answers[1][light]["emission"], rtol=1e-4, atol=1e-5
+        )
+    succeed(tmp_path, "solve", basis_file, WARM, "-o", "held", "--unpainted", "100")
+    held = json.loads((tmp_path / "held" / "lighting.json").read_text(encoding="utf-8"))["lights"]
+    present = json.loads(succeed(tmp_path, "lights", CORNELL, "--json"))["lights"]
+    now = {light["name"]: light["emission"] for light in present}
+
+    def gap(lights: dict[str, dict[str, list[float]]]) -> float:
+        return sum(float(np.abs(np.subtract(lights[n]["emission"], now[n])).sum()) for n in now)
+
+    assert gap(held) < gap(answers[1])
+
+
+def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    text = room.read_text(encoding="utf-8").replace('<default name="width" value="24"/>', "")
+    room.write_text(text, encoding="utf-8")
+    assert "-D width=VALUE" in refused(tmp_path, "lights", room)
+    assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9")
+
+
+def test_interrupted_leaves_no_result(tmp_path: Path) -> None:
+    import signal
+
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lightpaint.cli", "basis", str(CORNELL), "--spp", "4000"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    while not process.stderr.readline().startswith("basis"):
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == 130
+    assert "Traceback" not in process.stderr.read()
+    process.stderr.close()
+    assert list(tmp_path.iterdir()) == []
