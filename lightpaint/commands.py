@@ -26,7 +26,7 @@ from lightpaint.pipeline import (
     verify_result,
 )
 from lightpaint.progress import Progress as Report
-from lightpaint.relight.verdict import agreement, energy_shares, verdict
+from lightpaint.relight.verdict import energy_shares, verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant

@@ -1,10 +1,14 @@
-"""Telling whoever waits how far long work has come.
+"""Telling whoever waits how far long work has come, and letting them stop it.
 
 Rooms report through a plain callable, so that a terminal, a notebook and a test can all
 listen; which of them listens is the caller's choice.
 """
 
-from typing import Protocol
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 
 class Progress(Protocol):
@@ -16,3 +20,31 @@ class Progress(Protocol):
 
 def silent(label: str, done: int, total: int) -> None:
     """The progress report of whoever does not listen."""
+
+
+@contextmanager
+def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
+    """Hold Ctrl-C back, and yield a function that lets it through where it does no harm.
+
+    An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded
+    loops behind; between two passes it is clean.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: None  # signals arrive elsewhere
+        return
+    pending = False
+
+    def remember(_signal: int, _frame: Any) -> None:
+        nonlocal pending
+        pending = True
+
+    def let_through() -> None:
+        if pending:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, remember)
+    try:
+        yield let_through
+        let_through()
+    finally:
+        signal.signal(signal.SIGINT, before)

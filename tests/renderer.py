@@ -45,10 +45,12 @@ ROOM = """<scene version="3.0.0">
     </sensor>
     {sensors}
     <shape type="rectangle" id="floor"><transform name="to_world"><rotate x="1" angle="-90"/>
-        </transform><bsdf type="diffuse"><rgb name="reflectance" value="0.7 0.5 0.4"/></bsdf></shape>
+        </transform>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.7 0.5 0.4"/></bsdf></shape>
     <shape type="rectangle" id="wall"><transform name="to_world">
         <translate y="1" z="-1"/></transform>
-        <bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="0.3 0.5 0.6"/></bsdf></shape>
+        <bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="0.3 0.5 0.6"/></bsdf>
+        </shape>
     <shape type="sphere" id="ball"><point name="center" x="0.3" y="0.3" z="0.2"/>
         <float name="radius" value="0.3"/>
         <bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></shape>

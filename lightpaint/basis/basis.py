@@ -5,6 +5,7 @@ image as R, G, B; other programs can open it as it is. docs/formats.md has the d
 """
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,13 @@ class BasisLight:
     unit: str
     emission: RGB
     form: str = ""
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(v) and v >= 0 for v in self.emission):
+            raise BasisError(
+                f"light {self.name!r} has the emission {list(self.emission)}: "
+                "need three numbers >= 0"
+            )
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.errors import SceneError
 from lightpaint.images.exr import Floats
-from lightpaint.progress import Progress, silent
+from lightpaint.progress import Progress, interruptible_between_pieces, silent
 from lightpaint.scene.emitters import RGB
 from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_loaded
 from lightpaint.scene.scene import Scene
@@ -107,20 +107,22 @@ def _render_together(
     sequences = [pass_seed(seed, Stream.CHOICE, half) for half in range(2)]
     traced = 0
     progress("basis", 0, passes)
-    for k in range(passes):
-        traced += accumulate(
-            loaded,
-            scene.integrator,
-            sensor=scene.sensor,
-            light_of=light_of,
-            planes=planes[k % 2],
-            seen=seen,
-            seed=pass_seed(seed, Stream.BASIS, k),
-            spp=spp_per_pass,
-            turn=(sequences[k % 2], k // 2 * spp_per_pass),
-        )
-        dr.sync_thread()
-        progress("basis", k + 1, passes)
+    with interruptible_between_pieces() as let_interrupts_through:
+        for k in range(passes):
+            traced += accumulate(
+                loaded,
+                scene.integrator,
+                sensor=scene.sensor,
+                light_of=light_of,
+                planes=planes[k % 2],
+                seen=seen,
+                seed=pass_seed(seed, Stream.BASIS, k),
+                spp=spp_per_pass,
+                turn=(sequences[k % 2], k // 2 * spp_per_pass),
+            )
+            dr.sync_thread()
+            progress("basis", k + 1, passes)
+            let_interrupts_through()
     del loaded, light_of
     gc.collect()
     halves = []

@@ -60,14 +60,13 @@ def box_mean(values: Floats, radius: int) -> Floats:
         high = np.minimum(np.arange(length) + radius + 1, length)
         count = (high - low).reshape([-1 if k == axis else 1 for k in range(values.ndim)])
         values = (np.take(total, high, axis) - np.take(total, low, axis)) / count
-    # A running sum leaves round-off where the truth is 0.
-    return np.maximum(values, 0)
+    return values
 
 
 def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -> None:
-    """Write R, G, B in float32 and the half difference as a half-float layer."""
+    """Write R, G, B and the half difference as a layer of its own, in float32."""
     channels = rgb_channels(estimate.image)
-    channels |= rgb_channels(estimate.half_difference, HALF_DIFFERENCE, half=True)
+    channels |= rgb_channels(estimate.half_difference, HALF_DIFFERENCE)
     write_parts(path, [Part("rgb", channels, attributes)])
 
 

@@ -33,17 +33,36 @@ class Part:
 
     channels: name → (height, width) array, float16 or float32 (uint32 when read so).
     attributes: text attributes of the header.
+    display: (height, width) of the display window, the picture; None if it is `size`.
+    offset: (y, x) of the first stored pixel in it: programs crop what is empty or keep a margin.
     """
 
     name: str
     channels: Mapping[str, npt.NDArray[Any]]
     attributes: Mapping[str, str] = field(default_factory=dict)
+    display: tuple[int, int] | None = None
+    offset: tuple[int, int] = (0, 0)
 
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         height, width = next(iter(self.channels.values())).shape
         return height, width
+
+    def in_display_window(self) -> "Part":
+        """The part cut or filled with zeros to its display window."""
+        height, width = self.display or self.size
+        if (height, width) == self.size and self.offset == (0, 0):
+            return self
+        y, x = self.offset
+        top, left = max(y, 0), max(x, 0)
+        placed = {}
+        for name, pixels in self.channels.items():
+            canvas = np.zeros((height, width), pixels.dtype)
+            stored = pixels[top - y :, left - x :][: max(height - top, 0), : max(width - left, 0)]
+            canvas[top : top + stored.shape[0], left : left + stored.shape[1]] = stored
+            placed[name] = canvas
+        return Part(self.name, placed, self.attributes)
 
     def rgb(self, layer: str = "") -> Floats:
         """The R, G and B channels of `layer` as (height, width, 3) float32."""
@@ -90,7 +109,8 @@ def read_parts(path: Path) -> list[Part]:
         if not channels:
             raise ImageError(f"{path} has a part without channels")
         attributes = {k: v for k, v in part.header.items() if isinstance(v, str)}
-        result.append(Part(part.name() or "", channels, attributes))
+        display, offset = _windows(part.header)
+        result.append(Part(part.name() or "", channels, attributes, display, offset))
     return result
 
 
@@ -112,20 +132,23 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
             raise OutputError(f"cannot write {path}: {_first_line(error)}") from error
 
 
-def rgb_channels(image: Floats, layer: str = "", *, half: bool = False) -> dict[str, Floats]:
-    """(height, width, 3) pixels as the channels R, G, B of `layer`; float16 if `half`."""
+def rgb_channels(image: Floats, layer: str = "") -> dict[str, Floats]:
+    """(height, width, 3) pixels as the float32 channels R, G, B of `layer`."""
     prefix = f"{layer}." if layer else ""
-    if half:
-        # The largest half is 65504: beyond it a value would become infinite.
-        image = np.clip(image, -65504, 65504).astype(np.float16)
-    else:
-        image = image.astype(np.float32, copy=False)
+    image = image.astype(np.float32, copy=False)
     return {f"{prefix}{c}": image[..., k] for k, c in enumerate("RGB")}
 
 
 def write_rgb(path: Path, image: Floats, *, attributes: Mapping[str, str] | None = None) -> None:
     """Write a (height, width, 3) linear image as one float32 RGB part."""
     write_parts(path, [Part("rgb", rgb_channels(image), attributes or {})])
+
+
+def _windows(header: Mapping[str, Any]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """(height, width) of the display window and the data window's (y, x) in it."""
+    (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in header["displayWindow"])
+    x, y = (int(v) for v in header["dataWindow"][0])
+    return (y1 - y0 + 1, x1 - x0 + 1), (y - y0, x - x0)
 
 
 def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]) -> None:
@@ -140,7 +163,9 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
         width, height = int(x1) - int(x0) + 1, int(y1) - int(y0) + 1
         if width < 1 or height < 1:
             raise ImageError(f"{path} declares an empty image of {width}x{height} pixels")
-        values += width * height * max(len(header.get("channels", ())), 1)
+        (height_shown, width_shown), _ = _windows(header)
+        pixels = max(width * height, width_shown * height_shown)
+        values += pixels * max(len(header.get("channels", ())), 1)
     if values > MAX_VALUES:
         raise ImageError(f"{path} declares {values:.2g} pixel values: too many to read")
 

@@ -98,7 +98,10 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
     z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
 
     # A block's mean difference, over the standard error that its own pixels show.
+    # Where a rare bright sample is all the noise there is, both halves may show it alike and
+    # seem to know more than they do: a block counts for no more than LIMIT.
     block_z = _block_sums(difference) / np.sqrt(_block_sums(squares))
+    block_z = np.clip(block_z, -LIMIT, LIMIT)
     z_rms = float(np.sqrt(np.square(block_z).mean()))
     # For n normal z, the mean of z² is 1 ± √(2/n); the channels of a pixel are not
     # independent, so n counts blocks. 64 degrees of freedom add 2/62.

@@ -10,7 +10,7 @@ import numpy as np
 from lightpaint.errors import SceneError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
-from lightpaint.progress import Progress, silent
+from lightpaint.progress import Progress, interruptible_between_pieces, silent
 from lightpaint.scene.emitters import RGB
 from lightpaint.scene.scene import Scene
 
@@ -90,13 +90,15 @@ def render_loaded(
     passes, spp_per_pass = plan_passes(height * width, spp)
     halves = np.zeros((2, height, width, 3), np.float64)
     progress(label, 0, passes)
-    for k in range(passes):
-        image = mi.render(
-            loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=spp_per_pass
-        )
-        # Integrators that wrap another add channels of their own behind R, G and B.
-        halves[k % 2] += np.array(image)[..., :3]
-        progress(label, k + 1, passes)
+    with interruptible_between_pieces() as let_interrupts_through:
+        for k in range(passes):
+            image = mi.render(
+                loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=spp_per_pass
+            )
+            # Integrators that wrap another add channels of their own behind R, G and B.
+            halves[k % 2] += np.array(image)[..., :3]
+            progress(label, k + 1, passes)
+            let_interrupts_through()
     halves /= passes / 2
     return Estimate.of_halves(as_float32(halves[0]), as_float32(halves[1]))
 

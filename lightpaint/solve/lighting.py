@@ -48,7 +48,8 @@ class Quality:
 
     kkt_residual: optimality measure of the solver (see solver.kkt_residual).
     objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
-    unreached: lights that no weighted pixel sees, which keep their present emission.
+    unreached: lights that no weighted pixel sees, which keep what the solve started from:
+    their present emission.
     """
 
     kkt_residual: RGB
@@ -154,7 +155,7 @@ def read_lighting(path: str | Path) -> Lighting:
     if not path.is_file():
         raise LightingError(f"no such lighting file: {path}")
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_without_repeats)
     except (ValueError, RecursionError) as error:
         raise LightingError(f"{path} is not a JSON file: {error}") from None
     found = data.get("format") if isinstance(data, dict) else None
@@ -171,6 +172,14 @@ def read_lighting(path: str | Path) -> Lighting:
         raise LightingError(f"{path} is no complete lighting: {error!r}") from None
     except LightingError as error:
         raise LightingError(f"{path}: {error}") from None
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    # JSON itself would silently keep the last of two lights of one name.
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError(f"a name stands twice among {', '.join(key for key, _ in pairs)}")
+    return found
 
 
 def _setting(light: BasisLight, weight: RGB) -> LightSetting:
@@ -193,13 +202,16 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
 
 def _read_quality(data: dict[str, Any]) -> Quality:
     r, g, b = (int(v) for v in data["sweeps"])
+    converged, unreached = data["converged"], data["unreached"]
+    if not isinstance(converged, bool) or not isinstance(unreached, list):
+        raise TypeError("converged is true or false, and unreached a list of names")
     return Quality(
         _read_rgb(data["kkt_residual"]),
         _read_rgb(data["objective"]),
         _read_rgb(data["relative_objective"]),
         (r, g, b),
-        bool(data["converged"]),
-        tuple(str(name) for name in data["unreached"]),
+        converged,
+        tuple(str(name) for name in unreached),
     )
 
 

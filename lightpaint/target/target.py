@@ -96,7 +96,8 @@ def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
     for, SizeError if target and mask differ in size.
     """
     path = Path(path)
-    part = _single_part(path)
+    stored = _single_part(path)
+    part = stored.in_display_window()
     try:
         image = part.rgb()
     except ImageError as error:
@@ -117,7 +118,10 @@ def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
         image = _unpremultiplied(image, alpha.astype(np.float32))
 
     finite = np.asarray(np.isfinite(image).all(axis=-1))
-    weights = np.ones(part.size, np.float32) if importance is None else importance
+    # Pixels that the file does not store were not painted.
+    stored_ones = replace(stored, channels={"Y": np.ones(stored.size, np.float32)})
+    everywhere = stored_ones.in_display_window().channels["Y"]
+    weights = everywhere if importance is None else importance
     return Target(
         name=path.stem,
         image=np.where(finite[..., None], image, 0).astype(np.float32),
@@ -135,7 +139,7 @@ def _unpremultiplied(image: Floats, alpha: Floats) -> Floats:
 
 
 def _read_mask(path: Path) -> npt.NDArray[np.float32]:
-    part = _single_part(path)
+    part = _single_part(path).in_display_window()
     for name in ("Y", WEIGHT_CHANNEL, "A", "R"):
         if name in part.channels:
             return part.channels[name].astype(np.float32)

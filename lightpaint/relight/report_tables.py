@@ -1,0 +1,163 @@
+"""The tables of the report: lights, fit, renders, verification. Each returns HTML.
+
+Names of lights, targets and scenes come from other people's files and are escaped here.
+"""
+
+import importlib.metadata
+import platform
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import RGB, Basis, BasisLight
+from lightpaint.images.color import luminance
+from lightpaint.images.display import encode_display, to_8_bit
+from lightpaint.relight.report_pictures import data_uri, thumbnail
+from lightpaint.relight.verdict import energy_shares, relative_residual
+from lightpaint.relight.verify import LIMIT, Verification
+from lightpaint.solve.lighting import LightSetting
+from lightpaint.solve.solve import Solution
+from lightpaint.target.target import Target
+from lightpaint.version import __version__
+
+
+def lights_table(basis: Basis, solution: Solution) -> str:
+    """One row per light, in document order."""
+    shares = energy_shares(basis, solution.lighting)
+    settings = {light.name: light for light in solution.lighting.lights}
+    rows = []
+    for light, image, share in zip(basis.lights, basis.images, shares, strict=True):
+        picture, stops = thumbnail(image, basis.emitters_seen)
+        name, setting = escape(light.name), settings[light.name]
+        what = f"What {name} lights alone, shown at {stops:+.1f} stops"
+        rows.append(
+            f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
+            f'width="{picture.shape[1]}" height="{picture.shape[0]}" alt="{what}" '
+            f'title="{what}"></td>'
+            f'<th scope="row">{name}<small>{escape(light.plugin)}'
+            f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
+            f"<td>{_swatch(setting.emission)}</td>"
+            f'<td class="rgb">{_rgb(light.emission)}</td>'
+            f'<td class="rgb">{_rgb(setting.emission)}</td>'
+            f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
+            f"<td>{change(light, setting, solution.quality.unreached)}</td>"
+            f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
+            f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
+        )
+    return "".join(rows)
+
+
+def change(light: BasisLight, setting: LightSetting, unreached: tuple[str, ...]) -> str:
+    """In words or as a ratio of luminance, what happens to a light."""
+    before = float(luminance(np.array(light.emission)))
+    after = float(luminance(np.array(setting.emission)))
+    if light.name in unreached:
+        return "unchanged: reaches nothing painted"
+    if after == 0:
+        return "off" if before > 0 else "stays off"
+    if before == 0:
+        return "was off, now on"
+    stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
+    return f"×{after / before:.3g}<small>{stops}</small>"
+
+
+def fit_table(solution: Solution) -> str:
+    """Objective, optimality and sweeps, per channel and in all."""
+    q = solution.quality
+    columns = zip(
+        ("red", "green", "blue"), q.relative_objective, q.kkt_residual, q.sweeps, strict=True
+    )
+    rows = [
+        f'<tr><th scope="row">{name}</th><td>{objective:.3g}</td><td>{np.sqrt(objective):.3g}</td>'
+        f"<td>{kkt:.1e}</td><td>{sweeps}</td></tr>"
+        for name, objective, kkt, sweeps in columns
+    ]
+    total = relative_residual(solution)
+    rows.append(
+        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}</td><td>{total:.3g}</td>'
+        f"<td>{max(q.kkt_residual):.1e}</td><td>{max(q.sweeps)}</td></tr>"
+    )
+    return "".join(rows)
+
+
+def verification_table(verification: Verification | None) -> str:
+    """How far prediction and render are apart, each number beside what is allowed."""
+    if verification is None:
+        return _facts([("Result", "not verified")])
+    v = verification
+    means = ", ".join(f"{value:+.2f}" for value in v.z_mean).replace("-", "−")
+    return _facts(
+        [
+            ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
+            ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
+            ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; limit {v.z_rms_limit:.3f}"),
+            ("z of the whole image", f"{means} (R, G, B); limit ±{LIMIT:g}"),
+            ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
+        ]
+    )
+
+
+def render_table(basis: Basis, target: Target, solution: Solution) -> str:
+    """Where the basis comes from, and which pixels and lights took no part."""
+    origin, q = basis.origin, solution.quality
+    height, width = basis.size
+    stopped = f"no: stopped after {max(q.sweeps)} sweeps"
+    seen = int(basis.emitters_seen.sum())
+    facts = [
+        ("Solve converged", "yes" if q.converged else stopped),
+        ("Lights", f"{len(basis.lights)}, of them {_lights_off(solution) or 'none'} off"),
+        ("Image", f"{width} × {height} pixels"),
+        ("Basis", f"{origin.method}, {origin.spp} samples per pixel, seed {origin.seed}"),
+        ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
+    ]
+    if q.unreached:
+        facts.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
+    if target.not_finite:
+        facts.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
+    return _facts(facts)
+
+
+def versions(basis: Basis) -> str:
+    """What made this: lightpaint and the libraries under it, as installed here."""
+    parts = [f"lightpaint {__version__}"]
+    if basis.origin.lightpaint != __version__:
+        parts[0] += f" (basis by {basis.origin.lightpaint})"
+    for name in ("mitsuba", "drjit", "numpy"):
+        try:
+            parts.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue  # a saved basis needs no renderer
+    return " · ".join([*parts, f"Python {platform.python_version()}"])
+
+
+def hex_color(emission: RGB) -> str | None:
+    """Colour of a light as #rrggbb, its brightest channel at full; None if it is off."""
+    brightest = max(emission)
+    if brightest <= 0:
+        return None
+    r, g, b = to_8_bit(encode_display(np.array(emission) / brightest))
+    return f"#{r:02x}{g:02x}{b:02x}"
+
+
+def _swatch(emission: RGB) -> str:
+    color = hex_color(emission)
+    if color is None:
+        return '<span class="swatch none"></span><small>off</small>'
+    return f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
+
+
+def _rgb(emission: RGB) -> str:
+    return "<br>".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
+
+
+def _lights_off(solution: Solution) -> int:
+    return sum(not any(light.emission) for light in solution.lighting.lights)
+
+
+def _seen_note(target: Target, seen: int) -> str:
+    return ", which do not count" if seen and target.everything else ""
+
+
+def _facts(facts: list[tuple[str, Any]]) -> str:
+    return "".join(f"<dt>{escape(k)}</dt><dd>{escape(str(v))}</dd>" for k, v in facts)

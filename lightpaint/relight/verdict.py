@@ -1,0 +1,66 @@
+"""What a result comes to, in a few numbers and one sentence."""
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.images.color import LUMINANCE
+from lightpaint.relight.verify import LIMIT, Verification
+from lightpaint.solve.lighting import Lighting
+from lightpaint.solve.normal_equations import Doubles
+from lightpaint.solve.solve import Solution
+
+
+def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
+    """Share of each light in the predicted image's energy, (n,) float64, in basis order.
+
+    Energy is luminance Y summed over all pixels, painted or not: Σ Y(w_i Φ_i) over
+    Σ_j Σ Y(w_j Φ_j). The shares sum to 1; where every light is off they are all 0.
+    """
+    flux = basis.images.sum(axis=(1, 2), dtype=np.float64)  # (n, 3)
+    energy = (flux * lighting.weights_for(basis)) @ LUMINANCE
+    total = energy.sum()
+    return np.asarray(energy / total if total > 0 else np.zeros_like(energy))
+
+
+def relative_residual(solution: Solution) -> float:
+    """RMS of what the lighting misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
+
+    E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
+    by importance. 0 is a perfect match, 1 is what all lights off would give. Without the
+    square root a miss of 10 % of the light would look like one of 1 %.
+    """
+    weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
+    norm2 = float(weighted.sum())
+    # A painting that is black wherever it counts is met by darkness alone.
+    missed = sum(solution.quality.objective)
+    return float(np.sqrt(missed / norm2)) if norm2 > 0 else float(missed > 0)
+
+
+def share_met(solution: Solution) -> float:
+    """How much of the painting the lighting meets, 0 to 1: 1 − `relative_residual`."""
+    return max(0.0, 1.0 - relative_residual(solution))
+
+
+def verdict(solution: Solution, verification: Verification | None) -> str:
+    """One plain sentence: how well the painting is met, and whether a render confirms it."""
+    fit = (
+        f"The lighting meets {100 * share_met(solution):.1f} % of the painting "
+        f"(relative RMS residual {relative_residual(solution):.2g})"
+    )
+    if not solution.quality.converged:
+        fit += ", from a solve that stopped before it converged"
+    return f"{fit}; {agreement(verification)}."
+
+
+def agreement(verification: Verification | None) -> str:
+    """Whether prediction and verification agree, as a clause with its numbers."""
+    if verification is None:
+        return "the prediction is not verified by a render"
+    spread = f"z {verification.z_rms:.2f}, limit {verification.z_rms_limit:.2f}"
+    if verification.agrees:
+        return f"prediction and verification agree within noise ({spread})"
+    bias = max(verification.z_mean, key=abs)
+    return (
+        f"prediction and verification DISAGREE by more than their noise ({spread}; "
+        f"mean off by {abs(bias):.1f} standard errors, limit {LIMIT:g})"
+    )

@@ -1,0 +1,217 @@
+"""The basis and its file: exact, plain EXR to others, and refused when damaged."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from lightpaint.basis.basis import (
+    FORMAT_KEY,
+    LIGHT_KEY,
+    ORIGIN_KEY,
+    Basis,
+    is_basis_file,
+    read_basis,
+    write_basis,
+)
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.estimate import HALF_DIFFERENCE
+from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
+
+SIZE = (6, 5)
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> Basis:
+    rng = np.random.default_rng(3)
+    return make_basis(
+        3,
+        SIZE,
+        names=["key", "Fülllicht 灯 №2", "back/rim.left"],
+        # Values of every size, some beyond half float.
+        images=10.0 ** rng.uniform(-30, 30, (3, *SIZE, 3)),
+        half_differences=rng.normal(size=(3, *SIZE, 3)),
+        seen=rng.random(SIZE) < 0.3,
+    )
+
+
+@pytest.fixture
+def path(tmp_path: Path, basis: Basis) -> Path:
+    write_basis(tmp_path / "a.basis.exr", basis)
+    return tmp_path / "a.basis.exr"
+
+
+def _assert_equal(got: Basis, want: Basis) -> None:
+    assert got.lights == want.lights
+    assert got.origin == want.origin
+    assert got.images.tobytes() == want.images.tobytes()
+    assert got.half_differences.tobytes() == want.half_differences.tobytes()
+    assert got.images.dtype == got.half_differences.dtype == np.float32
+    assert got.emitters_seen.dtype == bool
+    np.testing.assert_array_equal(got.emitters_seen, want.emitters_seen)
+
+
+def test_there_and_back_is_exact(path: Path, basis: Basis):
+    back = read_basis(path)
+    _assert_equal(back, basis)
+    assert back.names == ("key", "Fülllicht 灯 №2", "back/rim.left")
+    assert back.size == SIZE
+    np.testing.assert_array_equal(back.present_weights, [x.emission for x in basis.lights])
+
+
+@pytest.mark.parametrize(
+    "names", [["emitters seen"], ["emitters seen", "emitters seen_"], ["Y", "rgb"], [" ", "\n"]]
+)
+def test_lights_of_any_name(tmp_path: Path, make_basis: Any, names: list[str]):
+    basis = make_basis(len(names), SIZE, names=names, seen=np.eye(*SIZE, dtype=bool))
+    write_basis(tmp_path / "a.exr", basis)
+    _assert_equal(read_basis(tmp_path / "a.exr"), basis)
+
+
+def test_other_programs_see_one_rgb_part_per_light(path: Path, basis: Basis):
+    parts = OpenEXR.File(str(path), separate_channels=True).parts
+    assert [part.name() for part in parts] == [*basis.names, "emitters seen"]
+    for part, image, half in zip(parts, basis.images, basis.half_differences, strict=False):
+        for c, channel in enumerate("RGB"):
+            np.testing.assert_array_equal(part.channels[channel].pixels, image[..., c])
+            noise = part.channels[f"{HALF_DIFFERENCE}.{channel}"].pixels
+            np.testing.assert_array_equal(noise, half[..., c])
+    np.testing.assert_array_equal(parts[-1].channels["Y"].pixels, basis.emitters_seen)
+
+
+def test_the_order_of_parts_is_the_order_of_lights(path: Path, basis: Basis):
+    *lights, seen = read_parts(path)
+    # The marks of the file may be on any part.
+    write_parts(path, [seen, *reversed(lights)])
+    back = read_basis(path)
+    assert back.names == basis.names[::-1]
+    np.testing.assert_array_equal(back.images, basis.images[::-1])
+
+
+def _rewrite(path: Path, index: int, **changes: Any) -> None:
+    """Write the file at `path` again with other attributes in part `index`."""
+    parts = read_parts(path)
+    attributes = {**parts[index].attributes, **changes}
+    attributes = {k: v for k, v in attributes.items() if v is not None}
+    parts[index] = replace(parts[index], attributes=attributes)
+    write_parts(path, parts)
+
+
+def test_rewriting_alone_damages_nothing(path: Path, basis: Basis):
+    _rewrite(path, 0)
+    _assert_equal(read_basis(path), basis)
+
+
+@pytest.mark.parametrize("mark", [None, "lightpaint-basis 2", ""])
+def test_a_file_of_another_format(path: Path, mark: str | None):
+    _rewrite(path, 0, **{FORMAT_KEY: mark})
+    with pytest.raises(BasisError, match=r"a\.basis\.exr is not a basis this version can read"):
+        read_basis(path)
+
+
+def test_an_ordinary_picture_is_no_basis(tmp_path: Path):
+    write_rgb(tmp_path / "a.exr", np.ones((2, 2, 3)))
+    with pytest.raises(BasisError, match="found 'no such mark'"):
+        read_basis(tmp_path / "a.exr")
+
+
+GOOD_LIGHT = {
+    "name": "key",
+    "plugin": "area",
+    "parameter": "radiance",
+    "unit": "",
+    "emission": [1, 2, 3],
+    "form": "",
+}
+BAD_LIGHTS: list[Any] = [
+    *[{k: v for k, v in GOOD_LIGHT.items() if k != gone} for gone in GOOD_LIGHT if gone != "form"],
+    GOOD_LIGHT | {"colour": "red"},
+    *[GOOD_LIGHT | {"emission": bad} for bad in ([1, 2], 5, None, [1, 2, "x"], [1, 2, 10**400])],
+    GOOD_LIGHT | {"name": "back/rim.left"},
+    [],
+    "key",
+    None,
+    3,
+]
+
+
+@pytest.mark.parametrize("light", BAD_LIGHTS, ids=lambda x: str(x)[:70])
+def test_damaged_lights(path: Path, light: Any):
+    _rewrite(path, 0, **{LIGHT_KEY: json.dumps(light)})
+    with pytest.raises(BasisError):
+        read_basis(path)
+
+
+@pytest.mark.parametrize("text", ["{", "key", "[" * 100_000, '{"a":' * 100_000])
+@pytest.mark.parametrize("key", [LIGHT_KEY, ORIGIN_KEY])
+def test_damaged_json(path: Path, key: str, text: str):
+    _rewrite(path, 0, **{key: text})
+    with pytest.raises(BasisError, match=r"a\.basis\.exr is damaged as a basis"):
+        read_basis(path)
+
+
+@pytest.mark.parametrize("origin", [None, "{}", "[]", '{"scene": "a"}', '{"x": 1}', "7"])
+def test_damaged_origin(path: Path, origin: str | None):
+    _rewrite(path, 0, **{ORIGIN_KEY: origin})
+    with pytest.raises(BasisError, match=r"a\.basis\.exr is damaged as a basis"):
+        read_basis(path)
+
+
+@pytest.mark.parametrize("keep", [slice(0, -1), slice(0, 0), slice(-1, None)])
+def test_lost_parts(path: Path, keep: slice):
+    parts = read_parts(path)
+    marks = {k: parts[0].attributes[k] for k in (FORMAT_KEY, ORIGIN_KEY)}
+    mark = Part("marks", {"Z": np.zeros(SIZE, np.float32)}, marks)
+    kept = [replace(p, attributes={**p.attributes, **marks}) for p in parts[keep]]
+    write_parts(path, [*kept, mark])
+    with pytest.raises(BasisError, match="has lost parts of its basis"):
+        read_basis(path)
+
+
+def test_lost_noise(path: Path):
+    parts = read_parts(path)
+    colours = {k: v for k, v in parts[1].channels.items() if len(k) == 1}
+    parts[1] = replace(parts[1], channels=colours)
+    write_parts(path, parts)
+    with pytest.raises(BasisError, match=r"damaged as a basis: no channel half_difference\.R"):
+        read_basis(path)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_values_that_are_not_finite(tmp_path: Path, basis: Basis, bad: float):
+    images = basis.images.copy()
+    images[1, 2, 3, 0] = bad
+    write_basis(tmp_path / "a.exr", replace(basis, images=images))
+    with pytest.raises(BasisError, match="not finite"):
+        read_basis(tmp_path / "a.exr")
+
+
+def test_a_cut_off_basis(path: Path):
+    content = path.read_bytes()
+    for length in np.linspace(0, len(content) - 1, 40, dtype=int):
+        path.write_bytes(content[:length])
+        with pytest.raises(ImageError):
+            read_basis(path)
+
+
+def test_what_a_basis_must_be(make_basis: Any, basis: Basis):
+    with pytest.raises(BasisError, match="light names repeat: a, a"):
+        make_basis(2, SIZE, names=["a", "a"])
+    for changes, message in [
+        ({"images": basis.images[:2]}, "for 3 lights"),
+        ({"images": basis.images[..., :2]}, "for 3 lights"),
+        ({"half_differences": basis.half_differences[:, 1:]}, "half differences"),
+        ({"emitters_seen": basis.emitters_seen.T}, "mask of seen emitters"),
+    ]:
+        with pytest.raises(BasisError, match=message):
+            replace(basis, **changes)
+
+
+def test_names_of_basis_files():
+    assert is_basis_file(Path("a.basis.exr"))
+    assert is_basis_file(Path("A.EXR"))
+    assert not is_basis_file(Path("scene.xml"))

@@ -1,0 +1,57 @@
+"""Shared fixtures: small synthetic bases, so that the rooms without a renderer test in ms."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from lightpaint.basis.basis import Basis, BasisLight, Origin
+
+# Shared machines are slow now and then, which is no failure; a fixed choice of examples makes
+# a run repeatable.
+settings.register_profile("lightpaint", deadline=None, derandomize=True)
+settings.load_profile("lightpaint")
+
+BasisFactory = Callable[..., Basis]
+
+
+@pytest.fixture(scope="session")
+def make_basis() -> BasisFactory:
+    """A function that makes a Basis of random images, one light each.
+
+    images, half_differences: (n, h, w, 3), instead of random ones. seen: (h, w) bool.
+    """
+
+    def make(
+        n: int = 3,
+        size: tuple[int, int] = (12, 10),
+        *,
+        seed: int = 0,
+        names: Sequence[str] | None = None,
+        emission: Sequence[Sequence[float]] | None = None,
+        images: Any = None,
+        half_differences: Any = None,
+        seen: Any = None,
+    ) -> Basis:
+        rng = np.random.default_rng(seed)
+        if images is None:
+            images = rng.random((n, *size, 3))
+        images = np.asarray(images, dtype=np.float32)
+        n, height, width, _ = images.shape
+        if half_differences is None:
+            half_differences = np.zeros(images.shape)
+        if emission is None:
+            emission = rng.random((n, 3)).tolist()
+        if seen is None:
+            seen = np.zeros((height, width), dtype=bool)
+        names = [f"light {k}" for k in range(n)] if names is None else names
+        lights = tuple(
+            BasisLight(name, "area", "radiance", "W/(m² sr)", tuple(map(float, rgb)), "1 m²")
+            for name, rgb in zip(names, emission, strict=True)
+        )
+        origin = Origin("scene.xml", "0f" * 8, "sensor", 64, 0, "synthetic")
+        return Basis(lights, images, np.asarray(half_differences, np.float32), seen, origin)
+
+    return make

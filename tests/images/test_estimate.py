@@ -1,0 +1,97 @@
+"""Noise of an estimate: closed forms and its file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.ndimage import uniform_filter
+
+from lightpaint.errors import ImageError
+from lightpaint.images.estimate import Estimate, box_mean, read_estimate, write_estimate
+from lightpaint.images.exr import write_rgb
+
+
+def test_of_halves():
+    a, b = np.random.default_rng(0).random((2, 4, 5, 3))
+    estimate = Estimate.of_halves(a, b)
+    assert estimate.size == (4, 5)
+    # One rounding in float64.
+    np.testing.assert_allclose(estimate.image + estimate.half_difference, a, rtol=1e-15)
+    np.testing.assert_allclose(estimate.image - estimate.half_difference, b, rtol=1e-15)
+
+
+def test_shapes_must_agree():
+    with pytest.raises(ImageError, match="differ in shape"):
+        Estimate(np.zeros((2, 3, 3)), np.zeros((3, 2, 3)))
+
+
+@pytest.mark.parametrize("radius", [0, 1, 2, 50])
+def test_variance_of_a_constant_half_difference(radius: int):
+    shape = (6, 9, 3)
+    estimate = Estimate(np.ones(shape), np.full(shape, -0.5, np.float32))
+    # Running sums in float64.
+    np.testing.assert_allclose(estimate.variance(radius=radius), 0.25, rtol=1e-12)
+
+
+def test_variance_without_pooling_is_the_square():
+    half = np.random.default_rng(0).normal(size=(6, 9, 3)).astype(np.float32)
+    variance = Estimate(np.zeros_like(half), half).variance(radius=0)
+    # Differences of running sums, of order 10, in float64.
+    np.testing.assert_allclose(variance, np.square(half, dtype=np.float64), atol=1e-13)
+
+
+def test_variance_is_that_of_the_mean_of_the_halves():
+    """Two halves of standard deviation σ have a mean of variance σ²/2."""
+    sigma, shape = 0.3, (200, 200, 3)
+    rng = np.random.default_rng(0)
+    estimate = Estimate.of_halves(*(1 + sigma * rng.normal(size=(2, *shape))))
+    count = np.prod(shape)
+    # Noise: a mean of squares of n normals has the relative standard error √(2/n); four of them.
+    tolerance = 4 * np.sqrt(2 / count)
+    assert estimate.variance().mean() == pytest.approx(sigma**2 / 2, rel=tolerance)
+    assert estimate.image.var() == pytest.approx(sigma**2 / 2, rel=tolerance)
+
+
+@given(
+    seed=st.integers(0, 1000),
+    height=st.integers(1, 12),
+    width=st.integers(1, 12),
+    radius=st.integers(0, 8),
+)
+def test_box_mean_agrees_with_scipy(seed: int, height: int, width: int, radius: int):
+    values = np.random.default_rng(seed).random((height, width, 2))
+    size = (2 * radius + 1, 2 * radius + 1, 1)
+    # A window that is cut off at the border: the mean of what is inside.
+    inside = uniform_filter(np.ones_like(values), size, mode="constant")
+    expected = uniform_filter(values, size, mode="constant") / inside
+    # float64, and both sum up running.
+    np.testing.assert_allclose(box_mean(values, radius), expected, rtol=1e-10)
+
+
+def test_box_mean_of_an_impulse():
+    values = np.zeros((7, 8))
+    values[3, 0] = 1
+    mean = box_mean(values, 1)
+    expected = np.zeros((7, 8))
+    # Two columns of the window are inside the picture at column 0, three at column 1.
+    expected[2:5, 0], expected[2:5, 1] = 1 / 6, 1 / 9
+    np.testing.assert_allclose(mean, expected, atol=1e-15)
+    assert mean[3, 2:].max() == 0
+
+
+def test_there_and_back(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    image, half = rng.random((2, 5, 7, 3)).astype(np.float32)
+    write_estimate(tmp_path / "a.exr", Estimate(image, half), {"lightpaint.seed": "7"})
+    back = read_estimate(tmp_path / "a.exr")
+    np.testing.assert_array_equal(back.image, image)
+    np.testing.assert_array_equal(back.half_difference, half)
+    assert back.image.dtype == back.half_difference.dtype == np.float32
+
+
+def test_an_image_that_knows_nothing_of_its_noise(tmp_path: Path):
+    write_rgb(tmp_path / "a.exr", np.ones((2, 2, 3)))
+    with pytest.raises(ImageError, match=r"a\.exr carries no half_difference layer"):
+        read_estimate(tmp_path / "a.exr")

@@ -1,0 +1,221 @@
+"""OpenEXR files: exact there and back, and nothing damaged passes in silence."""
+
+import os
+import resource
+import struct
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from lightpaint.errors import ImageError, OutputError
+from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+
+# What a header's text may hold: anything but NUL, which ends it.
+TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20)
+SIZES = st.tuples(st.integers(1, 9), st.integers(1, 9))
+TYPES = st.sampled_from([np.float16, np.float32, np.uint32])
+
+
+@st.composite
+def _parts(draw: Any) -> list[Part]:
+    parts = []
+    # All parts of one file share a display window, so that their sizes agree.
+    size = draw(SIZES)
+    for name in draw(st.lists(TEXT, min_size=1, max_size=3, unique=True)):
+        channels = {
+            channel: draw(hnp.arrays(draw(TYPES), size))
+            for channel in draw(st.lists(TEXT, min_size=1, max_size=4, unique=True))
+        }
+        keys = TEXT.map(lambda text: f"lightpaint.{text}")
+        parts.append(Part(name, channels, draw(st.dictionaries(keys, TEXT, max_size=3))))
+    return parts
+
+
+@given(parts=_parts())
+@settings(max_examples=60)
+def test_there_and_back_is_exact(tmp_path_factory: pytest.TempPathFactory, parts: list[Part]):
+    path = tmp_path_factory.getbasetemp() / "parts.exr"
+    write_parts(path, parts)
+    back = read_parts(path)
+    assert [p.name for p in back] == [p.name for p in parts]
+    for got, want in zip(back, parts, strict=True):
+        assert got.size == want.size
+        assert got.attributes.items() >= want.attributes.items()
+        assert set(got.channels) == set(want.channels)
+        for name, pixels in want.channels.items():
+            assert got.channels[name].dtype == pixels.dtype
+            # To the bit: NaN and the sign of zero are part of it.
+            assert got.channels[name].tobytes() == pixels.tobytes()
+
+
+def test_other_programs_read_what_we_write(tmp_path: Path):
+    image = np.random.default_rng(0).random((5, 7, 3)).astype(np.float32)
+    write_rgb(tmp_path / "a.exr", image, attributes={"comments": "evening"})
+    part = OpenEXR.File(str(tmp_path / "a.exr")).parts[0]
+    assert part.header["comments"] == "evening"
+    np.testing.assert_array_equal(part.channels["RGB"].pixels, image)
+
+
+def test_rgb_of_layers(tmp_path: Path):
+    image = np.random.default_rng(0).random((4, 3, 3)).astype(np.float32)
+    channels = rgb_channels(image) | rgb_channels(-image, "noise")
+    write_parts(tmp_path / "a.exr", [Part("p", channels)])
+    part = read_parts(tmp_path / "a.exr")[0]
+    np.testing.assert_array_equal(part.rgb(), image)
+    np.testing.assert_array_equal(part.rgb("noise"), -image)
+    assert part.rgb("noise").dtype == np.float32
+    with pytest.raises(ImageError, match=r"no channel x\.R, x\.G, x\.B .* has B, G, R, noise\.B"):
+        part.rgb("x")
+
+
+def _written(path: Path, kind: str) -> bytes:
+    """A file of `kind`. Its pixels do not compress to nothing."""
+    rgb = {c: np.random.default_rng(1).random((33, 21)).astype(np.float32) for c in "RGB"}
+    if kind == "parts":
+        write_parts(path, [Part("a", rgb), Part("b", rgb)])
+    elif kind == "tiles":
+        header = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+        OpenEXR.File(header, rgb).write(str(path))
+    else:
+        header = {"type": OpenEXR.scanlineimage, "compression": getattr(OpenEXR, kind)}
+        OpenEXR.File(header, rgb).write(str(path))
+    assert read_parts(path)[0].size == (33, 21)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "kind", ["parts", "tiles", "NO_COMPRESSION", "ZIP_COMPRESSION", "PIZ_COMPRESSION"]
+)
+def test_a_cut_off_file_is_refused_quietly(
+    tmp_path: Path, kind: str, capfd: pytest.CaptureFixture[str]
+):
+    path = tmp_path / "cut.exr"
+    content = _written(path, kind)
+    offsets = {*range(0, len(content), len(content) // 60), *range(len(content) - 5, len(content))}
+    for length in sorted(offsets):
+        path.write_bytes(content[:length])
+        with pytest.raises(ImageError, match=r"cut\.exr"):
+            read_parts(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_damage_is_an_image_error_or_harmless(tmp_path: Path):
+    path = tmp_path / "damaged.exr"
+    content = _written(path, "parts")
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(150):
+        damaged = bytearray(content)
+        # Three in four of the places lie in the headers.
+        end = len(content) if rng.random() < 0.25 else 700
+        damaged[rng.integers(end)] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        try:
+            read_parts(path)
+        except ImageError:
+            refused += 1
+    assert refused > 20
+
+
+def test_the_terminal_is_given_back(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    path = tmp_path / "cut.exr"
+    path.write_bytes(_written(path, "parts")[:-1])
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(5):
+        with pytest.raises(ImageError):
+            read_parts(path)
+    assert len(os.listdir("/proc/self/fd")) == before
+    os.write(1, b"out")
+    os.write(2, b"err")
+    assert capfd.readouterr() == ("out", "err")
+
+
+@pytest.mark.parametrize("content", [b"", b"#?RADIANCE\n", b"\x89PNG\r\n\x1a\n" + bytes(99)])
+def test_no_exr(tmp_path: Path, content: bytes):
+    path = tmp_path / "picture.exr"
+    path.write_bytes(content)
+    with pytest.raises(ImageError, match=r"picture\.exr is not a readable OpenEXR file"):
+        read_parts(path)
+
+
+def test_no_file(tmp_path: Path):
+    for path in (tmp_path / "none.exr", tmp_path):
+        with pytest.raises(ImageError, match="no such image file"):
+            read_parts(path)
+
+
+def test_deep_pixels_are_refused_by_name(tmp_path: Path):
+    samples = np.empty((3, 2), dtype=object)
+    for index in np.ndindex(samples.shape):
+        samples[index] = np.arange(sum(index), dtype=np.float32)
+    header = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
+    OpenEXR.File(header, {"Z": samples}).write(str(tmp_path / "deep.exr"))
+    with pytest.raises(ImageError, match="deep pixels"):
+        read_parts(tmp_path / "deep.exr")
+
+
+TOO_MANY = r"huge\.exr declares .* pixel values: too many to read"
+
+
+@pytest.mark.parametrize(
+    ("window", "message"),
+    [
+        ((0, 0, 99_999, 99_999), TOO_MANY),
+        ((0, 0, 2**20, 2**20), TOO_MANY),
+        ((-500_000, 7, 500_000, 9_000), TOO_MANY),
+        # These the library itself refuses.
+        ((0, 0, 2**31 - 2, 2**31 - 2), "not a readable OpenEXR file"),
+        ((-(2**31), -(2**31), 2**31 - 1, 2**31 - 1), "not a readable OpenEXR file"),
+        ((5, 5, 0, 0), "not a readable OpenEXR file"),
+    ],
+)
+def test_absurd_sizes_are_refused_at_once(
+    tmp_path: Path, window: tuple[int, int, int, int], message: str
+):
+    path = tmp_path / "huge.exr"
+    content = bytearray(_written(path, "ZIP_COMPRESSION"))
+    start = content.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    content[start : start + 16] = struct.pack("<4i", *window)
+    path.write_bytes(content)
+    began = time.perf_counter()
+    with pytest.raises(ImageError, match=message):
+        read_parts(path)
+    # It takes 0.2 ms; to decode, or only to allocate, would take many seconds.
+    assert time.perf_counter() - began < 1
+
+
+def test_of_a_crop_the_pixels_that_are_there_are_read(tmp_path: Path):
+    pixels = np.arange(30, dtype=np.float32).reshape(6, 5)
+    header = {
+        "type": OpenEXR.scanlineimage,
+        "dataWindow": (np.array([2, 3], np.int32), np.array([6, 8], np.int32)),
+        "displayWindow": (np.array([0, 0], np.int32), np.array([19, 9], np.int32)),
+    }
+    OpenEXR.File(header, {"Y": pixels}).write(str(tmp_path / "crop.exr"))
+    part = read_parts(tmp_path / "crop.exr")[0]
+    assert part.size == (6, 5)
+    np.testing.assert_array_equal(part.channels["Y"], pixels)
+
+
+def test_a_full_disk_keeps_the_old_file(tmp_path: Path):
+    path = tmp_path / "a.exr"
+    write_rgb(path, np.zeros((2, 2, 3)))
+    old = path.read_bytes()
+    noise = np.random.default_rng(0).random((256, 256, 3)).astype(np.float32)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # To the library a limit on the length of files is a full disk.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(OutputError, match=r"cannot write .*a\.exr"):
+            write_rgb(path, noise)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == old
+    assert os.listdir(tmp_path) == ["a.exr"]

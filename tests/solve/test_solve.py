@@ -1,0 +1,196 @@
+"""From basis and target to lighting: what is minimised, and known lightings coming back."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.errors import LightingError, SizeError, TargetError
+from lightpaint.solve.lighting import Lighting, combine
+from lightpaint.solve.normal_equations import weighted_problem
+from lightpaint.solve.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (12, 10)
+
+
+def _target(image: Any, importance: Any = None) -> Target:
+    everything = importance is None
+    importance = np.ones(image.shape[:2]) if importance is None else importance
+    return Target(
+        "painted", image.astype(np.float32), importance.astype(np.float32), everything=everything
+    )
+
+
+def _random_target(seed: int = 1) -> Target:
+    rng = np.random.default_rng(seed)
+    # Importances of 0, between 0 and 1, 1 and more than 1.
+    importance = np.clip(rng.normal(0.5, 0.8, SIZE), 0, None)
+    return _target(rng.random((*SIZE, 3)), importance)
+
+
+def _seen() -> Any:
+    seen = np.zeros(SIZE, bool)
+    seen[:3, :4] = True
+    return seen
+
+
+def _squares(importance: Any, image: Any, basis: Any, w: Any) -> Any:
+    residual = image - np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), w)
+    return (importance[..., None] * residual**2).sum(axis=(0, 1))
+
+
+@pytest.mark.parametrize("unpainted", [0.0, 0.01, 1.0, 30.0])
+def test_one_residual_stands_for_two(make_basis: Any, unpainted: float):
+    """Σ a‖Ψ−x‖² + unpainted (1−a)‖current−x‖² and the weighted residual differ by a constant."""
+    basis = make_basis(4, SIZE, seen=_seen())
+    target = _random_target()
+    image, importance = weighted_problem(basis, target, unpainted=unpainted)
+    current = np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), basis.present_weights)
+    a = target.importance.astype(np.float64)
+    rest = unpainted * np.where(basis.emitters_seen, 0, np.maximum(1 - a, 0))
+
+    rng = np.random.default_rng(0)
+    constants = []
+    for _ in range(3):
+        w = rng.random((4, 3)) * 3
+        two = _squares(a, target.image, basis, w) + _squares(rest, current, basis, w)
+        constants.append(two - _squares(importance, image, basis, w))
+    # float64 sums of some hundred terms of order 1 to 100 in magnitude.
+    np.testing.assert_allclose(constants[1:], [constants[0]] * 2, rtol=0, atol=1e-9)
+
+
+def test_seen_emitters_do_not_count_if_nobody_said_what_does(make_basis: Any):
+    basis = make_basis(3, SIZE, seen=_seen())
+    target = _target(np.ones((*SIZE, 3)))
+    for unpainted in (0.0, 2.0):
+        _, importance = weighted_problem(basis, target, unpainted=unpainted)
+        np.testing.assert_array_equal(importance, np.where(_seen(), 0, 1))
+
+
+def test_seen_emitters_count_where_somebody_painted_them(make_basis: Any):
+    basis = make_basis(3, SIZE, seen=_seen())
+    painted = np.zeros(SIZE)
+    painted[0, 0] = painted[8, 8] = 0.5
+    _, importance = weighted_problem(basis, _target(np.ones((*SIZE, 3)), painted))
+    np.testing.assert_array_equal(importance, painted)
+    # What is not painted pulls towards the current look, but not where an emitter is seen.
+    _, importance = weighted_problem(basis, _target(np.ones((*SIZE, 3)), painted), unpainted=4)
+    np.testing.assert_array_equal(importance, painted + np.where(_seen(), 0, 4 * (1 - painted)))
+
+
+def test_nothing_but_emitters(make_basis: Any):
+    basis = make_basis(3, SIZE, seen=np.ones(SIZE, bool))
+    with pytest.raises(TargetError, match="emitter in every pixel"):
+        solve(basis, _target(np.ones((*SIZE, 3))))
+
+
+@pytest.mark.parametrize("unpainted", [-1.0, -1e-9, float("nan"), float("inf")])
+def test_weights_of_the_unpainted_that_make_no_sense(make_basis: Any, unpainted: float):
+    with pytest.raises(TargetError, match="unpainted"):
+        solve(make_basis(3, SIZE), _random_target(), unpainted=unpainted)
+
+
+def test_a_painting_of_another_size(make_basis: Any):
+    with pytest.raises(SizeError, match="10x12 but the basis is 10x13"):
+        solve(make_basis(3, (13, 10)), _random_target())
+
+
+@pytest.mark.parametrize("n", [1, 4, 12])
+def test_a_known_lighting_comes_back(make_basis: Any, n: int):
+    basis = make_basis(n, (20, 18), seed=n)
+    rng = np.random.default_rng(n)
+    truth = rng.random((n, 3)) * (rng.random((n, 3)) < 0.7)
+    image = combine(basis, Lighting.of_weights(basis, truth)).image
+    solution = solve(basis, _target(image))
+    # The picture is float32: its round-off, 6e-8, times the condition of the basis.
+    np.testing.assert_allclose(solution.lighting.weights_for(basis), truth, atol=1e-6)
+    assert solution.quality.converged
+    assert max(solution.quality.relative_objective) < 1e-12
+    np.testing.assert_allclose(combine(basis, solution.lighting).image, image, atol=1e-5)
+
+
+def test_a_known_lighting_comes_back_from_a_painted_part(make_basis: Any):
+    basis = make_basis(4, SIZE)
+    image = combine(basis, Lighting.of_weights(basis, np.full((4, 3), 0.5))).image
+    painted = np.zeros(SIZE)
+    painted[2:6, 3:8] = 0.25
+    image[painted == 0] = 1e6
+    solution = solve(basis, _target(image, painted))
+    np.testing.assert_allclose(solution.lighting.weights_for(basis), 0.5, atol=1e-6)
+
+
+def test_the_unpainted_keeps_the_current_look(make_basis: Any):
+    """The more it weighs, the closer the answer comes to the present lighting."""
+    basis = make_basis(4, SIZE)
+    painted = np.zeros(SIZE)
+    painted[:6] = 1
+    target = _target(np.random.default_rng(5).random((*SIZE, 3)), painted)
+    distances = []
+    for unpainted in (0.0, 0.1, 1.0, 10.0, 1e6):
+        w = solve(basis, target, unpainted=unpainted).lighting.weights_for(basis)
+        distances.append(np.abs(w - basis.present_weights).max())
+    assert distances == sorted(distances, reverse=True)
+    # What is left of the painted part's pull, a share of about 1e-6.
+    assert distances[-1] < 1e-5 < distances[0]
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, 100.0])
+def test_the_start_does_not_change_the_answer(make_basis: Any, start: float):
+    basis, target = make_basis(5, SIZE), _random_target()
+    plain = solve(basis, target).lighting.weights_for(basis)
+    begin = Lighting.of_weights(basis, np.full((5, 3), start))
+    other = solve(basis, target, start=begin).lighting.weights_for(basis)
+    # A KKT residual of 1e-10 times the condition of the basis.
+    np.testing.assert_allclose(other, plain, atol=1e-8)
+
+
+def test_a_start_for_other_lights(make_basis: Any):
+    other = Lighting.present(make_basis(3, SIZE, names=["a", "b", "c"]))
+    with pytest.raises(LightingError, match="missing light 0"):
+        solve(make_basis(3, SIZE), _random_target(), start=other)
+
+
+def test_a_light_that_reaches_nothing_painted_is_named_and_kept(make_basis: Any):
+    images = np.random.default_rng(0).random((3, *SIZE, 3))
+    images[1, :6] = 0
+    basis = make_basis(images=images, names=["key", "back", "fill"])
+    painted = np.zeros(SIZE)
+    painted[:6] = 1
+    solution = solve(basis, _target(np.full((*SIZE, 3), 0.7), painted))
+    assert solution.quality.unreached == ("back",)
+    assert solution.lighting.emission["back"] == basis.lights[1].emission
+    assert solution.quality.converged
+
+
+def test_a_black_painting_turns_the_lights_off(make_basis: Any):
+    solution = solve(make_basis(4, SIZE), _target(np.zeros((*SIZE, 3))))
+    assert all(rgb == (0, 0, 0) for rgb in solution.lighting.emission.values())
+    assert solution.quality.objective == solution.quality.relative_objective == (0, 0, 0)
+
+
+def test_quality_tells_the_objective_of_the_answer(make_basis: Any):
+    basis, target = make_basis(4, SIZE), _random_target()
+    solution = solve(basis, target)
+    w = solution.lighting.weights_for(basis)
+    expected = _squares(target.importance, target.image, basis, w)
+    norm2 = (target.importance[..., None] * np.square(target.image, dtype=float)).sum(axis=(0, 1))
+    # float64 sums over some hundred pixels.
+    np.testing.assert_allclose(solution.quality.objective, expected, rtol=1e-10)
+    np.testing.assert_allclose(solution.quality.relative_objective, expected / norm2, rtol=1e-6)
+    assert solution.lighting.target == "painted"
+    assert solution.lighting.scene_identity == basis.origin.scene_identity
+
+
+def test_combine_mixes_images_and_noise_alike(make_basis: Any):
+    rng = np.random.default_rng(0)
+    halves = rng.normal(size=(3, *SIZE, 3))
+    basis = make_basis(3, SIZE, half_differences=halves)
+    w = rng.random((3, 3))
+    estimate = combine(basis, Lighting.of_weights(basis, w))
+    # Three products in float32.
+    expected = np.einsum("nhwc,nc->hwc", basis.images, w)
+    np.testing.assert_allclose(estimate.image, expected, rtol=1e-6)
+    np.testing.assert_allclose(
+        estimate.half_difference, np.einsum("nhwc,nc->hwc", halves, w), atol=1e-5
+    )

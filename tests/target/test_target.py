@@ -1,0 +1,133 @@
+"""Targets: what they refuse, and resampling in linear light under importance."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.errors import SizeError, TargetError
+from lightpaint.images.display import encode_display
+from lightpaint.images.exr import read_parts
+from lightpaint.target.target import Target
+from lightpaint.target.template import write_template
+
+# Resampling runs in float32.
+PRECISION = 1e-6
+
+
+def _target(image: Any, importance: Any) -> Target:
+    image, importance = np.asarray(image, np.float32), np.asarray(importance, np.float32)
+    return Target("painted", image, importance, everything=False)
+
+
+def _random(height: int, width: int) -> Target:
+    rng = np.random.default_rng(0)
+    importance = rng.random((height, width)) * (rng.random((height, width)) < 0.6)
+    importance[0, 0] = 1
+    return _target(rng.random((height, width, 3)), importance)
+
+
+def test_image_and_importance_of_different_sizes():
+    with pytest.raises(SizeError, match="differ in size"):
+        _target(np.ones((4, 3, 3)), np.ones((3, 4)))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_pixels_must_be_finite(bad: float):
+    image = np.ones((3, 3, 3))
+    image[1, 1, 1] = bad
+    with pytest.raises(TargetError, match="NaN or Inf"):
+        _target(image, np.ones((3, 3)))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -0.5])
+def test_importance_must_be_finite_and_not_negative(bad: float):
+    importance = np.ones((3, 3))
+    importance[1, 1] = bad
+    with pytest.raises(TargetError, match="finite and not negative"):
+        _target(np.ones((3, 3, 3)), importance)
+
+
+def test_something_must_count():
+    with pytest.raises(TargetError, match="importance 0 everywhere"):
+        _target(np.ones((3, 3, 3)), np.zeros((3, 3)))
+
+
+def test_its_own_size_changes_nothing():
+    target = _random(6, 8)
+    assert target.resized((6, 8)) is target
+    assert target.fitted_to((6, 8), resize=False) is target
+
+
+def test_another_size_only_if_allowed():
+    target = _random(6, 8)
+    with pytest.raises(SizeError, match=r"painted is 8x6 but the basis is 4x3.*--resize"):
+        target.fitted_to((3, 4), resize=False)
+    assert target.fitted_to((3, 4), resize=True).size == (3, 4)
+
+
+@pytest.mark.parametrize("size", [(3, 4), (12, 16), (5, 11), (1, 1), (7, 3)])
+def test_a_constant_image_stays_constant(size: tuple[int, int]):
+    colour = np.array([0.25, 1.5, 40.0], np.float32)
+    resized = _target(np.broadcast_to(colour, (6, 8, 3)), _random(6, 8).importance).resized(size)
+    assert resized.size == size
+    assert resized.image.dtype == resized.importance.dtype == np.float32
+    counts = resized.importance > 0
+    assert counts.any()
+    np.testing.assert_allclose(
+        resized.image[counts], np.broadcast_to(colour, (counts.sum(), 3)), rtol=PRECISION
+    )
+
+
+@pytest.mark.parametrize("size", [(3, 4), (12, 16), (5, 11), (1, 1)])
+def test_constant_importance_stays_constant(size: tuple[int, int]):
+    target = _target(_random(6, 8).image, np.full((6, 8), 0.75))
+    np.testing.assert_allclose(target.resized(size).importance, 0.75, rtol=PRECISION)
+
+
+@pytest.mark.parametrize("factor", [2, 3])
+def test_shrinking_is_the_mean_over_blocks_by_importance(factor: int):
+    target = _random(12, 18)
+    height, width = 12 // factor, 18 // factor
+
+    def block_sums(values: Any) -> Any:
+        blocks = values.astype(np.float64).reshape(height, factor, width, factor, -1)
+        return blocks.sum(axis=(1, 3))
+
+    a = target.importance[..., None]
+    sums, total = block_sums(a * target.image), block_sums(a)
+    resized = target.resized((height, width))
+    np.testing.assert_allclose(resized.importance, total[..., 0] / factor**2, rtol=PRECISION)
+    counts = total[..., 0] > 0
+    expected = sums[counts] / total[counts]
+    np.testing.assert_allclose(resized.image[counts], expected, rtol=PRECISION)
+
+
+def test_what_does_not_count_never_bleeds_in():
+    """Paint beside pixels of no importance keeps its colour, however bright those are."""
+    image = np.full((8, 8, 3), 1e6)
+    image[:, 3:] = 0.5
+    importance = np.zeros((8, 8))
+    importance[:, 3:] = 1
+    for size in ((4, 4), (5, 5), (16, 16), (13, 13)):
+        resized = _target(image, importance).resized(size)
+        counts = resized.importance > 0
+        np.testing.assert_allclose(resized.image[counts], 0.5, rtol=PRECISION)
+
+
+def test_resampling_keeps_everything_else():
+    target = Target("x", np.ones((4, 4, 3)), np.ones((4, 4)), everything=True, not_finite=3)
+    resized = target.resized((2, 2))
+    assert (resized.name, resized.everything, resized.not_finite) == ("x", True, 3)
+
+
+def test_template(tmp_path: Any):
+    image = np.random.default_rng(0).random((4, 5, 3)).astype(np.float32)
+    picture = write_template(tmp_path / "a.template.exr", image)
+    assert picture == tmp_path / "a.template.png"
+    np.testing.assert_array_equal(read_parts(tmp_path / "a.template.exr")[0].rgb(), image)
+    from PIL import Image
+
+    with Image.open(picture) as png:
+        # Rounding to 8 bits.
+        np.testing.assert_allclose(np.asarray(png) / 255, encode_display(image), atol=0.5001 / 255)

@@ -1,0 +1,98 @@
+"""Files are replaced whole or not at all."""
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from lightpaint.errors import OutputError
+from lightpaint.files import check_writable, replacing, write_bytes, write_text
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    path = tmp_path / "answer.json"
+    path.write_bytes(b"old")
+    return path
+
+
+def _fail_halfway(path: Path, problem: BaseException) -> None:
+    with replacing(path) as beside:
+        beside.write_bytes(b"half of")
+        raise problem
+
+
+def test_the_new_content_takes_the_place_of_the_old(old: Path):
+    write_text(old, "ñ\n")
+    assert old.read_bytes() == "ñ\n".encode()
+    assert os.listdir(old.parent) == [old.name]
+
+
+def test_the_old_file_is_there_until_the_block_ends(old: Path):
+    with replacing(old) as beside:
+        assert beside != old
+        beside.write_bytes(b"half of")
+        assert old.read_bytes() == b"old"
+    assert old.read_bytes() == b"half of"
+
+
+def test_writers_see_the_true_name_and_the_same_disk(tmp_path: Path):
+    # Some choose the format by the ending, and os.replace is atomic on one file system only.
+    with replacing(tmp_path / "a.b.exr") as beside:
+        assert beside.name == "a.b.exr"
+        assert beside.parent.parent == tmp_path
+        beside.touch()
+
+
+@pytest.mark.parametrize("problem", [ValueError, KeyboardInterrupt, SystemExit, MemoryError])
+def test_an_interrupted_write_leaves_old_content_and_no_debris(
+    old: Path, problem: type[BaseException]
+):
+    with pytest.raises(problem):
+        _fail_halfway(old, problem())
+    assert old.read_bytes() == b"old"
+    assert os.listdir(old.parent) == [old.name]
+
+
+def test_a_full_disk_is_an_output_error_that_names_the_file(old: Path):
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(OutputError, match=r"answer\.json: No space left"):
+        _fail_halfway(old, full)
+    assert old.read_bytes() == b"old"
+    assert os.listdir(old.parent) == [old.name]
+
+
+def test_a_block_that_writes_nothing_does_not_remove_the_old_file(old: Path):
+    with pytest.raises(OutputError), replacing(old):
+        pass
+    assert old.read_bytes() == b"old"
+
+
+def test_missing_folders_are_made(tmp_path: Path):
+    write_bytes(tmp_path / "a" / "b" / "c.bin", b"\0")
+    assert (tmp_path / "a" / "b" / "c.bin").read_bytes() == b"\0"
+
+
+def test_a_folder_that_is_a_file(old: Path):
+    with pytest.raises(OutputError, match="cannot write"):
+        write_bytes(old / "below.bin", b"")
+    with pytest.raises(OutputError, match="cannot write into"):
+        check_writable(old)
+    with pytest.raises(OutputError, match="cannot write into"):
+        check_writable(old / "below")
+    assert old.read_bytes() == b"old"
+
+
+def test_a_file_that_is_a_folder(tmp_path: Path):
+    folder = tmp_path / "folder"
+    (folder / "inside").mkdir(parents=True)
+    with pytest.raises(OutputError, match="folder"):
+        write_bytes(folder, b"")
+    assert os.listdir(tmp_path) == ["folder"]
+    assert os.listdir(folder) == ["inside"]
+
+
+def test_check_writable_makes_the_folder_and_leaves_it_empty(tmp_path: Path):
+    check_writable(tmp_path / "a" / "b")
+    assert os.listdir(tmp_path / "a" / "b") == []
