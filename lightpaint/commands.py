@@ -26,7 +26,7 @@ from lightpaint.pipeline import (
     verify_result,
 )
 from lightpaint.progress import Progress as Report
-from lightpaint.relight.verdict import energy_shares, verdict
+from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
@@ -224,12 +224,9 @@ def _show(look: Look, folder: Path) -> None:
 
 
 def _agreement(result: Verification) -> str:
-    word = "agree within noise" if result.agrees else "DISAGREE beyond noise"
-    bias = max(result.z_mean, key=abs)
     return (
-        f"prediction and verification {word}: z {result.z_rms:.2f} (limit "
-        f"{result.z_rms_limit:.2f}), mean off by {bias:+.1f} standard errors, RMSE "
-        f"{result.rmse:.2g} (noise {result.noise_rmse:.2g}), ΔE {result.delta_e_mean:.1f}"
+        f"{agreement(result)}; RMSE {result.rmse:.2g} (noise {result.noise_rmse:.2g}), "
+        f"ΔE {result.delta_e_mean:.1f}"
     )
 
 

@@ -91,8 +91,9 @@ def verification_table(verification: Verification | None) -> str:
         [
             ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
             ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
-            ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; limit {v.z_rms_limit:.3f}"),
             ("z of the whole image", f"{means} (R, G, B); limit ±{LIMIT:g}"),
+            ("z of the pattern", f"{v.z_pattern:+.2f}; limit {LIMIT:g}".replace("-", "−")),
+            ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
             ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
         ]
     )

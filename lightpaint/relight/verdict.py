@@ -56,11 +56,8 @@ def agreement(verification: Verification | None) -> str:
     """Whether prediction and verification agree, as a clause with its numbers."""
     if verification is None:
         return "the prediction is not verified by a render"
-    spread = f"z {verification.z_rms:.2f}, limit {verification.z_rms_limit:.2f}"
-    if verification.agrees:
-        return f"prediction and verification agree within noise ({spread})"
-    bias = max(verification.z_mean, key=abs)
+    word = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
     return (
-        f"prediction and verification DISAGREE by more than their noise ({spread}; "
-        f"mean off by {abs(bias):.1f} standard errors, limit {LIMIT:g})"
+        f"prediction and verification {word} "
+        f"({verification.difference:.1f} standard errors apart, limit {LIMIT:g})"
     )

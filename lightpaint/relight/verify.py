@@ -18,11 +18,10 @@ from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
 
-#: Side of the blocks of pixels over which differences are tested. One pair of halves gives
-#: one degree of freedom per pixel; 64 of them make the ratio close to normal.
+#: Side of the blocks of pixels over which differences are averaged before they are judged.
 BLOCK = 8
-#: Standard errors at which a mean difference counts as real, and the slack of the test on
-#: the spread: both far enough out that sound renders pass thousands of times in a row.
+#: Standard errors at which a difference counts as real: far enough out that sound renders
+#: pass thousands of times in a row.
 LIMIT = 5.0
 
 #: Relative round-off of float32 sums, below which a difference is no news.
@@ -33,10 +32,13 @@ PRECISION = 1e-5
 class Verification:
     """How far prediction and verification are apart.
 
-    verified: the independent render. z: (h, w, 3), difference per pixel in standard
-    errors, the noise pooled over neighbours.
-    z_rms: root mean square of the differences of 8x8 blocks in their standard errors: 1 if
-    there is only noise. z_mean: (3,) difference of the whole image in standard errors.
+    verified: the independent render.
+    z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
+    z_rms: root mean square of the differences of 8x8 blocks in their own standard errors.
+    About 1 if there is only noise; a little more where the noise is rare bright samples.
+    z_mean: (3,), difference of the whole image's sum, in standard errors.
+    z_pattern: how alike the differences of the two halves are, block by block, in standard
+    errors (see `_pattern`): noise is not alike, an error in some place is.
     rmse: of the pixels, in radiance; noise_rmse: what noise alone would give.
     delta_e_mean, delta_e_95: CIEDE2000 at the exposure of the report: mean, 95th percentile.
     """
@@ -44,17 +46,22 @@ class Verification:
     verified: Estimate
     z: Floats
     z_rms: float
-    z_rms_limit: float
     z_mean: tuple[float, float, float]
+    z_pattern: float
     rmse: float
     noise_rmse: float
     delta_e_mean: float
     delta_e_95: float
 
     @property
+    def difference(self) -> float:
+        """The most telling difference in standard errors, to be held against LIMIT."""
+        return max(*map(abs, self.z_mean), self.z_pattern)
+
+    @property
     def agrees(self) -> bool:
         """Whether the difference can be noise alone."""
-        return self.z_rms <= self.z_rms_limit and max(map(abs, self.z_mean)) <= LIMIT
+        return self.difference <= LIMIT
 
 
 def verify(
@@ -98,15 +105,7 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
     z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
 
     # A block's mean difference, over the standard error that its own pixels show.
-    # Where a rare bright sample is all the noise there is, both halves may show it alike and
-    # seem to know more than they do: a block counts for no more than LIMIT.
     block_z = _block_sums(difference) / np.sqrt(_block_sums(squares))
-    block_z = np.clip(block_z, -LIMIT, LIMIT)
-    z_rms = float(np.sqrt(np.square(block_z).mean()))
-    # For n normal z, the mean of z² is 1 ± √(2/n); the channels of a pixel are not
-    # independent, so n counts blocks. 64 degrees of freedom add 2/62.
-    blocks = block_z.size / 3
-    limit = float(np.sqrt(1 + 2 / (BLOCK**2 - 2) + LIMIT * np.sqrt(2 / blocks)))
     z_mean = difference.sum(axis=(0, 1)) / np.sqrt(squares.sum(axis=(0, 1)))
 
     scale = 2.0 ** choose_exposure(verified.image)
@@ -114,14 +113,32 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
     return Verification(
         verified=verified,
         z=z.astype(np.float32),
-        z_rms=z_rms,
-        z_rms_limit=limit,
+        z_rms=float(np.sqrt(np.square(block_z).mean())),
         z_mean=(float(z_mean[0]), float(z_mean[1]), float(z_mean[2])),
+        z_pattern=_pattern(predicted, verified, squares, magnitude),
         rmse=float(np.sqrt(np.square(difference).mean())),
         noise_rmse=float(np.sqrt(squares.mean())),
         delta_e_mean=float(differences.mean()),
         delta_e_95=float(np.percentile(differences, 95)),
     )
+
+
+def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude: Floats) -> float:
+    """Σ_blocks d_A d_B over its standard error, d_A and d_B the differences of the halves.
+
+    The halves A and B of both images are independent, so noise of any distribution makes
+    the sum 0 on average, and whatever is truly different adds its square. Blocks count
+    relative to their brightness. squares: variance per pixel; magnitude: brightness.
+    """
+    difference = predicted.image.astype(np.float64) - verified.image
+    half = predicted.half_difference.astype(np.float64) - verified.half_difference
+    brightness = _block_sums(magnitude.sum(axis=-1, dtype=np.float64))
+    typical = brightness.mean()
+    weight = np.square(typical / (brightness + typical)) if typical > 0 else 1.0
+    products = (_block_sums(difference + half) * _block_sums(difference - half)).sum(axis=-1)
+    # A half has twice the variance of the mean; the channels may all go together.
+    spread = 2 * _block_sums(squares).sum(axis=-1)
+    return float((weight * products).sum() / np.sqrt(np.square(weight * spread).sum()))
 
 
 def _block_sums(image: Floats) -> Floats:
