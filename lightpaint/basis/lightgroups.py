@@ -25,7 +25,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lightpaint.scene.scene import Integrator
+from lightpaint.scene.parsed import Integrator
 
 
 def lights_by_instance(scene: Any, names: Sequence[str]) -> Any:

@@ -1,0 +1,230 @@
+"""Mitsuba's parsed form of a scene XML, and how loaded scenes are made of it.
+
+What Mitsuba parsed is kept and copied for every load: instantiating changes it, and only one
+loaded scene should be alive at a time.
+"""
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lightpaint.errors import SceneError
+from lightpaint.scene.emitters import RGB
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """The part of the scene's integrator that decides which light paths there are."""
+
+    plugin: str
+    max_depth: int
+    rr_depth: int
+    hide_emitters: bool
+
+
+@dataclass(frozen=True)
+class EmitterSetting:
+    """What an emitter is set to: one RGB colour of its parameter, and how often it is sampled."""
+
+    parameter: str
+    emission: RGB
+    sampling_weight: float
+
+
+@dataclass(frozen=True)
+class View:
+    """A sensor and its film: size of the whole and of the crop window within, in pixels."""
+
+    sensor: int
+    size: tuple[int, int]
+    crop_size: tuple[int, int]
+    crop_offset: tuple[int, int]
+
+    @classmethod
+    def of(cls, loaded: Any, sensor: int) -> "View":
+        """Of the sensor with that index in a loaded scene. All pairs are (x, y)."""
+        film = loaded.sensors()[sensor].film()
+        size, crop_size, offset = (
+            (int(pair[0]), int(pair[1]))
+            for pair in (film.size(), film.crop_size(), film.crop_offset())
+        )
+        return cls(sensor, size, crop_size, offset)
+
+    def film(self) -> Any:
+        """A box-filtered RGB float32 film of this size."""
+        import mitsuba as mi
+
+        return mi.load_dict(
+            {
+                "type": "hdrfilm",
+                "width": self.size[0],
+                "height": self.size[1],
+                "crop_width": self.crop_size[0],
+                "crop_height": self.crop_size[1],
+                "crop_offset_x": self.crop_offset[0],
+                "crop_offset_y": self.crop_offset[1],
+                "pixel_format": "rgb",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            }
+        )
+
+
+class ParsedScene:
+    """The nodes of a scene XML, by Mitsuba's own parser."""
+
+    def __init__(self, path: Path, parameters: Mapping[str, str], variant: str) -> None:
+        import mitsuba as mi
+
+        self.path = path
+        self.parameters = parameters
+        self.config = mi.parser.ParserConfig(variant)
+        # Merged meshes would lose the order and the names of their emitters.
+        self.config.merge_meshes = False
+        self.resolver = mi.FileResolver(mi.file_resolver())
+        self.resolver.prepend(str(path.resolve().parent))
+        with self._resolving(), mitsuba_errors(path):
+            self.state = mi.parser.parse_file(self.config, str(path), **parameters)
+            mi.parser.transform_all(self.config, self.state)
+        if self.state.nodes[0].props.plugin_name() != "scene":
+            raise SceneError(f"{path} is not a scene: its root element must be <scene>")
+        self.files = tuple(Path(str(f)) for f in self.state.files)
+        kinds = mi.ObjectType
+        self.emitter_nodes = self._nodes_of(kinds.Emitter)
+        self.sensor_nodes = self._children_of(0, kinds.Sensor)
+        self.sensor_names = tuple(
+            self.state.nodes[k].props.id() or f"sensor_{i}" for i, k in enumerate(self.sensor_nodes)
+        )
+        self.names = self._name_lights()
+
+    def _nodes_of(self, kind: Any) -> list[int]:
+        return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
+
+    def _children_of(self, parent: int, kind: Any = None) -> list[int]:
+        import mitsuba as mi
+
+        props = self.state.nodes[parent].props
+        reference = mi.Properties.Type.ResolvedReference
+        children = [props[k].index() for k in props if props.type(k) == reference]
+        return [c for c in children if kind is None or self.state.nodes[c].type == kind]
+
+    def _name_lights(self) -> dict[int, str]:
+        """Names by node: emitter id, else the id of its shape, else `<plugin>_<k>`."""
+        import mitsuba as mi
+
+        shape_of = {
+            child: shape
+            for shape in self._nodes_of(mi.ObjectType.Shape)
+            for child in self._children_of(shape, mi.ObjectType.Emitter)
+        }
+        names: dict[int, str] = {}
+        taken: set[str] = set()
+        count: dict[str, int] = {}
+        for node in self.emitter_nodes:
+            props = self.state.nodes[node].props
+            plugin = props.plugin_name()
+            count[plugin] = count.get(plugin, -1) + 1
+            shape = shape_of.get(node)
+            shape_id = self.state.nodes[shape].props.id() if shape is not None else ""
+            base = props.id() or shape_id or f"{plugin}_{count[plugin]}"
+            name, k = base, 2
+            while name in taken:
+                name, k = f"{base}_{k}", k + 1
+            taken.add(name)
+            names[node] = name
+        return names
+
+    def instantiate(self, settings: Mapping[int, EmitterSetting], view: View | None = None) -> Any:
+        """Make a `mi.Scene`, its emitters set by node.
+
+        view: the sensor whose film is replaced by `view.film()`; None leaves all as they are.
+        """
+        import mitsuba as mi
+
+        state = mi.parser.ParserState(self.state)
+        for node, name in self.names.items():
+            state.nodes[node].props.set_id(name)
+        for node, setting in settings.items():
+            props = state.nodes[node].props
+            props[setting.parameter] = mi.ScalarColor3f(*setting.emission)
+            props["sampling_weight"] = setting.sampling_weight
+        if view is not None:
+            props = state.nodes[self.sensor_nodes[view.sensor]].props
+            for key in list(props):
+                reference = mi.Properties.Type.ResolvedReference
+                if (
+                    props.type(key) == reference
+                    and state.nodes[props[key].index()].type == mi.ObjectType.Film
+                ):
+                    del props[key]
+            props["film"] = view.film()
+        with self._resolving(), mitsuba_errors(self.path):
+            return mi.parser.instantiate(self.config, state)
+
+    def integrator(self) -> Integrator:
+        import mitsuba as mi
+
+        nodes = self._children_of(0, mi.ObjectType.Integrator)
+        if not nodes:
+            # Mitsuba's own choice for a scene that names none.
+            return Integrator("path", -1, 5, False)
+        props = self.state.nodes[nodes[0]].props
+        return Integrator(
+            props.plugin_name(),
+            int(props.get("max_depth", -1)),
+            int(props.get("rr_depth", 5)),
+            bool(props.get("hide_emitters", False)),
+        )
+
+    def has_media(self) -> bool:
+        import mitsuba as mi
+
+        return bool(self._nodes_of(mi.ObjectType.Medium))
+
+    def identity(self, sensor: int) -> str:
+        digest = hashlib.sha256()
+        for path in (*self.files, *self._assets()):
+            data = Path(path).read_bytes()
+            digest.update(len(data).to_bytes(8, "little"))
+            digest.update(data)
+        digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
+        return digest.hexdigest()[:32]
+
+    def _assets(self) -> Iterator[Path]:
+        import mitsuba as mi
+
+        for node in self.state.nodes:
+            for key in node.props:
+                if node.props.type(key) == mi.Properties.Type.String:
+                    path = Path(str(self.resolver.resolve(node.props[key])))
+                    if path.is_file():
+                        yield path
+
+    @contextmanager
+    def _resolving(self) -> Iterator[None]:
+        """Let relative paths be found beside the scene's files meanwhile."""
+        import mitsuba as mi
+
+        before = mi.file_resolver()
+        mi.set_file_resolver(self.resolver)
+        try:
+            yield
+        finally:
+            mi.set_file_resolver(before)
+
+
+@contextmanager
+def mitsuba_errors(path: Path) -> Iterator[None]:
+    """Turn what Mitsuba throws into one line: its own words, without its source places."""
+    try:
+        yield
+    except RuntimeError as error:
+        text = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", str(error))
+        text = " ".join(text.split())
+        undefined = re.search(r"undefined parameter: \$(\w+)", text)
+        hint = f"; set it with -D {undefined[1]}=VALUE" if undefined else ""
+        raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from None
