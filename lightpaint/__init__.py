@@ -23,6 +23,7 @@ from lightpaint.images.display import display_picture
 from lightpaint.images.estimate import Estimate
 from lightpaint.pipeline import Look, paint_with_light
 from lightpaint.relight.relight import relight
+from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
@@ -53,6 +54,7 @@ __all__ = [
     "render_basis",
     "solve",
     "use_variant",
+    "verdict",
     "verify",
     "write_basis",
     "write_lighting",

@@ -63,7 +63,13 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument("source", metavar="SCENE|BASIS", help="scene XML, or a *.basis.exr")
     solve.add_argument("targets", metavar="TARGET", nargs="+", help="painted EXR")
     _add_output(solve, "DIR", "result folder (default: named after the target)")
-    solve.add_argument("--mask", metavar="M.exr", help="what counts, instead of the alpha")
+    solve.add_argument(
+        "--mask",
+        dest="masks",
+        action="append",
+        metavar="M.exr",
+        help="what counts, instead of the alpha; once for all targets, or once for each in order",
+    )
     solve.add_argument(
         "--unpainted",
         type=_weight,
@@ -85,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
 
     verify = _command(commands, "verify", "render results anew and compare with the prediction")
     verify.add_argument("folders", metavar="DIR", nargs="+", help="result folder of solve")
-    _add_sampling(verify)
+    _add_sampling(verify, default="the basis's")
     _add_variant(verify)
 
     doctor = _command(commands, "doctor", "say what works here and what to install")
@@ -127,9 +133,9 @@ def _add_variant(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_sampling(parser: argparse.ArgumentParser) -> None:
+def _add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene's") -> None:
     parser.add_argument(
-        "--spp", type=_at_least(2), metavar="N", help="samples per pixel (default: the scene's)"
+        "--spp", type=_at_least(2), metavar="N", help=f"samples per pixel (default: {default})"
     )
     parser.add_argument(
         "--seed",

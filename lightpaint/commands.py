@@ -11,7 +11,7 @@ from lightpaint import console
 from lightpaint.basis.basis import is_basis_file, read_basis, write_basis
 from lightpaint.basis.render import render_basis, why_not_one_pass
 from lightpaint.doctor import examine
-from lightpaint.errors import OutputError
+from lightpaint.errors import OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.pipeline import (
     Look,
@@ -93,7 +93,8 @@ def solve(options: Namespace, given: list[str]) -> int:
     """`lightpaint solve SCENE|BASIS TARGET...`"""
     folders = _folders(options.output, [Path(t).stem for t in options.targets])
     # Everything a user gave is looked at before the first sample is taken.
-    targets = [read_target(path, mask=options.mask) for path in options.targets]
+    masks = _one_for_each(options.masks or [None], options.targets)
+    targets = [read_target(t, mask=m) for t, m in zip(options.targets, masks, strict=True)]
     source = Path(options.source)
     if is_basis_file(source):
         scene, made = None, read_basis(source)
@@ -232,6 +233,16 @@ def _folders(output: str | None, names: Sequence[str]) -> list[Path]:
     if len(set(names)) < len(names):
         raise OutputError(f"results would overwrite each other: {', '.join(names)}")
     return [Path(output or ".") / name for name in names]
+
+
+def _one_for_each(masks: list[str | None], targets: list[str]) -> list[str | None]:
+    if len(masks) == 1:
+        return masks * len(targets)
+    if len(masks) != len(targets):
+        raise TargetError(
+            f"{len(masks)} masks for {len(targets)} targets: give one for all, or one for each"
+        )
+    return masks
 
 
 def _check_suffix(path: Path) -> None:

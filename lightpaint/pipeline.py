@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.render import render_basis
-from lightpaint.errors import LightpaintError
+from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
@@ -81,6 +81,8 @@ def paint_with_light(
         scene = load_scene(scene, sensor=sensor, parameters=parameters)
     if isinstance(basis, str | Path):
         basis = read_basis(Path(basis))
+    if scene is not None and basis is not None:
+        check_same_view(scene, basis)
     if not isinstance(target, Target):
         target = read_target(target, mask=mask)
     size = basis.size if basis is not None else scene.size if scene is not None else target.size
@@ -94,7 +96,7 @@ def paint_with_light(
     solution = solve(basis, target, unpainted=unpainted)
     predicted = combine(basis, solution.lighting)
     write_lighting(folder / "lighting.json", solution.lighting)
-    view = {"sensor": scene.sensor, "spp": basis.origin.spp} if scene is not None else {}
+    view = {"sensor": basis.origin.sensor, "spp": basis.origin.spp}
     write_estimate(folder / "predicted.exr", predicted, {VIEW_KEY: json.dumps(view)})
 
     relit, verification = None, None
@@ -105,6 +107,17 @@ def paint_with_light(
     look = Look(target, basis, solution, predicted, relit, verification)
     show_look(look, folder, command=command)
     return look
+
+
+def check_same_view(scene: Scene, basis: Basis) -> None:
+    """Raise BasisError unless `basis` was made of `scene` as it is, through its sensor."""
+    origin, sensor = basis.origin, scene.sensor_names[scene.sensor]
+    if (origin.scene_identity, origin.sensor) != (scene.identity, sensor):
+        what = "another state of the scene" if origin.sensor == sensor else "another sensor"
+        raise BasisError(
+            f"the basis shows {what}: it was made of {origin.scene} through {origin.sensor}, not "
+            f"of {scene.path} as it is through {sensor}; make it again"
+        )
 
 
 def show_look(look: Look, folder: Path, *, command: str) -> None:
@@ -178,8 +191,15 @@ def verify_result(
     predicted = read_estimate(folder / "predicted.exr")
     [part] = read_parts(folder / "predicted.exr")
     view = json.loads(part.attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(folder / "relit.xml", sensor=view.get("sensor", 0))
-    return verify(predicted, relit, spp=spp or view.get("spp"), seed=seed, progress=progress)
+    relit = load_scene(folder / "relit.xml", sensor=view.get("sensor"))
+    return verify(
+        predicted,
+        relit,
+        spp=spp or view.get("spp"),
+        seed=seed,
+        stream=Stream.SECOND_VERIFICATION,
+        progress=progress,
+    )
 
 
 def command_line(arguments: list[str]) -> str:

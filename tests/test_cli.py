@@ -14,7 +14,13 @@ import OpenEXR
 import pytest
 from renderer import REPOSITORY, write_room
 
+from lightpaint import paint_with_light
+from lightpaint.basis.render import render_basis
+from lightpaint.errors import BasisError
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+from lightpaint.pipeline import verify_result
+from lightpaint.scene.scene import load_scene
+from lightpaint.target.target import Target
 
 CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"
 WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
@@ -124,6 +130,43 @@ def test_several_targets_share_one_basis(tmp_path: Path) -> None:
     for name in ("warm", "cool"):
         assert {p.name for p in (tmp_path / "out" / name).iterdir()} == RESULTS
     assert done.stderr.count("basis:") == 1
+
+
+def test_each_target_with_its_own_mask(basis_file: Path, tmp_path: Path) -> None:
+    write_parts(tmp_path / "m.exr", [Part("", {"Y": np.ones((128, 128), np.float32)})])
+    masks = ("--mask", "m.exr", "--mask", COOL_MASK)
+    succeed(tmp_path, "solve", basis_file, WARM, COOL, *masks, "-o", "both")
+    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", "cool")
+    together = tmp_path / "both" / "cool" / "lighting.json"
+    assert together.read_bytes() == (tmp_path / "cool" / "lighting.json").read_bytes()
+    assert "3 masks for 2 targets" in refused(
+        tmp_path, "solve", basis_file, WARM, COOL, *masks, "--mask", "m.exr"
+    )
+
+
+def test_a_basis_of_another_view_is_noticed(tmp_path: Path) -> None:
+    sensor = """<sensor type="perspective" id="side"><transform name="to_world">
+        <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">
+        <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
+    path = write_room(tmp_path, sensors=sensor)
+    scene, side = load_scene(path), load_scene(path, sensor="side")
+    basis = render_basis(side, spp=16)
+    target = Target("t", basis.images[0], np.ones(basis.size, np.float32), everything=True)
+    with pytest.raises(BasisError, match="another sensor"):
+        paint_with_light(scene, target, tmp_path / "out", basis=basis)
+    room = path.read_text(encoding="utf-8")
+    path.write_text(room.replace("0.7 0.5 0.4", "0.7 0.5 0.5"), encoding="utf-8")
+    with pytest.raises(BasisError, match="another state"):
+        paint_with_light(load_scene(path, sensor="side"), target, tmp_path / "out", basis=basis)
+    assert not (tmp_path / "out").exists()
+    # What was solved through one sensor is verified through it.
+    path.write_text(room, encoding="utf-8")
+    look = paint_with_light(side, target, tmp_path / "out", basis=basis)
+    assert look.verification is not None
+    assert look.verification.agrees
+    again = verify_result(tmp_path / "out")
+    assert again.agrees
+    assert np.abs(again.verified.image - look.verification.verified.image).max() > 0
 
 
 def test_solving_from_a_basis_needs_no_mitsuba(basis_file: Path, tmp_path: Path) -> None:

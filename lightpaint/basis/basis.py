@@ -98,6 +98,12 @@ class Basis:
         """Names of the lights, in the order of the images."""
         return tuple(light.name for light in self.lights)
 
+    def image(self, name: str) -> Floats:
+        """The image of the light called `name`, (h, w, 3). Raises BasisError if there is none."""
+        if name not in self.names:
+            raise BasisError(f"no light {name!r} in the basis: it has {', '.join(self.names)}")
+        return np.asarray(self.images[self.names.index(name)])
+
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""

@@ -98,18 +98,18 @@ def _render_together(
 
     height, width = scene.size
     names = [light.name for light in scene.lights]
-    passes, spp_per_pass = plan_passes(height * width, spp)
+    passes = plan_passes(height * width, spp)
     loaded = scene.load(dict.fromkeys(names, WHITE))
     light_of = lights_by_instance(loaded, names)
     planes = [dr.zeros(mi.Float, len(names) * height * width * 3) for _ in range(2)]
     seen = dr.zeros(mi.Float, height * width)
     # One sequence of choices for each half, far from all others.
     sequences = [pass_seed(seed, Stream.CHOICE, half) for half in range(2)]
-    traced = 0
-    progress("basis", 0, passes)
+    traced = [0, 0]
+    progress("basis", 0, len(passes))
     with interruptible_between_pieces() as let_interrupts_through:
-        for k in range(passes):
-            traced += accumulate(
+        for k, pass_spp in enumerate(passes):
+            traced[k % 2] += accumulate(
                 loaded,
                 scene.integrator,
                 sensor=scene.sensor,
@@ -117,20 +117,20 @@ def _render_together(
                 planes=planes[k % 2],
                 seen=seen,
                 seed=pass_seed(seed, Stream.BASIS, k),
-                spp=spp_per_pass,
-                turn=(sequences[k % 2], k // 2 * spp_per_pass),
+                spp=pass_spp,
+                turn=(sequences[k % 2], traced[k % 2]),
             )
             dr.sync_thread()
-            progress("basis", k + 1, passes)
+            progress("basis", k + 1, len(passes))
             let_interrupts_through()
     del loaded, light_of
     gc.collect()
     halves = []
-    while planes:
+    for half_spp in traced:
         plane = np.array(planes.pop(0)).reshape(len(names), height, width, 3)
-        plane /= traced / 2
+        plane /= half_spp
         halves.append(plane)
-    return halves, np.array(seen).reshape(height, width) > 0, traced
+    return halves, np.array(seen).reshape(height, width) > 0, sum(traced)
 
 
 def _render_separately(
@@ -157,9 +157,9 @@ def _render_separately(
         means.append(estimate.image)
         differences.append(estimate.half_difference)
     height, width = scene.size
-    passes, spp_per_pass = plan_passes(height * width, spp)
+    traced = sum(plan_passes(height * width, spp))
     mean, difference = np.stack(means), np.stack(differences)
-    return [mean + difference, mean - difference], _emitters_seen(scene), passes * spp_per_pass
+    return [mean + difference, mean - difference], _emitters_seen(scene), traced
 
 
 def _emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:

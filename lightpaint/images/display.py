@@ -46,10 +46,14 @@ def png_bytes(image_8_bit: npt.NDArray[Any]) -> bytes:
     return buffer.getvalue()
 
 
-def display_picture(image: Floats, *, stops: float | None = None) -> Image.Image:
-    """A linear image as a picture that a notebook shows. stops: chosen if not given."""
+def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:
+    """A linear image as a picture that a notebook shows.
+
+    stops: exposure, chosen if not given. zoom: side of a pixel of `image` in the picture.
+    """
     exposure = choose_exposure(image) if stops is None else stops
-    return Image.fromarray(to_8_bit(encode_display(image, stops=exposure)))
+    pixels = to_8_bit(encode_display(image, stops=exposure))
+    return Image.fromarray(np.kron(pixels, np.ones((zoom, zoom, 1), np.uint8)))
 
 
 def write_png(path: Path, image: Floats, *, stops: float = 0.0) -> None:

@@ -70,11 +70,13 @@ def verify(
     *,
     spp: int | None = None,
     seed: int = 0,
+    stream: Stream = Stream.VERIFICATION,
     progress: Progress = silent,
 ) -> Verification:
     """Render the relit scene with samples no basis ever uses, and compare.
 
     spp: samples per pixel (the scene's own number by default).
+    stream: random numbers to draw; a repeated verification takes others than the first.
     """
     if relit.size != predicted.size:
         raise SizeError(
@@ -85,7 +87,7 @@ def verify(
         relit,
         spp=spp,
         seed=seed,
-        stream=Stream.VERIFICATION,
+        stream=stream,
         label="verification",
         progress=progress,
     )

@@ -32,7 +32,7 @@ def emission_kind(plugin: str, name: str) -> EmissionKind:
         return ONE_COLOUR[plugin]
     except KeyError:
         raise SceneError(
-            f"light {name!r} is a {plugin!r} emitter, which lightpaint cannot solve for: "
+            f"light {name!r} is an emitter of kind {plugin!r}, which lightpaint cannot solve for: "
             f"it takes {', '.join(ONE_COLOUR)}; remove that light or replace it"
         ) from None
 

@@ -26,6 +26,7 @@ class Stream(IntEnum):
     VERIFICATION = 1
     TEMPLATE = 2
     CHOICE = 3
+    SECOND_VERIFICATION = 4
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:
@@ -33,13 +34,17 @@ def pass_seed(seed: int, stream: Stream, index: int) -> int:
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
 
 
-def plan_passes(pixels: int, spp: int) -> tuple[int, int]:
-    """(number of passes, samples per pixel in each): an even number, for two equal halves."""
+def plan_passes(pixels: int, spp: int) -> list[int]:
+    """Samples per pixel of each pass, `spp` in all or one more.
+
+    Even and odd passes make up two halves of equal size.
+    """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few: two halves need at least 2")
-    halves = max(1, round(pixels * spp / (2 * SAMPLES_PER_PASS)))
-    passes = 2 * min(halves, spp // 2)
-    return passes, -(-spp // passes)
+    half = -(-spp // 2)
+    passes = min(half, max(1, round(pixels * half / SAMPLES_PER_PASS)))
+    sizes = [half // passes + (k < half % passes) for k in range(passes)]
+    return [size for size in sizes for _ in range(2)]
 
 
 def render(
@@ -87,19 +92,19 @@ def render_loaded(
     import mitsuba as mi
 
     height, width = scene.size
-    passes, spp_per_pass = plan_passes(height * width, spp)
+    passes = plan_passes(height * width, spp)
     halves = np.zeros((2, height, width, 3), np.float64)
-    progress(label, 0, passes)
+    progress(label, 0, len(passes))
     with interruptible_between_pieces() as let_interrupts_through:
-        for k in range(passes):
+        for k, pass_spp in enumerate(passes):
             image = mi.render(
-                loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=spp_per_pass
+                loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=pass_spp
             )
             # Integrators that wrap another add channels of their own behind R, G and B.
-            halves[k % 2] += np.array(image)[..., :3]
-            progress(label, k + 1, passes)
+            halves[k % 2] += pass_spp * np.array(image)[..., :3].astype(np.float64)
+            progress(label, k + 1, len(passes))
             let_interrupts_through()
-    halves /= passes / 2
+    halves /= sum(passes) / 2
     return Estimate.of_halves(as_float32(halves[0]), as_float32(halves[1]))
 
 

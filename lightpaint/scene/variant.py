@@ -165,7 +165,7 @@ def _llvm_paths() -> Iterator[tuple[Path, str]]:
         files = []
     for file in sorted(files, key=lambda f: len(f.name)):
         if file.name.startswith("libLLVM") and ".so" in file.name:
-            yield Path(str(file.locate())), "karellen-llvm-core"
+            yield Path(str(file.locate())).resolve(), "karellen-llvm-core"
     name = {"Darwin": "libLLVM*.dylib", "Windows": "LLVM-C.dll"}.get(
         platform.system(), "libLLVM*.so*"
     )

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,19 @@ class Lighting:
     def emission(self) -> Mapping[str, RGB]:
         """RGB emission by name of light."""
         return {light.name: light.emission for light in self.lights}
+
+    def with_emission(self, name: str, emission: RGB) -> "Lighting":
+        """This lighting with another RGB emission for one light, and no claim to be optimal.
+
+        Raises LightingError if there is no such light.
+        """
+        if name not in self.emission:
+            raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
+        lights = tuple(
+            replace(light, emission=emission, weight=emission) if light.name == name else light
+            for light in self.lights
+        )
+        return replace(self, lights=lights, quality=None)
 
     @classmethod
     def of_weights(cls, basis: Basis, weights: Doubles, **about: Any) -> "Lighting":

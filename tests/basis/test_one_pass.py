@@ -17,7 +17,7 @@ from lightpaint.basis.render import (
 )
 from lightpaint.errors import SceneError
 from lightpaint.progress import silent
-from lightpaint.scene.render import Stream, pass_seed, plan_passes
+from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes
 from lightpaint.scene.scene import Scene, load_scene
 
 INTEGRATORS = {
@@ -255,10 +255,12 @@ def test_pass_seeds_never_meet() -> None:
 
 @pytest.mark.parametrize("pixels", [1, 400, 230_400, 8_294_400])
 @pytest.mark.parametrize("spp", [2, 3, 64, 1000])
-def test_passes_are_even_and_make_up_the_samples(pixels: int, spp: int) -> None:
-    passes, each = plan_passes(pixels, spp)
-    assert passes % 2 == 0
-    assert spp <= passes * each < spp + passes
+def test_passes_make_up_two_equal_halves_of_the_samples(pixels: int, spp: int) -> None:
+    passes = plan_passes(pixels, spp)
+    assert sum(passes[::2]) == sum(passes[1::2])
+    assert spp <= sum(passes) <= spp + 1
+    assert min(passes) >= 1
+    assert max(passes) * pixels <= max(2 * SAMPLES_PER_PASS, pixels)
 
 
 def test_too_few_samples_or_too_many_lights_are_refused(tmp_path: Path) -> None:
