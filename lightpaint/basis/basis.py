@@ -34,6 +34,7 @@ class BasisLight:
     parameter, unit: what one unit of weight is (`radiance`, `W/(m² sr)`).
     emission: its present RGB emission in the scene, in that unit.
     form: its place and size, for people.
+    is_scalar: whether it can only be scaled as a whole, and has one weight for all channels.
     """
 
     name: str
@@ -42,6 +43,7 @@ class BasisLight:
     unit: str
     emission: RGB
     form: str = ""
+    is_scalar: bool = False
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(v) and v >= 0 for v in self.emission):
@@ -69,7 +71,7 @@ class Basis:
     """The images of a scene lit by one light at a time.
 
     lights: n of them; their order is the order of everything else.
-    images: (n, h, w, 3) float32, linear Rec.709 radiance under unit-white emission.
+    images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
     half_differences: (n, h, w, 3) float32, half the difference of two independent halves
     of the samples: the noise of `images`.
     emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.

@@ -63,7 +63,9 @@ def render_basis(
         halves, seen, spp = _render_separately(scene, spp, seed, progress)
         method = SEPARATE
     lights = tuple(
-        BasisLight(x.name, x.plugin, x.kind.parameter, x.kind.unit, x.emission, x.form)
+        BasisLight(
+            x.name, x.plugin, x.kind.parameter, x.kind.unit, x.emission, x.form, x.kind.is_scalar
+        )
         for x in scene.lights
     )
     origin = Origin(

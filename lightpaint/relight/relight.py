@@ -13,8 +13,10 @@ import numpy as np
 
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
-from lightpaint.relight.xml_edit import Element, XmlFile, tag
-from lightpaint.scene.emitters import RGB
+from lightpaint.images.exr import Floats, write_rgb
+from lightpaint.relight.emission_xml import Changes, write_emission
+from lightpaint.relight.xml_edit import XmlFile, tag
+from lightpaint.scene.emitters import RGB, Scaling
 from lightpaint.scene.scene import Light, Scene, load_scene
 from lightpaint.solve.lighting import Lighting
 
@@ -23,8 +25,9 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     """Write `scene` with the emissions of `lighting` to `path`, and load it back.
 
     The file refers to the original folder by relative path, so it loads in plain Mitsuba
-    from where it lies. Included files that hold lights are copied beside it. A light that
-    is off keeps its emitter, is black and is never sampled.
+    from where it lies. Included files that hold lights are copied beside it, and so are
+    scaled images of lights that emit one. A light that is off keeps its emitter, is black
+    and is never sampled.
 
     Raises LightingError if the two name different lights, SceneError where the XML cannot
     express the answer, OutputError if `path` cannot be written.
@@ -33,10 +36,15 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     check_same_lights(scene, lighting)
     if path.resolve() in {file.resolve() for file in scene.files}:
         raise OutputError(f"{path} is the scene itself: write the relit scene somewhere else")
-    for file, data in relit_files(scene, lighting.emission, path).items():
-        write_bytes(file, data)
+    for file, content in relit_files(scene, lighting.emission, path).items():
+        if isinstance(content, bytes):
+            write_bytes(file, content)
+        else:
+            write_rgb(file, content)
     relit = load_scene(path, sensor=scene.sensor)
     for light in scene.lights:
+        if light.kind.scaling is not Scaling.COLOUR:
+            continue  # as authored means something else there
         wanted, taken = lighting.emission[light.name], relit.light(light.name).emission
         if not np.array_equal(np.asarray(wanted, np.float32), np.asarray(taken, np.float32)):
             raise SceneError(f"{path} did not take the emission of light {light.name!r}")
@@ -62,8 +70,10 @@ class _Edits:
     settings: dict[int, tuple[Light, RGB, float | None]] = field(default_factory=dict)
 
 
-def relit_files(scene: Scene, emission: Mapping[str, RGB], path: Path) -> dict[Path, bytes]:
-    """Content of the relit XML at `path` and of the included files it needs beside it."""
+def relit_files(
+    scene: Scene, emission: Mapping[str, RGB], path: Path
+) -> dict[Path, bytes | Floats]:
+    """Content of the relit XML at `path`, and of the includes and images it needs beside it."""
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
     all_dark = not any(any(rgb) for rgb in emission.values())
@@ -80,12 +90,15 @@ def relit_files(scene: Scene, emission: Mapping[str, RGB], path: Path) -> dict[P
             )
         here[light.offset] = setting
 
-    written = {}
+    written: dict[Path, bytes | Floats] = {}
     for edit in edits.values():
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         defaults = scene.parameters if is_root else {}
-        written[target] = _edit(edit, target.parent, defaults)
+        content, images = _edit(edit, target.parent, scene, defaults)
+        # Mitsuba looks for images beside the scene, also for those of an included file.
+        written |= {path.parent / name: image for name, image in images.items()}
+        written[target] = content
     return written
 
 
@@ -108,7 +121,10 @@ def _place_of_include(file: Path, root: Path) -> Path:
         ) from None
 
 
-def _edit(edit: _Edits, folder: Path, defaults: Mapping[str, str]) -> bytes:
+def _edit(
+    edit: _Edits, folder: Path, scene: Scene, defaults: Mapping[str, str]
+) -> tuple[bytes, dict[str, Floats]]:
+    """The edited XML, to be written into `folder`, and the images it refers to, by name."""
     xml = XmlFile(edit.original)
     if xml.root.tag == "scene":
         # Assets and includes lie where the original lies; the first default wins.
@@ -116,23 +132,11 @@ def _edit(edit: _Edits, folder: Path, defaults: Mapping[str, str]) -> bytes:
         lines = [tag("path", value=Path(origin).as_posix())]
         lines += [tag("default", name=k, value=v) for k, v in defaults.items()]
         xml.insert_first(xml.root, lines)
+    images: dict[str, Floats] = {}
     for offset, (light, rgb, weight) in edit.settings.items():
-        element = xml.element_at(offset)
-        values = " ".join(f"{np.float32(v):.9g}" for v in rgb)
-        parameter = light.kind.parameter
-        missing = _set(xml, element, parameter, tag("rgb", name=parameter, value=values))
+        changes = Changes(xml, xml.element_at(offset))
         if weight is not None:
-            line = tag("float", name="sampling_weight", value=f"{weight:g}")
-            missing += _set(xml, element, "sampling_weight", line)
-        if missing:
-            xml.insert_first(element, missing)
-    return xml.edited()
-
-
-def _set(xml: XmlFile, element: Element, name: str, line: str) -> list[str]:
-    """Replace the child called `name` by `line`; if there is none, return it as missing."""
-    child = element.child_named(name)
-    if child is None:
-        return [line]
-    xml.replace(child, line)
-    return []
+            changes.set("float", "sampling_weight", f"{weight:g}")
+        images |= write_emission(changes, scene, light, rgb)
+        changes.finish()
+    return xml.edited(), images

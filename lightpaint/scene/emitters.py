@@ -1,59 +1,102 @@
 """What "one unit" of each kind of light means, and how its present emission is read."""
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
+
+import numpy as np
 
 from lightpaint.errors import SceneError
 
 RGB = tuple[float, float, float]
 
+#: A light as the scene has it, where its emission is a multiple of that.
+AS_AUTHORED: RGB = (1.0, 1.0, 1.0)
+
+
+class Scaling(Enum):
+    """What in the scene file carries the emission of a light.
+
+    COLOUR: one RGB colour; its unit is white, whatever the scene says.
+    IMAGE: a bitmap, scaled per channel; its unit is the image as authored.
+    FACTORS: numbers that scale the light as a whole, not per channel; unit as authored.
+    """
+
+    COLOUR = "colour"
+    IMAGE = "image"
+    FACTORS = "factors"
+
 
 @dataclass(frozen=True)
 class EmissionKind:
-    """The parameter of an emitter plugin that scales its light, and the parameter's unit."""
+    """How a light is scaled, by which parameter of its plugin, and the unit of its emission.
 
+    factors: names of the numbers that scale it, for FACTORS.
+    """
+
+    scaling: Scaling
     parameter: str
     unit: str
+    factors: tuple[str, ...] = ()
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether the light has one weight for all channels instead of three."""
+        return self.scaling is Scaling.FACTORS
 
 
-#: Emitters whose light is one RGB colour. Their unit is white, (1, 1, 1), in `unit`.
-ONE_COLOUR = {
-    "area": EmissionKind("radiance", "W/(m² sr)"),
-    "constant": EmissionKind("radiance", "W/(m² sr)"),
-    "directional": EmissionKind("irradiance", "W/m²"),
-    "point": EmissionKind("intensity", "W/sr"),
-    "spot": EmissionKind("intensity", "W/sr"),
+#: Unit of emission of lights that are multiples of what the scene has.
+MULTIPLE = "× as authored"
+
+#: (parameter, unit) of the emitters that are supported; the first is what carries emission.
+PLUGINS = {
+    "area": ("radiance", "W/(m² sr)"),
+    "constant": ("radiance", "W/(m² sr)"),
+    "directional": ("irradiance", "W/m²"),
+    "envmap": ("radiance", "W/(m² sr)"),
+    "point": ("intensity", "W/sr"),
+    "projector": ("irradiance", "W/m²"),
+    "spot": ("intensity", "W/sr"),
+    "sunsky": ("radiance", "W/(m² sr)"),
 }
 
 
-def emission_kind(plugin: str, name: str) -> EmissionKind:
-    """How the light `name` is scaled. Raises SceneError for a plugin that is not supported."""
-    try:
-        return ONE_COLOUR[plugin]
-    except KeyError:
+def emission_kind(emitter: Any, plugin: str, name: str) -> EmissionKind:
+    """How the loaded emitter `name` is scaled. Raises SceneError if lightpaint cannot."""
+    import mitsuba as mi
+
+    if plugin not in PLUGINS:
         raise SceneError(
             f"light {name!r} is an emitter of kind {plugin!r}, which lightpaint cannot solve for: "
-            f"it takes {', '.join(ONE_COLOUR)}; remove that light or replace it"
-        ) from None
+            f"it takes {', '.join(PLUGINS)}; remove that light or replace it"
+        )
+    parameter, unit = PLUGINS[plugin]
+    keys = set(mi.traverse(emitter).keys())
+    if plugin == "sunsky":
+        return EmissionKind(Scaling.FACTORS, parameter, MULTIPLE, ("sun_scale", "sky_scale"))
+    if plugin == "envmap" or f"{parameter}.data" in keys:
+        return EmissionKind(Scaling.IMAGE, parameter, MULTIPLE)
+    if f"{parameter}.value" in keys:
+        return EmissionKind(Scaling.COLOUR, parameter, unit)
+    if f"{parameter}.scale" in keys:
+        return EmissionKind(Scaling.FACTORS, parameter, MULTIPLE, ("scale",))
+    raise SceneError(
+        f"light {name!r} has a textured {parameter} that lightpaint cannot scale: "
+        f"use a bitmap, or one colour, <rgb name={parameter!r} .../>"
+    )
 
 
 def read_emission(emitter: Any, kind: EmissionKind, name: str) -> RGB:
     """The emission of a loaded Mitsuba emitter, as linear RGB in the unit of `kind`.
 
     Read from the loaded object and not from the XML text, where a spectrum, a preset or
-    nothing at all may stand. Raises SceneError if it varies over the light.
+    nothing at all may stand.
     """
     import mitsuba as mi
-    import numpy as np
 
-    parameters = mi.traverse(emitter)
-    key = f"{kind.parameter}.value"
-    if key not in parameters:
-        raise SceneError(
-            f"light {name!r} has a textured {kind.parameter}, which lightpaint cannot solve for: "
-            f"give it one colour, <rgb name={kind.parameter!r} .../>"
-        )
-    value = np.array(parameters[key], dtype=float).ravel()
+    if kind.scaling is not Scaling.COLOUR:
+        return AS_AUTHORED
+    value = np.array(mi.traverse(emitter)[f"{kind.parameter}.value"], dtype=float).ravel()
     if value.size not in (1, 3):
         raise SceneError(f"light {name!r} has a {kind.parameter} of {value.size} values, not RGB")
     r, g, b = np.broadcast_to(value, 3).tolist()
@@ -63,7 +106,6 @@ def read_emission(emitter: Any, kind: EmissionKind, name: str) -> RGB:
 def describe_form(emitter: Any, plugin: str) -> str:
     """Where a loaded emitter is and how large, in scene units, for people to read."""
     import mitsuba as mi
-    import numpy as np
 
     def at(point: Any) -> str:
         x, y, z = np.array(point, dtype=float).ravel()[:3]
@@ -74,7 +116,7 @@ def describe_form(emitter: Any, plugin: str) -> str:
         box = shape.bbox()
         area = float(np.array(shape.surface_area()).ravel()[0])
         return f"area {area:.3g} at {at(box.center())}"
-    if plugin == "constant":
+    if plugin in ("constant", "envmap", "sunsky"):
         return "all around"
     parameters = mi.traverse(emitter)
     if "position" in parameters:

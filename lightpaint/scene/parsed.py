@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.emitters import RGB
+from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Integrator:
 
 @dataclass(frozen=True)
 class EmitterSetting:
-    """What an emitter is set to: one RGB colour of its parameter, and how often it is sampled."""
+    """What an emitter is set to: emission in the unit of `kind`, and how often it is sampled."""
 
-    parameter: str
+    kind: EmissionKind
     emission: RGB
     sampling_weight: float
 
@@ -149,9 +149,7 @@ class ParsedScene:
         for node, name in self.names.items():
             state.nodes[node].props.set_id(name)
         for node, setting in settings.items():
-            props = state.nodes[node].props
-            props[setting.parameter] = mi.ScalarColor3f(*setting.emission)
-            props["sampling_weight"] = setting.sampling_weight
+            self._apply(state, node, setting)
         if view is not None:
             props = state.nodes[self.sensor_nodes[view.sensor]].props
             for key in list(props):
@@ -164,6 +162,47 @@ class ParsedScene:
             props["film"] = view.film()
         with self._resolving(), mitsuba_errors(self.path):
             return mi.parser.instantiate(self.config, state)
+
+    def _apply(self, state: Any, node: int, setting: EmitterSetting) -> None:
+        import mitsuba as mi
+
+        kind, rgb = setting.kind, setting.emission
+        props = state.nodes[node].props
+        props["sampling_weight"] = setting.sampling_weight
+        if kind.scaling is Scaling.COLOUR:
+            props[kind.parameter] = mi.ScalarColor3f(*rgb)
+        elif kind.scaling is Scaling.FACTORS:
+            # The numbers stand in the emitter itself or in its texture.
+            texture = self.child_named(node, kind.parameter)
+            holder = props if texture is None else state.nodes[texture].props
+            for factor in kind.factors:
+                holder[factor] = float(holder.get(factor, 1.0)) * rgb[0]
+        elif not any(rgb):
+            # Where a bitmap is chosen, a scale stands beside it, but for area lights.
+            if props.plugin_name() == "area":
+                props[kind.parameter] = mi.ScalarColor3f(0)
+            else:
+                props["scale"] = 0.0
+        elif rgb != AS_AUTHORED:
+            raise SceneError(f"an image of light can be loaded black or as it is, not times {rgb}")
+
+    def child_named(self, node: int, name: str) -> int | None:
+        """The node that is referenced by `node` under `name`."""
+        import mitsuba as mi
+
+        props = self.state.nodes[node].props
+        if name not in props or props.type(name) != mi.Properties.Type.ResolvedReference:
+            return None
+        return int(props[name].index())
+
+    def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
+        """(file, whether its values are linear as they stand) of the image that emitter emits."""
+        texture = self.child_named(node, parameter)
+        props = self.state.nodes[node if texture is None else texture].props
+        if "filename" not in props:
+            raise SceneError(f"light {self.names[node]!r} emits an image that is in no file")
+        path = Path(str(self.resolver.resolve(props["filename"])))
+        return path, bool(props.get("raw", False))
 
     def integrator(self) -> Integrator:
         import mitsuba as mi

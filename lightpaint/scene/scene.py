@@ -10,7 +10,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lightpaint.errors import SceneError
+from lightpaint.images.exr import Floats
 from lightpaint.scene.emitters import RGB, EmissionKind, describe_form, emission_kind, read_emission
 from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, View
 from lightpaint.scene.variant import use_variant
@@ -20,7 +23,7 @@ from lightpaint.scene.variant import use_variant
 class Light:
     """One light of a scene: what a person adjusts.
 
-    emission: present linear RGB emission in the unit of `kind`.
+    emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
     file, offset: where its element's `<` stands: index into Scene.files, byte offset.
     """
 
@@ -81,7 +84,8 @@ class Scene:
 
         The film is replaced by a box-filtered RGB float32 one of the same size, for basis
         and verification alike. A light set to black is never sampled. Drop the scene, and
-        all that came from it, before loading another.
+        all that came from it, before loading another. Lights that are images can only be
+        black or as authored here: other multiples take files (see relight).
         """
         emission = emission or {}
         # Mitsuba refuses a scene in which no emitter may be sampled.
@@ -92,8 +96,19 @@ class Scene:
             # A light the scene keeps switched off is sampled again once it shines.
             weight = light.sampling_weight or 1.0
             weight = weight if any(rgb) or all_dark else 0.0
-            settings[light.node] = EmitterSetting(light.kind.parameter, rgb, weight)
+            settings[light.node] = EmitterSetting(light.kind, rgb, weight)
         return self._parsed.instantiate(settings, self.view)
+
+    def emitted_image(self, light: Light) -> Floats:
+        """The image that `light` emits, (h, w, 3) linear Rec.709, without its scale."""
+        import mitsuba as mi
+
+        path, raw = self._parsed.image_file(light.node, light.kind.parameter)
+        bitmap = mi.Bitmap(str(path))
+        if raw:
+            bitmap.set_srgb_gamma(False)
+        rgb = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
+        return np.array(rgb)
 
 
 def load_scene(
@@ -154,7 +169,7 @@ def _find_lights(parsed: ParsedScene, loaded: Any) -> tuple[Light, ...]:
             raise SceneError(f"emitter {name!r} does not stand in {parsed.path} as itself")
         node = parsed.state.nodes[node_of[name]]
         plugin = node.props.plugin_name()
-        kind = emission_kind(plugin, name)
+        kind = emission_kind(emitter, plugin, name)
         found.append(
             Light(
                 name=name,

@@ -81,6 +81,10 @@ def use_variant(wanted: str | None = None) -> Backend:
     present = mi.variant()
     if present is not None and wanted in (None, present):
         _check_is_rgb(present)
+        if present.startswith("llvm"):
+            import drjit as dr
+
+            _check_llvm_in_use(dr, present)
         _current = Backend(present)
     elif wanted is None:
         _current = _choose(mi, llvm)
@@ -117,10 +121,23 @@ def _set(mi: Any, variant: str, llvm: Llvm | None) -> Backend:
             # The first array starts the backend; failing here is better than mid-render.
             import drjit as dr
 
+            _check_llvm_in_use(dr, variant)
             dr.eval(mi.Float(0) + 1)
+    except BackendError:
+        raise
     except Exception as error:
         raise BackendError(f"Mitsuba's {variant} does not start here: {error}") from error
     return Backend(variant, llvm)
+
+
+def _check_llvm_in_use(dr: Any, variant: str) -> None:
+    """Raise BackendError if Dr.Jit has taken an LLVM that would bring the process down."""
+    if variant.startswith("llvm") and (version := dr.detail.llvm_version())[0] < OLDEST_LLVM:
+        raise BackendError(
+            f"Mitsuba was imported before lightpaint had a say and took LLVM {version[0]}, which "
+            f"cannot run it: load a scene or call lightpaint.use_variant() before "
+            f"`import mitsuba`, or set DRJIT_LIBLLVM_PATH to LLVM {OLDEST_LLVM} or newer"
+        )
 
 
 def _check_is_rgb(variant: str) -> None:

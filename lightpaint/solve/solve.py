@@ -46,7 +46,8 @@ def solve(
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     equations = NormalEquations.of(basis, image, importance)
     begin = basis.present_weights if start is None else start.weights_for(basis)
-    result = solve_normal_equations(equations, begin)
+    is_scalar = [light.is_scalar for light in basis.lights]
+    result = solve_normal_equations(equations, begin, is_scalar=is_scalar)
 
     objective = equations.objective(result.weights)
     norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)

@@ -1,8 +1,10 @@
 """The non-negative least-squares solve: projected Gauss–Seidel with a measure of optimality."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
 
@@ -37,29 +39,61 @@ def solve_normal_equations(
     equations: NormalEquations,
     start: Doubles,
     *,
+    is_scalar: Sequence[bool] = (),
     tolerance: float = 1e-10,
     max_sweeps: int = 20_000,
 ) -> SolverResult:
-    """Minimise the objective over w >= 0, channel by channel.
+    """Minimise the objective over w >= 0.
 
     start: (n, 3), weights to begin with; lights that reach nothing keep them.
+    is_scalar: per light, whether one weight serves its three channels. Without such lights
+    the channels are problems of their own; with some, one problem couples them.
     tolerance: of the KKT residual (see `kkt_residual`).
     """
     weights = np.array(start, dtype=np.float64)
     power = np.einsum("cii->ic", equations.M)
-    strongest = power.max(initial=0)
-    reached = (power > UNREACHED * strongest).any(axis=1)
+    lit = power > UNREACHED * power.max(initial=0)  # (n, 3)
     residuals, sweeps = np.zeros(3), [0, 0, 0]
-    for c in range(3):
-        lit = np.flatnonzero(power[:, c] > UNREACHED * strongest)
-        M, b = equations.M[c][np.ix_(lit, lit)], equations.b[c, lit]
-        w, residuals[c], sweeps[c] = projected_gauss_seidel(
-            M, b, weights[lit, c], tolerance=tolerance, max_sweeps=max_sweeps
+    for channels in ([0, 1, 2],) if any(is_scalar) else ([0], [1], [2]):
+        problem = _unknowns(lit, channels, is_scalar)
+        M, b = _assemble(equations, problem)
+        begin = np.array([weights[i, cs[0]] for i, cs in problem])
+        w, residual, count = projected_gauss_seidel(
+            M, b, begin, tolerance=tolerance, max_sweeps=max_sweeps
         )
-        weights[lit, c] = w
-    return SolverResult(
-        weights, residuals, (sweeps[0], sweeps[1], sweeps[2]), tuple(reached.tolist()), tolerance
-    )
+        for (i, cs), value in zip(problem, w, strict=True):
+            weights[i, cs] = value
+        for c in channels:
+            residuals[c], sweeps[c] = residual, count
+    reached = tuple(lit.any(axis=1).tolist())
+    return SolverResult(weights, residuals, (sweeps[0], sweeps[1], sweeps[2]), reached, tolerance)
+
+
+def _unknowns(
+    lit: npt.NDArray[np.bool_], channels: list[int], is_scalar: Sequence[bool]
+) -> list[tuple[int, list[int]]]:
+    """(light, channels it moves together) of each unknown weight."""
+    unknowns: list[tuple[int, list[int]]] = []
+    for i in range(len(lit)):
+        if is_scalar and is_scalar[i]:
+            unknowns += [(i, channels)] if lit[i].any() else []
+        else:
+            unknowns += [(i, [c]) for c in channels if lit[i, c]]
+    return unknowns
+
+
+def _assemble(
+    equations: NormalEquations, unknowns: list[tuple[int, list[int]]]
+) -> tuple[Doubles, Doubles]:
+    """M and b in the unknowns: those of the channels, summed where one weight serves several."""
+    size = len(unknowns)
+    M, b = np.zeros((size, size)), np.zeros(size)
+    for c in range(3):
+        here = np.array([k for k, (_, cs) in enumerate(unknowns) if c in cs], dtype=int)
+        lights = np.array([unknowns[k][0] for k in here], dtype=int)
+        M[np.ix_(here, here)] += equations.M[c][np.ix_(lights, lights)]
+        b[here] += equations.b[c, lights]
+    return M, b
 
 
 def projected_gauss_seidel(

@@ -129,22 +129,6 @@ def test_missing_file_unknown_sensor_and_light(tmp_path: Path) -> None:
         load_scene(path).light("nobody")
 
 
-@pytest.mark.parametrize(
-    ("light", "named"),
-    [
-        ('<emitter type="sunsky" id="heaven"/>', "heaven"),
-        (
-            '<shape type="rectangle" id="screen"><emitter type="area"><texture type="checkerboard"'
-            ' name="radiance"/></emitter></shape>',
-            "screen",
-        ),
-    ],
-)
-def test_lights_it_cannot_solve_for_are_named(tmp_path: Path, light: str, named: str) -> None:
-    with pytest.raises(SceneError, match=named):
-        load_scene(write_room(tmp_path, lights=light))
-
-
 def test_a_process_keeps_its_variant() -> None:
     backend = use_variant()
     assert use_variant(backend.variant) is backend

@@ -222,3 +222,29 @@ def test_kkt_residual_by_hand():
     assert kkt_residual(np.array([0.0, 5.0]), off, b) == 0
     assert kkt_residual(np.array([1.0, 0.0]), off, b) == 0.5
     assert kkt_residual(np.array([0.0, -1.0]), off, b) == 0.5
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_lights_with_one_weight_agree_with_scipy_on_the_joint_problem(seed: int):
+    rng = np.random.default_rng(seed)
+    n, pixels = int(rng.integers(1, 9)), 80
+    A = rng.random((3, n, pixels)) + 0.05
+    target = rng.normal(0.4, 0.6, (3, pixels))
+    is_scalar = (rng.random(n) < 0.5).tolist()
+    is_scalar[0] = True
+    M, b = A @ A.transpose(0, 2, 1), np.einsum("cnp,cp->cn", A, target)
+    equations = NormalEquations(M, b, np.square(target).sum(axis=1))
+    found = solve_normal_equations(equations, np.ones((n, 3)), is_scalar=is_scalar)
+    # One column per weight over the pixels of all three channels, one after another.
+    columns, owners = [], []
+    for i in range(n):
+        for channels in [[0, 1, 2]] if is_scalar[i] else [[0], [1], [2]]:
+            column = np.zeros((3, pixels))
+            column[channels] = A[channels, i]
+            columns.append(column.ravel())
+            owners.append((i, channels))
+    expected, _ = nnls(np.stack(columns, axis=1), target.ravel())
+    assert found.converged
+    for (i, channels), value in zip(owners, expected, strict=True):
+        # Precision: both stop at about 1e-10 of weights of the order of 1.
+        np.testing.assert_allclose(found.weights[i, channels], value, atol=1e-8)

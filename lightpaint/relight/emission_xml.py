@@ -1,0 +1,91 @@
+"""The emission of one light, written into its element of the scene XML."""
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lightpaint.errors import SceneError
+from lightpaint.images.exr import Floats
+from lightpaint.relight.xml_edit import Element, XmlFile, tag
+from lightpaint.scene.emitters import AS_AUTHORED, RGB, Scaling
+from lightpaint.scene.scene import Light, Scene
+
+
+@dataclass
+class Changes:
+    """Children of one element to be replaced, or inserted where there are none yet."""
+
+    xml: XmlFile
+    element: Element
+    _missing: list[str] = field(default_factory=list)
+
+    def set(self, kind: str, name: str, value: str) -> None:
+        """Give the element a child `<kind name=… value=…/>`, in the place of its namesake."""
+        line = tag(kind, name=name, value=value)
+        child = self.element.child_named(name)
+        if child is None:
+            self._missing.append(line)
+        else:
+            self.xml.replace(child, line)
+
+    def number(self, name: str, otherwise: float) -> float:
+        """The number that stands in the child called `name` now, or `otherwise`."""
+        child = self.element.child_named(name)
+        text = child.attributes.get("value", "") if child is not None else f"{otherwise}"
+        try:
+            return float(text)
+        except ValueError:
+            raise SceneError(
+                f"cannot scale {name}={text!r}: write a number in the place of the parameter"
+            ) from None
+
+    def child(self, name: str) -> "Changes":
+        """Changes to the child called `name`, which must be an element of its own."""
+        child = self.element.child_named(name)
+        if child is None or child.tag == "ref":
+            raise SceneError(
+                f"the {name} of a light is given by reference, and others may share it: write "
+                f"the texture into the light itself"
+            )
+        return Changes(self.xml, child)
+
+    def finish(self) -> None:
+        """Hand the insertions on; call once, last."""
+        if self._missing:
+            self.xml.insert_first(self.element, self._missing)
+
+
+def write_emission(changes: Changes, scene: Scene, light: Light, rgb: RGB) -> dict[str, Floats]:
+    """Set the emission of `light` to `rgb`, in the unit of its kind.
+
+    Returns the images, (h, w, 3) linear, that have to lie beside the relit scene, by file name.
+    """
+    kind = light.kind
+    if kind.scaling is Scaling.COLOUR:
+        changes.set("rgb", kind.parameter, " ".join(f"{np.float32(v):.9g}" for v in rgb))
+    elif kind.scaling is Scaling.FACTORS:
+        holder = changes if light.plugin == "sunsky" else changes.child(kind.parameter)
+        for factor in kind.factors:
+            holder.set("float", factor, f"{holder.number(factor, 1.0) * rgb[0]:.9g}")
+        if holder is not changes:
+            holder.finish()
+    elif light.plugin != "area" and len(set(rgb)) == 1:
+        changes.set("float", "scale", f"{changes.number('scale', 1.0) * rgb[0]:.9g}")
+    elif not any(rgb):
+        changes.set("rgb", kind.parameter, "0 0 0")
+    elif rgb != AS_AUTHORED:
+        return _scale_image(changes, scene, light, rgb)
+    return {}
+
+
+def _scale_image(changes: Changes, scene: Scene, light: Light, rgb: RGB) -> dict[str, Floats]:
+    """Scale the image of `light` by `rgb` and refer to the result."""
+    safe = re.sub(r"[^\w-]+", "_", light.name)
+    name = f"relit.{safe}.exr"
+    holder = changes if light.plugin == "envmap" else changes.child(light.kind.parameter)
+    holder.set("string", "filename", name)
+    if holder is not changes:
+        holder.set("boolean", "raw", "true")
+        holder.finish()
+    return {name: scene.emitted_image(light) * np.asarray(rgb, np.float32)}
