@@ -25,8 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except LightpaintError as error:
         print(f"lightpaint {options.command}: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print(f"lightpaint {options.command}: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        how_to_go_on = f": {interrupt}" if str(interrupt) else ""
+        print(f"lightpaint {options.command}: interrupted{how_to_go_on}", file=sys.stderr)
         return 130
 
 
@@ -52,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     basis = _command(commands, "basis", "render the image of each light alone")
     _add_scene(basis)
     _add_sampling(basis)
+    _add_cache(basis)
     _add_output(basis, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
 
     template = _command(commands, "template", "render the current look, to paint over")
@@ -81,6 +83,7 @@ def _parser() -> argparse.ArgumentParser:
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
     _add_sampling(solve)
+    _add_cache(solve)
     _add_view(solve)
 
     relight = _command(commands, "relight", "write lightings into the scene and render it")
@@ -93,6 +96,15 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("folders", metavar="DIR", nargs="+", help="result folder of solve")
     _add_sampling(verify, default="the basis's")
     _add_variant(verify)
+
+    cache = _command(commands, "cache", "list or delete the bases kept from earlier runs")
+    cache.add_argument(
+        "action",
+        nargs="?",
+        choices=("list", "clear"),
+        default="list",
+        help="what to do (default: %(default)s)",
+    )
 
     doctor = _command(commands, "doctor", "say what works here and what to install")
     _add_variant(doctor)
@@ -143,6 +155,15 @@ def _add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene'
         default=0,
         metavar="S",
         help="random seed (default: %(default)s)",
+    )
+
+
+def _add_cache(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--no-cache",
+        dest="cache",
+        action="store_false",
+        help="neither take nor keep the basis for later runs (default: do both)",
     )
 
 

@@ -8,14 +8,16 @@ from pathlib import Path
 from rich.markup import escape
 
 from lightpaint import console
-from lightpaint.basis.basis import is_basis_file, read_basis, write_basis
-from lightpaint.basis.render import render_basis, why_not_one_pass
+from lightpaint.basis import cache as bases
+from lightpaint.basis.basis import Basis, is_basis_file, read_basis, write_basis
+from lightpaint.basis.render import why_not_one_pass
 from lightpaint.doctor import examine
 from lightpaint.errors import OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.pipeline import (
     Look,
     command_line,
+    obtain_basis,
     paint_with_light,
     relight_look,
     render_template,
@@ -67,8 +69,7 @@ def basis(options: Namespace, _given: list[str]) -> int:
     _check_suffix(output)
     check_writable(output.parent)
     scene = _load(options)
-    with console.progress() as progress:
-        made = render_basis(scene, spp=options.spp, seed=options.seed, progress=progress)
+    made = _basis(scene, options)
     write_basis(output, made)
     print(f"{output}: {len(made.lights)} lights, {made.origin.spp} samples per pixel")
     return 0
@@ -108,9 +109,9 @@ def solve(options: Namespace, given: list[str]) -> int:
 
     for target, folder in zip(targets, folders, strict=True):
         _warn_of_pixels(target.not_finite, target.name)
+        if made is None and scene is not None:
+            made = _basis(scene, options)
         with console.progress() as progress:
-            if made is None and scene is not None:
-                made = render_basis(scene, spp=options.spp, seed=options.seed, progress=progress)
             look = paint_with_light(
                 scene,
                 target,
@@ -156,6 +157,23 @@ def verify(options: Namespace, _given: list[str]) -> int:
     return 0 if agree else 1
 
 
+def cache(options: Namespace, _given: list[str]) -> int:
+    """`lightpaint cache [clear]`"""
+    if options.action == "clear":
+        print(f"{bases.clear()} bases deleted from {bases.folder()}")
+        return 0
+    table = console.table("scene", "sensor", "spp", "seed", "MB", "file")
+    for entry in reversed(bases.entries()):
+        known = entry.origin
+        about = (
+            (known.scene, known.sensor, str(known.spp), str(known.seed)) if known else ("?",) * 4
+        )
+        table.add_row(*map(escape, about), f"{entry.size / 1e6:.0f}", escape(entry.path.name))
+    console.print_table(table)
+    print(f"kept in {bases.folder()}")
+    return 0
+
+
 def doctor(options: Namespace, _given: list[str]) -> int:
     """`lightpaint doctor`"""
     findings = examine(options.variant)
@@ -185,6 +203,31 @@ def _load(options: Namespace, *, path: Path | None = None, say_how: bool = True)
             f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
         )
     return scene
+
+
+def _basis(scene: Scene, options: Namespace) -> Basis:
+    """Render the basis, or say that it was there already."""
+    rendered = False
+    with console.progress() as report:
+
+        def progress(label: str, done: int, total: int) -> None:
+            nonlocal rendered
+            rendered = True
+            report(label, done, total)
+
+        made = obtain_basis(
+            scene,
+            spp=options.spp,
+            seed=options.seed,
+            use_cache=options.cache,
+            progress=progress,
+        )
+    if not rendered:
+        console.say(
+            f"basis of {made.origin.spp} samples per pixel kept from an earlier run "
+            "(--no-cache renders it anew)"
+        )
+    return made
 
 
 def _show(look: Look, folder: Path) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
-from lightpaint.basis.render import render_basis
+from lightpaint.basis.render import goes_on_from, render_basis
 from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.images.display import choose_exposure, write_png
@@ -62,6 +63,7 @@ def paint_with_light(
     sensor: int | str | None = None,
     parameters: Mapping[str, object] | None = None,
     resize: bool = False,
+    use_cache: bool = True,
     command: str = "",
     progress: Progress = silent,
 ) -> Look:
@@ -70,7 +72,7 @@ def paint_with_light(
     scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer.
     folder: receives lighting.json, predicted.exr, comparison.png and report.html and, with
     a scene, relit.xml and verified.exr.
-    basis: one made before of the same scene; rendered if not given.
+    basis: one made before of the same scene; taken from the cache or rendered if not given.
     unpainted: weight of unpainted pixels against the current look.
     spp, seed: of the basis and, with other random numbers, of the verification.
 
@@ -92,7 +94,7 @@ def paint_with_light(
     if basis is None:
         if scene is None:
             raise LightpaintError("give a scene, a basis, or both")
-        basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
+        basis = obtain_basis(scene, spp=spp, seed=seed, use_cache=use_cache, progress=progress)
     solution = solve(basis, target, unpainted=unpainted)
     predicted = combine(basis, solution.lighting)
     write_lighting(folder / "lighting.json", solution.lighting)
@@ -118,6 +120,29 @@ def check_same_view(scene: Scene, basis: Basis) -> None:
             f"the basis shows {what}: it was made of {origin.scene} through {origin.sensor}, not "
             f"of {scene.path} as it is through {sensor}; make it again"
         )
+
+
+def obtain_basis(
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    use_cache: bool = True,
+    progress: Progress = silent,
+) -> Basis:
+    """The basis of `scene`: what an earlier run kept, with the samples that are missing.
+
+    use_cache: False neither looks for one nor keeps it.
+    """
+    if not use_cache:
+        return render_basis(scene, spp=spp, seed=seed, progress=progress)
+    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed)
+    if start is not None and not goes_on_from(scene, start, seed):
+        start = None
+    basis = render_basis(scene, spp=spp, seed=seed, start=start, keep=cache.keep, progress=progress)
+    if basis is not start:
+        cache.keep(basis)
+    return basis
 
 
 def show_look(look: Look, folder: Path, *, command: str) -> None:

@@ -22,6 +22,10 @@ def silent(label: str, done: int, total: int) -> None:
     """The progress report of whoever does not listen."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, after what was done has been kept. Its text says how to go on."""
+
+
 @contextmanager
 def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
     """Hold Ctrl-C back, and yield a function that lets it through where it does no harm.

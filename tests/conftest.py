@@ -1,6 +1,6 @@
 """Shared fixtures: small synthetic bases, so that the rooms without a renderer test in ms."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,7 +51,15 @@ def make_basis() -> BasisFactory:
             BasisLight(name, "area", "radiance", "W/(m² sr)", tuple(map(float, rgb)), "1 m²")
             for name, rgb in zip(names, emission, strict=True)
         )
-        origin = Origin("scene.xml", "0f" * 8, "sensor", 64, 0, "synthetic")
+        origin = Origin("scene.xml", "0f" * 8, "sensor", 0, "synthetic", (32, 32), (1, 1))
         return Basis(lights, images, np.asarray(half_differences, np.float32), seen, origin)
 
     return make
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Neither take nor leave anything in the cache of whoever runs the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIGHTPAINT_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield

@@ -14,7 +14,7 @@ import OpenEXR
 import pytest
 from renderer import REPOSITORY, write_room
 
-from lightpaint import paint_with_light
+from lightpaint import paint_with_light, read_basis
 from lightpaint.basis.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
@@ -125,7 +125,20 @@ def test_verify_tells_a_tampered_scene(solved: tuple[Path, str], tmp_path: Path)
 
 
 def test_several_targets_share_one_basis(tmp_path: Path) -> None:
-    done = run(tmp_path, "solve", CORNELL, WARM, COOL, "--mask", COOL_MASK, "--spp", 4, "-o", "out")
+    done = run(
+        tmp_path,
+        "solve",
+        CORNELL,
+        WARM,
+        COOL,
+        "--mask",
+        COOL_MASK,
+        "--no-cache",
+        "--spp",
+        4,
+        "-o",
+        "out",
+    )
     assert done.returncode == 0, done.stderr
     for name in ("warm", "cool"):
         assert {p.name for p in (tmp_path / "out" / name).iterdir()} == RESULTS
@@ -320,10 +333,14 @@ def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
     assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9")
 
 
-@pytest.mark.parametrize("delay_s", [0, 0.1, 1])
-def test_interrupted_leaves_no_result(tmp_path: Path, delay_s: float) -> None:
+@pytest.mark.parametrize("delay_s", [0, 0.1, 3])
+def test_interrupted_keeps_what_is_done_and_goes_on(tmp_path: Path, delay_s: float) -> None:
     command = [sys.executable, "-m", "lightpaint.cli", "basis", str(CORNELL), "--spp", "4000"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+    command += ["--seed", str(int(10 * delay_s))]
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stderr is not None
         while not process.stderr.readline().startswith("basis"):
             pass
@@ -331,5 +348,65 @@ def test_interrupted_leaves_no_result(tmp_path: Path, delay_s: float) -> None:
         process.send_signal(signal.SIGINT)
         errors = process.stderr.read()
         assert process.wait(timeout=60) == 130
-    assert errors == "lightpaint basis: interrupted\n"
-    assert list(tmp_path.iterdir()) == []
+    assert errors.startswith("lightpaint basis: interrupted")
+    assert errors.count("\n") == 1
+    kept = list((tmp_path / "cache").glob("*"))
+    assert len(kept) == ("are kept" in errors)
+    if delay_s == 3:
+        [path] = kept
+        done = read_basis(path).origin.spp
+        assert f"{done} of 4000" in errors
+    assert [p.name for p in tmp_path.iterdir() if p.name != "cache"] == []
+
+
+@pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])
+def test_killed_at_any_moment_leaves_a_readable_basis(tmp_path: Path, delay_s: float) -> None:
+    code = f"""
+import lightpaint.scene.render, lightpaint as lp, sys
+from lightpaint.pipeline import obtain_basis
+sys.modules["lightpaint.basis.render"].KEEP_EVERY_S = 0
+lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
+scene = lp.load_scene({str(CORNELL)!r})
+print("ready", flush=True)
+obtain_basis(scene, spp=100_000)
+"""
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        while not list(tmp_path.glob("*.basis.exr")):
+            time.sleep(0.01)
+        time.sleep(delay_s)
+        process.kill()
+    [path] = tmp_path.glob("*.basis.exr")
+    basis = read_basis(path)
+    assert basis.origin.spp >= 16
+    # And the next run goes on from there, like one that was never interrupted.
+    more = basis.origin.spp + 32
+    code = code.replace("100_000", str(more))
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True)
+    again = read_basis(path)
+    assert more <= again.origin.spp <= more + 1
+
+
+def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
+
+    def call(*arguments: object) -> str:
+        return subprocess.run(
+            [sys.executable, "-m", "lightpaint.cli", *map(str, arguments)],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+
+    call("basis", CORNELL, "--spp", "2", "--no-cache")
+    assert "scene.xml" not in call("cache")
+    call("basis", CORNELL, "--spp", "2")
+    assert "scene.xml" in call("cache", "list")
+    assert "1 bases deleted" in call("cache", "clear")
+    assert "scene.xml" not in call("cache")

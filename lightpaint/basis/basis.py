@@ -15,7 +15,14 @@ import numpy.typing as npt
 
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.exr import Floats, Part, read_parts, rgb_channels, write_parts
+from lightpaint.images.exr import (
+    Floats,
+    Part,
+    read_attributes,
+    read_parts,
+    rgb_channels,
+    write_parts,
+)
 from lightpaint.version import __version__
 
 RGB = tuple[float, float, float]
@@ -55,15 +62,24 @@ class BasisLight:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a basis comes from: what makes two of them comparable."""
+    """Where a basis comes from: what makes two of them comparable, and one go on.
+
+    halves: samples per pixel of each of the two halves; passes: how many passes made them.
+    """
 
     scene: str
     scene_identity: str
     sensor: str
-    spp: int
     seed: int
     method: str
+    halves: tuple[int, int]
+    passes: tuple[int, int]
     lightpaint: str = __version__
+
+    @property
+    def spp(self) -> int:
+        """Samples per pixel in all."""
+        return sum(self.halves)
 
 
 @dataclass(frozen=True)
@@ -73,7 +89,8 @@ class Basis:
     lights: n of them; their order is the order of everything else.
     images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
     half_differences: (n, h, w, 3) float32, half the difference of two independent halves
-    of the samples: the noise of `images`.
+    of the samples: the noise of `images`. Where an interrupt left the halves unequal, it
+    overstates the noise a little.
     emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
     """
 
@@ -155,7 +172,7 @@ def read_basis(path: Path) -> Basis:
         raise BasisError(f"{path} has lost parts of its basis: make it again with lightpaint basis")
     try:
         lights = tuple(_light(json.loads(p.attributes[LIGHT_KEY])) for p in lit)
-        origin = Origin(**json.loads(head[ORIGIN_KEY]))
+        origin = _origin(json.loads(head[ORIGIN_KEY]))
         basis = Basis(
             lights=lights,
             images=np.stack([p.rgb() for p in lit]),
@@ -178,9 +195,22 @@ def read_basis(path: Path) -> Basis:
     return basis
 
 
+def read_origin(path: Path) -> Origin:
+    """Where the basis at `path` comes from, without reading its images."""
+    try:
+        return _origin(json.loads(read_attributes(path)[ORIGIN_KEY]))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise BasisError(f"{path} is no basis this version can read: {error}") from error
+
+
 def is_basis_file(path: Path) -> bool:
     """Whether the name says so: a basis is an EXR, a scene is XML."""
     return path.suffix.lower() == ".exr"
+
+
+def _origin(data: dict[str, Any]) -> Origin:
+    (a, b), (p, q) = (tuple(int(v) for v in data.pop(key)) for key in ("halves", "passes"))
+    return Origin(halves=(a, b), passes=(p, q), **data)
 
 
 def _light(data: dict[str, Any]) -> BasisLight:

@@ -24,8 +24,51 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import numpy.typing as npt
 
+from lightpaint.basis.basis import Basis
+from lightpaint.images.exr import Floats
 from lightpaint.scene.parsed import Integrator
+
+
+class HalfSums:
+    """What two independent halves of the samples have come to, undivided, on the device.
+
+    planes: per half, n·h·w·3 values laid out (n, h, w, 3). seen: h·w counts of camera rays
+    that saw an emitter. spp, passes: per half, samples per pixel and passes so far.
+    """
+
+    def __init__(self, lights: int, size: tuple[int, int]) -> None:
+        self.shape = (lights, *size, 3)
+        count = lights * size[0] * size[1] * 3
+        self.planes = [dr.zeros(mi.Float, count) for _ in range(2)]
+        self.seen = dr.zeros(mi.Float, size[0] * size[1])
+        self.spp, self.passes = [0, 0], [0, 0]
+
+    @classmethod
+    def of(cls, basis: Basis) -> "HalfSums":
+        """The sums that made `basis`, up to round-off."""
+        sums = cls(len(basis.lights), basis.size)
+        a, b = sums.spp = list(basis.origin.halves)
+        sums.passes = list(basis.origin.passes)
+        # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
+        half_a = basis.images + basis.half_differences * (2 * b / (a + b))
+        half_b = basis.images - basis.half_differences * (2 * a / (a + b))
+        sums.planes = [mi.Float((half_a * a).ravel()), mi.Float((half_b * b).ravel())]
+        sums.seen = mi.Float(basis.emitters_seen.ravel().astype(np.float32))
+        return sums
+
+    def mean_and_half_difference(self) -> tuple[Floats, Floats]:
+        """Of all samples, and between the halves, as arrays of `shape`."""
+        (a, b), (plane_a, plane_b) = self.spp, self.planes
+        mean = (plane_a + plane_b) / (a + b)
+        half_difference = (plane_a / a - plane_b / b) / 2
+        dr.eval(mean, half_difference)
+        return np.array(mean).reshape(self.shape), np.array(half_difference).reshape(self.shape)
+
+    def emitters_seen(self) -> npt.NDArray[np.bool_]:
+        """(h, w), pixels in which any camera ray saw an emitter."""
+        return np.array(self.seen).reshape(self.shape[1:3]) > 0
 
 
 def lights_by_instance(scene: Any, names: Sequence[str]) -> Any:

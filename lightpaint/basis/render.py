@@ -1,15 +1,17 @@
 """Rendering the basis: all lights in one pass where that is possible, else one by one."""
 
 import gc
+import time
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
-from lightpaint.errors import SceneError
-from lightpaint.images.exr import Floats
-from lightpaint.progress import Progress, interruptible_between_pieces, silent
+from lightpaint.errors import BasisError, SceneError
+from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
 from lightpaint.scene.emitters import RGB
 from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_loaded
 from lightpaint.scene.scene import Scene
@@ -17,6 +19,9 @@ from lightpaint.scene.variant import use_variant
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)
+
+#: Seconds of work that a crash may cost.
+KEEP_EVERY_S = 30.0
 
 ONE_PASS = "one pass"
 SEPARATE = "separate renders"
@@ -42,12 +47,20 @@ def render_basis(
     *,
     spp: int | None = None,
     seed: int = 0,
+    start: Basis | None = None,
+    keep: Callable[[Basis], bool] | None = None,
     progress: Progress = silent,
 ) -> Basis:
     """Render the image of each light of `scene` alone, at unit emission.
 
-    spp: samples per pixel (the scene's own number by default), rounded up to whole passes.
+    spp: samples per pixel (the scene's own number by default).
     seed: any number >= 0; other seeds give independent bases.
+    start: an earlier basis of the same scene, sensor and seed: its samples count, and only
+    what is missing to `spp` is rendered.
+    keep: called with what there is, now and then and when Ctrl-C ends the work early;
+    returns whether it could be kept.
+
+    Raises SceneError for more lights and pixels than fit, Interrupted for Ctrl-C.
     """
     height, width = scene.size
     spp = scene.spp if spp is None else spp
@@ -56,88 +69,108 @@ def render_basis(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
             "use a smaller film or fewer lights"
         )
+    if start is not None and not goes_on_from(scene, start, seed):
+        raise BasisError("the basis to go on from was made of another scene, sensor or seed")
     if why_not_one_pass(scene) is None:
-        halves, seen, spp = _render_together(scene, spp, seed, progress)
-        method = ONE_PASS
-    else:
-        halves, seen, spp = _render_separately(scene, spp, seed, progress)
-        method = SEPARATE
-    lights = tuple(
+        return _render_together(scene, spp, seed, start, keep, progress)
+    return _render_separately(scene, spp, seed, progress)
+
+
+def goes_on_from(scene: Scene, basis: Basis, seed: int) -> bool:
+    """Whether more samples of `scene` under `seed` may be added to `basis`."""
+    mine = _origin(scene, seed, ONE_PASS, (0, 0), (0, 0))
+    return replace(basis.origin, halves=(0, 0), passes=(0, 0)) == mine
+
+
+def _origin(
+    scene: Scene, seed: int, method: str, halves: tuple[int, int], passes: tuple[int, int]
+) -> Origin:
+    return Origin(
+        scene=scene.path.name,
+        scene_identity=scene.identity,
+        sensor=scene.sensor_names[scene.sensor],
+        seed=seed,
+        method=method,
+        halves=halves,
+        passes=passes,
+    )
+
+
+def _basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
+    return tuple(
         BasisLight(
             x.name, x.plugin, x.kind.parameter, x.kind.unit, x.emission, x.form, x.kind.is_scalar
         )
         for x in scene.lights
     )
-    origin = Origin(
-        scene=scene.path.name,
-        scene_identity=scene.identity,
-        sensor=scene.sensor_names[scene.sensor],
-        spp=spp,
-        seed=seed,
-        method=method,
-    )
-    images, half_differences = _mean_and_half_difference(halves)
-    return Basis(lights, images, half_differences, seen, origin)
-
-
-def _mean_and_half_difference(halves: list[Floats]) -> tuple[Floats, Floats]:
-    a, b = halves
-    images = (a + b) / 2
-    # In place: these are the largest arrays there are.
-    a -= b
-    a /= 2
-    return images, a
 
 
 def _render_together(
-    scene: Scene, spp: int, seed: int, progress: Progress
-) -> tuple[list[Floats], npt.NDArray[np.bool_], int]:
-    """One path-traced pass for all lights (see lightgroups.py)."""
+    scene: Scene,
+    spp: int,
+    seed: int,
+    start: Basis | None,
+    keep: Callable[[Basis], bool] | None,
+    progress: Progress,
+) -> Basis:
+    """All lights in one path-traced pass after another (see lightgroups.py)."""
     import drjit as dr
-    import mitsuba as mi
 
-    from lightpaint.basis.lightgroups import accumulate, lights_by_instance
+    from lightpaint.basis.lightgroups import HalfSums, accumulate, lights_by_instance
 
     height, width = scene.size
     names = [light.name for light in scene.lights]
-    passes = plan_passes(height * width, spp)
+    sums = HalfSums(len(names), scene.size) if start is None else HalfSums.of(start)
+    plan = plan_passes(height * width, spp, done=(sums.spp[0], sums.spp[1]))
+    if start is not None and not plan:
+        return start
+
+    def basis() -> Basis:
+        images, half_differences = sums.mean_and_half_difference()
+        halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
+        origin = _origin(scene, seed, ONE_PASS, halves, passes)
+        return Basis(_basis_lights(scene), images, half_differences, sums.emitters_seen(), origin)
+
     loaded = scene.load(dict.fromkeys(names, WHITE))
     light_of = lights_by_instance(loaded, names)
-    planes = [dr.zeros(mi.Float, len(names) * height * width * 3) for _ in range(2)]
-    seen = dr.zeros(mi.Float, height * width)
     # One sequence of choices for each half, far from all others.
     sequences = [pass_seed(seed, Stream.CHOICE, half) for half in range(2)]
-    traced = [0, 0]
-    progress("basis", 0, len(passes))
-    with interruptible_between_pieces() as let_interrupts_through:
-        for k, pass_spp in enumerate(passes):
-            traced[k % 2] += accumulate(
-                loaded,
-                scene.integrator,
-                sensor=scene.sensor,
-                light_of=light_of,
-                planes=planes[k % 2],
-                seen=seen,
-                seed=pass_seed(seed, Stream.BASIS, k),
-                spp=pass_spp,
-                turn=(sequences[k % 2], traced[k % 2]),
-            )
-            dr.sync_thread()
-            progress("basis", k + 1, len(passes))
-            let_interrupts_through()
-    del loaded, light_of
-    gc.collect()
-    halves = []
-    for half_spp in traced:
-        plane = np.array(planes.pop(0)).reshape(len(names), height, width, 3)
-        plane /= half_spp
-        halves.append(plane)
-    return halves, np.array(seen).reshape(height, width) > 0, sum(traced)
+    kept_s = time.monotonic()
+    progress("basis", 0, len(plan))
+    try:
+        with interruptible_between_pieces() as let_interrupts_through:
+            for k, (half, pass_spp) in enumerate(plan):
+                sums.spp[half] += accumulate(
+                    loaded,
+                    scene.integrator,
+                    sensor=scene.sensor,
+                    light_of=light_of,
+                    planes=sums.planes[half],
+                    seen=sums.seen,
+                    seed=pass_seed(seed, Stream.BASIS, 2 * sums.passes[half] + half),
+                    spp=pass_spp,
+                    turn=(sequences[half], sums.spp[half]),
+                )
+                sums.passes[half] += 1
+                dr.sync_thread()
+                progress("basis", k + 1, len(plan))
+                if keep is not None and time.monotonic() - kept_s > KEEP_EVERY_S and half == 1:
+                    keep(basis())
+                    kept_s = time.monotonic()
+                let_interrupts_through()
+    except KeyboardInterrupt:
+        if keep is None or not all(sums.spp) or not keep(basis()):
+            raise
+        raise Interrupted(
+            f"{sum(sums.spp)} of {spp} samples per pixel are kept; the same command goes on"
+        ) from None
+    finally:
+        del loaded, light_of
+        gc.collect()
+    return basis()
 
 
-def _render_separately(
-    scene: Scene, spp: int, seed: int, progress: Progress
-) -> tuple[list[Floats], npt.NDArray[np.bool_], int]:
+def _render_separately(scene: Scene, spp: int, seed: int, progress: Progress) -> Basis:
     """One ordinary render per light: right for any integrator, n times the work."""
     names = [light.name for light in scene.lights]
     means, differences = [], []
@@ -159,9 +192,11 @@ def _render_separately(
         means.append(estimate.image)
         differences.append(estimate.half_difference)
     height, width = scene.size
-    traced = sum(plan_passes(height * width, spp))
-    mean, difference = np.stack(means), np.stack(differences)
-    return [mean + difference, mean - difference], _emitters_seen(scene), traced
+    plan = plan_passes(height * width, spp)
+    half = sum(size for _, size in plan) // 2
+    origin = _origin(scene, seed, SEPARATE, (half, half), (len(plan) // 2, len(plan) // 2))
+    images, half_differences = np.stack(means), np.stack(differences)
+    return Basis(_basis_lights(scene), images, half_differences, _emitters_seen(scene), origin)
 
 
 def _emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:

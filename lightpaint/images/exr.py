@@ -77,6 +77,17 @@ class Part:
         return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32)
 
 
+def read_attributes(path: Path) -> dict[str, str]:
+    """Text attributes of the first part of an EXR file, without its pixels."""
+    with _silenced():
+        try:
+            header = OpenEXR.File(str(path), header_only=True).parts[0].header
+        except Exception as error:
+            reason = _first_line(error)
+            raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
+        return {k: v for k, v in header.items() if isinstance(v, str)}
+
+
 def read_parts(path: Path) -> list[Part]:
     """All parts of the EXR file at `path`.
 

@@ -3,6 +3,7 @@
 import gc
 from collections.abc import Mapping
 from enum import IntEnum
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -34,17 +35,21 @@ def pass_seed(seed: int, stream: Stream, index: int) -> int:
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
 
 
-def plan_passes(pixels: int, spp: int) -> list[int]:
-    """Samples per pixel of each pass, `spp` in all or one more.
+def plan_passes(pixels: int, spp: int, *, done: tuple[int, int] = (0, 0)) -> list[tuple[int, int]]:
+    """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
 
-    Even and odd passes make up two halves of equal size.
+    spp: what both halves come to together, or one more to make them equal.
+    done: samples per pixel that each half has already.
     """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few: two halves need at least 2")
-    half = -(-spp // 2)
-    passes = min(half, max(1, round(pixels * half / SAMPLES_PER_PASS)))
-    sizes = [half // passes + (k < half % passes) for k in range(passes)]
-    return [size for size in sizes for _ in range(2)]
+    largest = max(1, SAMPLES_PER_PASS // pixels)
+    lists = []
+    for half in range(2):
+        left = max(0, -(-spp // 2) - done[half])
+        sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
+        lists.append([(half, size) for size in sizes])
+    return [one for pair in zip_longest(*lists) for one in pair if one is not None]
 
 
 def render(
@@ -96,15 +101,15 @@ def render_loaded(
     halves = np.zeros((2, height, width, 3), np.float64)
     progress(label, 0, len(passes))
     with interruptible_between_pieces() as let_interrupts_through:
-        for k, pass_spp in enumerate(passes):
+        for k, (half, pass_spp) in enumerate(passes):
             image = mi.render(
                 loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=pass_spp
             )
             # Integrators that wrap another add channels of their own behind R, G and B.
-            halves[k % 2] += pass_spp * np.array(image)[..., :3].astype(np.float64)
+            halves[half] += pass_spp * np.array(image)[..., :3].astype(np.float64)
             progress(label, k + 1, len(passes))
             let_interrupts_through()
-    halves /= sum(passes) / 2
+    halves /= sum(size for _, size in passes) / 2
     return Estimate.of_halves(as_float32(halves[0]), as_float32(halves[1]))
 
 

@@ -1,0 +1,109 @@
+"""Bases kept from earlier runs, so that a second painting of a scene is answered at once.
+
+One file per scene content, sensor and seed; more samples are added to it when asked for. The
+folder is the user's cache folder, or what LIGHTPAINT_CACHE names, and may be deleted at any
+time.
+"""
+
+import hashlib
+import os
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from lightpaint.basis.basis import FORMAT, Basis, Origin, read_basis, read_origin, write_basis
+from lightpaint.errors import LightpaintError, OutputError
+
+#: Bytes above which the bases that were not used for longest are deleted.
+LARGEST = 8 * 2**30
+SUFFIX = ".basis.exr"
+#: Seconds after which an unfinished file belongs to nobody.
+LEFTOVER_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One cached basis. size: in bytes. origin: None if the file cannot be read."""
+
+    path: Path
+    size: int
+    origin: Origin | None
+
+
+def folder() -> Path:
+    """Where bases are kept."""
+    named = os.environ.get("LIGHTPAINT_CACHE")
+    return Path(named) if named else user_cache_path("lightpaint") / "bases"
+
+
+def find(scene_identity: str, sensor: str, seed: int) -> Basis | None:
+    """The basis kept for that, or None. A damaged one is deleted and not spoken of."""
+    path = _path(scene_identity, sensor, seed)
+    if not path.is_file():
+        return None
+    try:
+        basis = read_basis(path)
+    except LightpaintError:
+        path.unlink(missing_ok=True)
+        return None
+    path.touch()
+    return basis
+
+
+def keep(basis: Basis) -> bool:
+    """Keep `basis` in the place of what was kept for its scene, sensor and seed.
+
+    Returns whether that worked: a full disk is no reason to lose a render.
+    """
+    origin = basis.origin
+    path = _path(origin.scene_identity, origin.sensor, origin.seed)
+    try:
+        write_basis(path, basis)
+        _prune(path)
+    except (OutputError, OSError):
+        return False
+    return True
+
+
+def _prune(path: Path) -> None:
+    """Bring the folder back under LARGEST, and keep `path`."""
+    for leftover in folder().glob(f".*{SUFFIX}.*"):
+        # What a killed process was writing.
+        if time.time() - leftover.stat().st_mtime > LEFTOVER_S:
+            shutil.rmtree(leftover, ignore_errors=True)
+    rest = LARGEST - path.stat().st_size
+    for entry in reversed(entries()):
+        if entry.path == path:
+            continue
+        rest -= entry.size
+        if rest < 0:
+            entry.path.unlink(missing_ok=True)
+
+
+def entries() -> list[Entry]:
+    """What is kept, the longest unused first."""
+    files = sorted(folder().glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime)
+    return [Entry(path, path.stat().st_size, _origin_of(path)) for path in files]
+
+
+def clear() -> int:
+    """Delete all that is kept. Returns how many bases that were."""
+    kept = entries()
+    for entry in kept:
+        entry.path.unlink(missing_ok=True)
+    return len(kept)
+
+
+def _path(scene_identity: str, sensor: str, seed: int) -> Path:
+    key = repr((FORMAT, scene_identity, sensor, seed))
+    return folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
+
+
+def _origin_of(path: Path) -> Origin | None:
+    try:
+        return read_origin(path)
+    except LightpaintError:
+        return None
