@@ -5,6 +5,7 @@ a disagreement; 2: something the user can mend, said in one line; 130: interrupt
 """
 
 import argparse
+import io
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -16,11 +17,15 @@ from lightpaint.version import __version__
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that lacks a character shows another, and loses no result over it.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     options = _parser().parse_args(given)
-    # What a command needs is imported when it runs: --help answers at once.
-    from lightpaint import commands
-
     try:
+        # What a command needs is imported when it runs: --help answers at once.
+        from lightpaint import commands
+
         return int(getattr(commands, options.command)(options, given))
     except LightpaintError as error:
         print(f"lightpaint {options.command}: {error}", file=sys.stderr)
@@ -59,7 +64,10 @@ def _parser() -> argparse.ArgumentParser:
     template = _command(commands, "template", "render the current look, to paint over")
     _add_scene(template)
     _add_sampling(template)
-    _add_output(template, "F.exr", "file to write, a PNG beside it (default: <scene>.exr)")
+    _add_output(template, "F.exr", "file to write, a PNG beside it (default: template.exr)")
+    template.add_argument(
+        "--force", action="store_true", help="replace an existing file (default: refuse)"
+    )
 
     solve = _command(commands, "solve", "find the lighting that comes closest to a painting")
     solve.add_argument("source", metavar="SCENE|BASIS", help="scene XML, or a *.basis.exr")

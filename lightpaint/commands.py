@@ -12,7 +12,7 @@ from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis, is_basis_file, read_basis, write_basis
 from lightpaint.basis.render import why_not_one_pass
 from lightpaint.doctor import examine
-from lightpaint.errors import OutputError, TargetError
+from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.pipeline import (
     Look,
@@ -47,7 +47,7 @@ def lights(options: Namespace, _given: list[str]) -> int:
             }
             for light in scene.lights
         ]
-        print(json.dumps({"scene": str(scene.path), "lights": listed}, indent=2))
+        console.write(json.dumps({"scene": str(scene.path), "lights": listed}, indent=2))
         return 0
     table = console.table("light", "plugin", "emission R G B", "unit", "size or place", "sampling")
     for light in scene.lights:
@@ -71,22 +71,28 @@ def basis(options: Namespace, _given: list[str]) -> int:
     scene = _load(options)
     made = _basis(scene, options)
     write_basis(output, made)
-    print(f"{output}: {len(made.lights)} lights, {made.origin.spp} samples per pixel")
+    console.write(f"{output}: {len(made.lights)} lights, {made.origin.spp} samples per pixel")
     return 0
 
 
 def template(options: Namespace, _given: list[str]) -> int:
     """`lightpaint template SCENE -o F.exr`"""
-    output = Path(options.output or Path(options.scene).stem + ".exr")
+    output = Path(options.output or "template.exr")
     _check_suffix(output)
+    for file in (output, output.with_suffix(".png")):
+        if file.exists() and not options.force:
+            raise OutputError(
+                f"{file} exists and may have been painted on: choose another name with -o, or "
+                "pass --force"
+            )
     check_writable(output.parent)
     scene = _load(options, say_how=False)
     with console.progress() as progress:
         picture = render_template(
             scene, output, spp=options.spp, seed=options.seed, progress=progress
         )
-    print(f"{output}: paint over it in linear light, and save with alpha where it matters")
-    print(f"{picture}: the same as a picture")
+    console.write(f"{output}: paint over it in linear light, and save with alpha where it matters")
+    console.write(f"{picture}: the same as a picture")
     return 0
 
 
@@ -98,6 +104,7 @@ def solve(options: Namespace, given: list[str]) -> int:
     targets = [read_target(t, mask=m) for t, m in zip(options.targets, masks, strict=True)]
     source = Path(options.source)
     if is_basis_file(source):
+        _check_nothing_to_render(options)
         scene, made = None, read_basis(source)
         size = made.size
     else:
@@ -137,11 +144,13 @@ def relight(options: Namespace, _given: list[str]) -> int:
     for folder in folders:
         check_writable(folder)
     for lighting, folder in zip(answers, folders, strict=True):
+        if lighting.scene_identity not in ("", scene.identity):
+            console.say(f"{folder}: the lighting was solved for another state of the scene")
         with console.progress() as progress:
             relight_look(
                 scene, lighting, folder, spp=options.spp, seed=options.seed, progress=progress
             )
-        print(f"{folder}: relit.xml, relit.exr, relit.png")
+        console.write(f"{folder}: relit.xml, relit.exr, relit.png")
     return 0
 
 
@@ -152,7 +161,7 @@ def verify(options: Namespace, _given: list[str]) -> int:
     for folder in options.folders:
         with console.progress() as progress:
             result = verify_result(folder, spp=options.spp, seed=options.seed, progress=progress)
-        print(f"{folder}: {_agreement(result)}")
+        console.write(f"{folder}: {_agreement(result)}")
         agree &= result.agrees
     return 0 if agree else 1
 
@@ -160,7 +169,7 @@ def verify(options: Namespace, _given: list[str]) -> int:
 def cache(options: Namespace, _given: list[str]) -> int:
     """`lightpaint cache [clear]`"""
     if options.action == "clear":
-        print(f"{bases.clear()} bases deleted from {bases.folder()}")
+        console.write(f"{bases.clear()} bases deleted from {bases.folder()}")
         return 0
     table = console.table("scene", "sensor", "spp", "seed", "MB", "file")
     for entry in reversed(bases.entries()):
@@ -170,23 +179,22 @@ def cache(options: Namespace, _given: list[str]) -> int:
         )
         table.add_row(*map(escape, about), f"{entry.size / 1e6:.0f}", escape(entry.path.name))
     console.print_table(table)
-    print(f"kept in {bases.folder()}")
+    console.write(f"kept in {bases.folder()}")
     return 0
 
 
 def doctor(options: Namespace, _given: list[str]) -> int:
     """`lightpaint doctor`"""
     findings = examine(options.variant)
-    table = console.table("", "", "found")
     for finding in findings:
         mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
-        table.add_row(finding.what, mark, escape(finding.found))
-    console.print_table(table)
+        console.write(f"{finding.what:18s} {mark:8s} {finding.found}")
     missing = [finding for finding in findings if finding.state == "missing"]
     for finding in missing:
-        print(f"{finding.what}: {finding.remedy}")
-    print("something is missing" if missing else "everything needed is here")
-    return 0
+        if finding.remedy:
+            console.write(f"to mend {finding.what}: {finding.remedy}")
+    console.write("something is missing" if missing else "everything needed is here")
+    return 2 if missing else 0
 
 
 def _load(options: Namespace, *, path: Path | None = None, say_how: bool = True) -> Scene:
@@ -245,8 +253,8 @@ def _show(look: Look, folder: Path) -> None:
             f"{100 * share:.1f} %",
         )
     console.print_table(table)
-    print(verdict(look.solution, look.verification))
-    print(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
+    console.write(verdict(look.solution, look.predicted, look.verification))
+    console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
     if quality.unreached:
         console.say(
@@ -271,11 +279,23 @@ def _agreement(result: Verification) -> str:
 
 def _folders(output: str | None, names: Sequence[str]) -> list[Path]:
     """One result folder per name: DIR itself for a single one, DIR/<name> for several."""
+    for name in names:
+        if Path(name).name != name or name == "..":
+            raise OutputError(f"{name!r} is no name for a folder: choose one with -o")
     if len(names) == 1:
         return [Path(output or names[0])]
     if len(set(names)) < len(names):
         raise OutputError(f"results would overwrite each other: {', '.join(names)}")
     return [Path(output or ".") / name for name in names]
+
+
+def _check_nothing_to_render(options: Namespace) -> None:
+    asked = {"-s": options.sensor, "-D": options.parameters, "-m": options.variant}
+    asked |= {"--spp": options.spp}
+    if idle := [name for name, value in asked.items() if value]:
+        raise BasisError(
+            f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"
+        )
 
 
 def _one_for_each(masks: list[str | None], targets: list[str]) -> list[str | None]:

@@ -1,5 +1,7 @@
 """How the command line speaks: tables to stdout, progress and remarks to stderr."""
 
+import io
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from lightpaint.errors import OutputError
 from lightpaint.progress import Progress as Report
 
 
@@ -26,7 +29,22 @@ def table(*columns: str) -> Table:
 
 def print_table(made: Table) -> None:
     """Print to stdout. Piped output has no width: nothing in it is cut."""
-    Console(highlight=False, width=None if sys.stdout.isatty() else 200).print(made)
+    width = None if sys.stdout.isatty() else 1000
+    page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
+    page.print(made)
+    text = page.file.getvalue()  # type: ignore[attr-defined]
+    write("\n".join(line.rstrip() for line in text.splitlines()))
+
+
+def write(text: str) -> None:
+    """A line of results, to stdout. Work goes on if whoever read them has left (`| head`)."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise OutputError(f"cannot write to standard output: {error.strerror}") from error
 
 
 def say(text: str) -> None:

@@ -60,6 +60,8 @@ def _llvm() -> list[Finding]:
         if llvm.version is not None:
             version = ".".join(map(str, llvm.version))
             findings.append(Finding("LLVM", "ok", f"{version} from {llvm.origin}: {llvm.path}"))
+            export = f"export DRJIT_LIBLLVM_PATH={llvm.path}"
+            findings.append(Finding("for plain mitsuba", "info", export))
         else:
             skipped = f"passed over, {llvm.problem}: {llvm.path} ({llvm.origin})"
             findings.append(Finding("LLVM", "info", skipped))
@@ -89,7 +91,7 @@ def _backend(variant: str | None) -> Finding:
     try:
         backend = use_variant(variant)
     except BackendError as error:
-        return Finding("backend", "missing", str(error), "pip install mitsuba")
+        return Finding("backend", "missing", str(error))
     if backend.note:
         return Finding("backend", "missing", backend.note, INSTALL_LLVM)
     return Finding("backend", "ok", f"{backend.variant} starts and computes")

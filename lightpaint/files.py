@@ -42,13 +42,13 @@ def write_text(path: Path, text: str) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Raise OutputError unless files can be made in `folder`, which is made if missing.
+    """Raise OutputError unless files can be made in `folder`, or it and files in it.
 
     Called before long work, so that an hour of rendering never ends at a closed door.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        there = next(f for f in (folder, *folder.absolute().parents) if f.exists())
+        with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
         raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error

@@ -9,7 +9,7 @@ from pathlib import Path
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.render import goes_on_from, render_basis
-from lightpaint.errors import BasisError, LightpaintError
+from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import check_writable
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
@@ -28,6 +28,20 @@ from lightpaint.target.template import write_template
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
 VIEW_KEY = "lightpaint.view"
+
+
+#: What a solve and a relight write, and the next solve replaces.
+RESULTS = (
+    "lighting.json",
+    "predicted.exr",
+    "verified.exr",
+    "comparison.png",
+    "report.html",
+    "relit.xml",
+    "relit.png",
+    "relit.exr",
+    "relit.*.exr",
+)
 
 
 @dataclass(frozen=True)
@@ -97,6 +111,7 @@ def paint_with_light(
         basis = obtain_basis(scene, spp=spp, seed=seed, use_cache=use_cache, progress=progress)
     solution = solve(basis, target, unpainted=unpainted)
     predicted = combine(basis, solution.lighting)
+    clear_results(folder)
     write_lighting(folder / "lighting.json", solution.lighting)
     view = {"sensor": basis.origin.sensor, "spp": basis.origin.spp}
     write_estimate(folder / "predicted.exr", predicted, {VIEW_KEY: json.dumps(view)})
@@ -109,6 +124,15 @@ def paint_with_light(
     look = Look(target, basis, solution, predicted, relit, verification)
     show_look(look, folder, command=command)
     return look
+
+
+def clear_results(folder: Path) -> None:
+    """Delete what an earlier solve left in `folder`: results of two never stand together."""
+    if not (folder / "lighting.json").is_file():
+        return  # somebody else's files, whatever they are called
+    for pattern in RESULTS:
+        for file in folder.glob(pattern):
+            file.unlink()
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:
@@ -213,6 +237,12 @@ def verify_result(
 ) -> Verification:
     """Render the relit.xml of a result folder anew and compare it with its predicted.exr."""
     folder = Path(folder)
+    missing = [name for name in ("predicted.exr", "relit.xml") if not (folder / name).is_file()]
+    if missing:
+        raise OutputError(
+            f"{folder} is no result folder with a relit scene: it has no "
+            f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
+        )
     predicted = read_estimate(folder / "predicted.exr")
     [part] = read_parts(folder / "predicted.exr")
     view = json.loads(part.attributes.get(VIEW_KEY, "{}"))

@@ -23,6 +23,7 @@ from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 
 CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"
+GALLERY = REPOSITORY / "scenes" / "gallery" / "scene.xml"
 WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
 COOL = REPOSITORY / "targets" / "cornell" / "cool.exr"
 COOL_MASK = REPOSITORY / "targets" / "cornell" / "cool.mask.exr"
@@ -220,6 +221,81 @@ def test_template_is_the_current_look(tmp_path: Path) -> None:
     assert (tmp_path / "t.png").is_file()
 
 
+def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
+    succeed(tmp_path, "template", CORNELL, "--spp", 2)
+    painted = tmp_path / "template.exr"
+    painted.write_bytes(b"hours of work")
+    assert "may have been painted on" in refused(tmp_path, "template", CORNELL, "--spp", 2)
+    assert painted.read_bytes() == b"hours of work"
+    succeed(tmp_path, "template", CORNELL, "--spp", 2, "--force")
+    assert painted.read_bytes() != b"hours of work"
+
+
+def test_results_of_two_solves_never_stand_together(
+    solved: tuple[Path, str], basis_file: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "look"
+    shutil.copytree(solved[0], folder)
+    (folder / "notes.txt").write_text("mine", encoding="utf-8")
+    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder)
+    left = {p.name for p in folder.iterdir()}
+    assert left == (RESULTS - {"relit.xml", "verified.exr"}) | {"notes.txt"}
+    # A folder that no solve has written to is not tidied.
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "relit.xml").write_text("mine", encoding="utf-8")
+    succeed(tmp_path, "solve", basis_file, WARM, "-o", other)
+    assert (other / "relit.xml").read_text(encoding="utf-8") == "mine"
+
+
+def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
+    command = f"{sys.executable} -m lightpaint.cli solve {basis_file} {WARM} {COOL} -o out"
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {command} | true"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    for name in ("warm", "cool"):
+        assert (tmp_path / "out" / name / "report.html").is_file()
+
+
+def test_a_terminal_without_unicode_loses_no_result(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "lightpaint.cli", "lights", str(CORNELL)],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "W/(m? sr)" in done.stdout
+
+
+def test_a_lighting_cannot_name_a_folder_elsewhere(
+    solved: tuple[Path, str], tmp_path: Path
+) -> None:
+    data = json.loads((solved[0] / "lighting.json").read_text(encoding="utf-8"))
+    for target in ("../elsewhere", "/tmp/elsewhere", "..", 5):
+        path = tmp_path / "l.json"
+        path.write_text(json.dumps({**data, "target": target}), encoding="utf-8")
+        refused(tmp_path, "relight", CORNELL, path)
+
+
+def test_doctor_fails_where_something_is_missing(tmp_path: Path) -> None:
+    done = run(tmp_path, "doctor", "-m", "llvm_nonsense_rgb")
+    assert done.returncode == 2
+    assert "MISSING" in done.stdout
+
+
+def test_resize_does_not_stretch(basis_file: Path, tmp_path: Path) -> None:
+    write_rgb(tmp_path / "wide.exr", np.ones((64, 128, 3), np.float32))
+    assert "another shape" in refused(tmp_path, "solve", basis_file, "wide.exr", "--resize")
+
+
 def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
     room = write_room(tmp_path)
     done = run(tmp_path, "basis", room, "-m", "scalar_rgb", "--spp", 4, "-D", "width=8")
@@ -263,9 +339,10 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         "bad/small.exr": "128x64",
         "bad/unpainted.exr": "importance 0 everywhere",
         "bad/negative.exr": "not negative",
-        "bad/nan.exr": "importance 0 everywhere",
+        "bad/nan.exr": "NaN or Inf in every pixel",
         "bad/cut.exr": "cut off",
-        "bad/text.exr": "not a readable OpenEXR",
+        "bad/text.exr": "is no OpenEXR file",
+        "bad": "is a folder",
     }.items():
         assert words in refused(here, "solve", basis_file, target)
         assert words in refused(here, "solve", CORNELL, target)
@@ -275,7 +352,11 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
     assert "cannot write" in refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
     assert "is not a basis" in refused(here, "solve", WARM, WARM)
     assert "no such scene" in refused(here, "solve", "gone.xml", WARM)
-    assert "refuses" in refused(here, "lights", "bad/text.exr")
+    assert "not a scene" in refused(here, "lights", "bad/text.exr")
+    assert "is a folder" in refused(here, "lights", "bad")
+    assert "refuses" in refused(here, "lights", "bad/file")
+    assert "nothing to render" in refused(here, "lights", GALLERY, "-D", "width=0")
+    assert "cannot change a saved basis" in refused(here, "solve", basis_file, WARM, "--spp", 9)
     assert "no sensor 'nobody'" in refused(here, "lights", CORNELL, "-s", "nobody")
     assert "not key=value" in refused(here, "lights", CORNELL, "-D", "spp")
     assert "spp" in refused(here, "basis", CORNELL, "--spp", "1")
@@ -285,7 +366,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
     assert "must end in .exr" in refused(here, "basis", CORNELL, "-o", "basis.png")
     assert "no such lighting" in refused(here, "relight", CORNELL, "gone.json")
     assert "not a JSON" in refused(here, "relight", CORNELL, "bad/file")
-    assert "no such image" in refused(here, "verify", "bad")
+    assert "no result folder" in refused(here, "verify", "bad")
     assert "no variant" in refused(here, "lights", CORNELL, "-m", "llvm_ad_nonsense_rgb")
     assert "not supported" in refused(here, "lights", CORNELL, "-m", "scalar_spectral")
 

@@ -26,6 +26,17 @@ Floats = npt.NDArray[np.floating[Any]]
 #: Above this many values in one file, reading is refused before any pixel is decoded.
 MAX_VALUES = 2**31
 
+#: How other files begin that people take for paintings.
+MAGICS = {
+    b"\x89PNG": "PNG",
+    b"\xff\xd8": "JPEG",
+    b"II*\0": "TIFF",
+    b"MM\0*": "TIFF",
+    b"8BPS": "Photoshop",
+    b"#?": "Radiance HDR",
+    b"PK": "layered (zip)",
+}
+
 
 @dataclass(frozen=True)
 class Part:
@@ -88,6 +99,22 @@ def read_attributes(path: Path) -> dict[str, str]:
         return {k: v for k, v in header.items() if isinstance(v, str)}
 
 
+def _check_is_exr(path: Path) -> None:
+    if path.is_dir():
+        raise ImageError(f"{path} is a folder, not an image file")
+    if not path.is_file():
+        raise ImageError(f"no such image file: {path}")
+    try:
+        with path.open("rb") as file:
+            magic = file.read(8)
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror}") from error
+    if not magic.startswith(b"\x76\x2f\x31\x01"):
+        found = next((kind for mark, kind in MAGICS.items() if magic.startswith(mark)), None)
+        is_a = f"is a {found} file" if found else "is no OpenEXR file"
+        raise ImageError(f"{path} {is_a}: export it as linear OpenEXR")
+
+
 def read_parts(path: Path) -> list[Part]:
     """All parts of the EXR file at `path`.
 
@@ -95,8 +122,7 @@ def read_parts(path: Path) -> list[Part]:
     MAX_VALUES pixel values.
     """
     path = Path(path)
-    if not path.is_file():
-        raise ImageError(f"no such image file: {path}")
+    _check_is_exr(path)
     with _silenced():
         try:
             header = OpenEXR.File(str(path), header_only=True)

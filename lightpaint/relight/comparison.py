@@ -67,12 +67,12 @@ def comparison_image(
     tiles = [
         Tile(
             f"target: {target.name}",
-            f"{_percent(share)} painted{', the rest hatched' if share < 1 else ''}",
+            f"{_percent(share)} painted{', the rest hatched' if share < 0.995 else ''}",
             target_picture(target, solution, current, stops=stops),
         ),
         Tile(
             f"predicted{at}",
-            f"misses {_percent(relative_residual(solution))} of the target (RMS)",
+            f"misses {_percent(relative_residual(solution))} of the target (RMS, with noise)",
             encode_display(predicted, stops=stops),
         ),
     ]

@@ -81,7 +81,7 @@ def report_page(
         title=escape(f"{target.name} · {basis.origin.scene}"),
         target=escape(target.name),
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
-        verdict=escape(verdict(solution, verification)),
+        verdict=escape(verdict(solution, predicted, verification)),
         banner=_banner(verification),
         wipe=wipe(looks),
         exposure=_exposure(stops, predicted.image),

@@ -4,6 +4,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.color import LUMINANCE
+from lightpaint.images.estimate import Estimate
 from lightpaint.relight.verify import LIMIT, Verification
 from lightpaint.solve.lighting import Lighting
 from lightpaint.solve.normal_equations import Doubles
@@ -23,33 +24,50 @@ def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
 
 
 def relative_residual(solution: Solution) -> float:
-    """RMS of what the lighting misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
+    """RMS of what the prediction misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
 
     E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
     by importance. 0 is a perfect match, 1 is what all lights off would give. Without the
     square root a miss of 10 % of the light would look like one of 1 %.
     """
-    weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
-    norm2 = float(weighted.sum())
+    norm2 = _norm2(solution)
     # A painting that is black wherever it counts is met by darkness alone.
     missed = sum(solution.quality.objective)
     return float(np.sqrt(missed / norm2)) if norm2 > 0 else float(missed > 0)
 
 
-def share_met(solution: Solution) -> float:
-    """How much of the painting the lighting meets, 0 to 1: 1 − `relative_residual`."""
-    return max(0.0, 1.0 - relative_residual(solution))
+def noise_residual(solution: Solution, predicted: Estimate) -> float:
+    """The part of `relative_residual` that is the basis' own noise, in the same measure."""
+    norm2 = _norm2(solution)
+    squares = np.square(predicted.half_difference, dtype=np.float64)
+    noise2 = float((solution.importance[..., None] * squares).sum())
+    return float(np.sqrt(noise2 / norm2)) if norm2 > 0 else 0.0
 
 
-def verdict(solution: Solution, verification: Verification | None) -> str:
+def share_met(solution: Solution, predicted: Estimate) -> float:
+    """How much of the painting the lighting meets, 0 to 1, were it rendered without noise.
+
+    Noise in the prediction adds its power to the objective; what is left without it is what
+    the lighting itself misses.
+    """
+    missed2 = relative_residual(solution) ** 2 - noise_residual(solution, predicted) ** 2
+    return max(0.0, 1.0 - float(np.sqrt(max(missed2, 0.0))))
+
+
+def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
     """One plain sentence: how well the painting is met, and whether a render confirms it."""
     fit = (
-        f"The lighting meets {100 * share_met(solution):.1f} % of the painting "
-        f"(relative RMS residual {relative_residual(solution):.2g})"
+        f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting "
+        f"(RMS; noise adds {100 * noise_residual(solution, predicted):.0f} %)"
     )
     if not solution.quality.converged:
         fit += ", from a solve that stopped before it converged"
     return f"{fit}; {agreement(verification)}."
+
+
+def _norm2(solution: Solution) -> float:
+    weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
+    return float(weighted.sum())
 
 
 def agreement(verification: Verification | None) -> str:

@@ -100,7 +100,7 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
     squares = np.square(predicted.half_difference, dtype=np.float64)
     squares += np.square(verified.half_difference, dtype=np.float64)
     # Round-off is noise too; it keeps 0/0 out where nothing was ever lit.
-    magnitude = np.abs(predicted.image) + np.abs(verified.image)
+    magnitude = np.abs(predicted.image).astype(np.float64) + np.abs(verified.image)
     squares += np.square(PRECISION * magnitude) + np.finfo(np.float32).tiny
 
     pooled = predicted.variance() + verified.variance() + np.square(PRECISION * magnitude)

@@ -129,8 +129,12 @@ def load_scene(
     """
     backend = use_variant(variant)
     path = Path(path)
+    if path.is_dir():
+        raise SceneError(f"{path} is a folder, not a scene XML")
     if not path.is_file():
         raise SceneError(f"no such scene file: {path}")
+    if path.suffix.lower() in (".exr", ".json", ".png"):
+        raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
     values = {key: str(value) for key, value in (parameters or {}).items()}
     parsed = ParsedScene(path, values, backend.variant)
     index = _sensor_index(sensor, parsed.sensor_names, path)
@@ -141,6 +145,11 @@ def load_scene(
     spp = int(loaded.sensors()[index].sampler().sample_count())
     del loaded
     gc.collect()
+    if min(view.crop_size) < 1:
+        raise SceneError(
+            f"{path} has a film of {view.crop_size[0]}x{view.crop_size[1]} pixels: "
+            "there is nothing to render"
+        )
     if not lights:
         raise SceneError(f"{path} has no lights: add at least one emitter")
 

@@ -177,8 +177,8 @@ def read_lighting(path: str | Path) -> Lighting:
     try:
         return Lighting(
             lights=tuple(_read_setting(name, d) for name, d in data["lights"].items()),
-            target=str(data.get("target", "")),
-            scene_identity=str(data.get("scene_identity", "")),
+            target=_read_text(data, "target"),
+            scene_identity=_read_text(data, "scene_identity"),
             quality=_read_quality(data["solve"]) if "solve" in data else None,
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -231,6 +231,13 @@ def _read_quality(data: dict[str, Any]) -> Quality:
 def _rgb(values: Any) -> RGB:
     r, g, b = (float(v) for v in values)
     return r, g, b
+
+
+def _read_text(data: dict[str, Any], key: str) -> str:
+    text = data.get(key, "")
+    if not isinstance(text, str):
+        raise TypeError(f"{key} is a text, not {text!r}")
+    return text
 
 
 def _read_rgb(values: Any) -> RGB:

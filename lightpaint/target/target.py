@@ -43,6 +43,8 @@ class Target:
                 f"target {self.name}: importance must be finite and not negative; it is between "
                 f"{np.min(self.importance):g} and {np.max(self.importance):g}"
             )
+        if self.not_finite == self.importance.size:
+            raise TargetError(f"target {self.name} holds NaN or Inf in every pixel")
         if not self.importance.any():
             raise TargetError(
                 f"target {self.name} has importance 0 everywhere, so nothing in it counts: "
@@ -81,6 +83,12 @@ class Target:
             raise SizeError(
                 f"target {self.name} is {self.size[1]}x{self.size[0]} but the basis is "
                 f"{size[1]}x{size[0]}: export it at that size, or pass --resize"
+            )
+        (height, width), (mine_h, mine_w) = size, self.size
+        if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
+            raise SizeError(
+                f"target {self.name} is {mine_w}x{mine_h}, of another shape than the basis with "
+                f"{width}x{height}: crop it to that shape, --resize does not stretch"
             )
         return self.resized(size)
 

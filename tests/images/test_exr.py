@@ -137,18 +137,28 @@ def test_the_terminal_is_given_back(tmp_path: Path, capfd: pytest.CaptureFixture
     assert capfd.readouterr() == ("out", "err")
 
 
-@pytest.mark.parametrize("content", [b"", b"#?RADIANCE\n", b"\x89PNG\r\n\x1a\n" + bytes(99)])
-def test_no_exr(tmp_path: Path, content: bytes):
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"", "no OpenEXR"),
+        (b"#?RADIANCE\n", "a Radiance HDR"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(99), "a PNG"),
+        (b"\xff\xd8\xff\xe0", "a JPEG"),
+        (b"8BPS\0", "a Photoshop"),
+    ],
+)
+def test_no_exr(tmp_path: Path, content: bytes, kind: str):
     path = tmp_path / "picture.exr"
     path.write_bytes(content)
-    with pytest.raises(ImageError, match=r"picture\.exr is not a readable OpenEXR file"):
+    with pytest.raises(ImageError, match=rf"picture\.exr is {kind} file: export it as linear"):
         read_parts(path)
 
 
 def test_no_file(tmp_path: Path):
-    for path in (tmp_path / "none.exr", tmp_path):
-        with pytest.raises(ImageError, match="no such image file"):
-            read_parts(path)
+    with pytest.raises(ImageError, match="no such image file"):
+        read_parts(tmp_path / "none.exr")
+    with pytest.raises(ImageError, match="is a folder"):
+        read_parts(tmp_path)
 
 
 def test_deep_pixels_are_refused_by_name(tmp_path: Path):

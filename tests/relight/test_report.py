@@ -17,7 +17,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.relight.report import energy_shares, report_page, verdict, write_report
 from lightpaint.relight.report_pictures import data_uri, thumbnail
 from lightpaint.relight.report_tables import hex_color
-from lightpaint.relight.verdict import relative_residual, share_met
+from lightpaint.relight.verdict import noise_residual, relative_residual, share_met
 from lightpaint.relight.verify import compare
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.solve import solve
@@ -340,11 +340,16 @@ def test_how_well_a_painting_is_met_in_closed_form(make_basis: Any):
     solution = solve(basis, target)
     # The objective is a difference of float64 sums.
     assert relative_residual(solution) == pytest.approx(np.sqrt(0.5), rel=1e-9)
-    assert share_met(solution) == pytest.approx(1 - np.sqrt(0.5), rel=1e-9)
-    assert verdict(solution, None) == (
-        "The lighting meets 29.3 % of the painting (relative RMS residual 0.71); "
+    silent = Estimate(image, np.zeros_like(image))
+    assert share_met(solution, silent) == pytest.approx(1 - np.sqrt(0.5), rel=1e-9)
+    assert verdict(solution, silent, None) == (
+        "The lighting meets 29 % of the painting (RMS; noise adds 0 %); "
         "the prediction is not verified by a render."
     )
+    # Noise of half the painting's RMS: a quarter of its power is no fault of the lighting.
+    noisy = Estimate(image, np.full_like(image, 0.5 * np.sqrt(0.5)))
+    assert noise_residual(solution, noisy) == pytest.approx(0.5, rel=1e-6)
+    assert share_met(solution, noisy) == pytest.approx(1 - 0.5, rel=1e-6)
 
 
 def test_a_painting_of_darkness_is_met_by_darkness(make_basis: Any):
@@ -352,14 +357,16 @@ def test_a_painting_of_darkness_is_met_by_darkness(make_basis: Any):
     black = Target(
         "night", np.zeros((4, 6, 3), np.float32), np.ones((4, 6), np.float32), everything=True
     )
-    assert verdict(solve(basis, black), None).startswith("The lighting meets 100.0 % ")
+    solution = solve(basis, black)
+    predicted = combine(basis, solution.lighting)
+    assert verdict(solution, predicted, None).startswith("The lighting meets 100 % ")
 
 
 def test_the_verdict_tells_of_the_verification(make_basis: Any):
     good, bad = _result(make_basis), _result(make_basis, bias=1.2)
     z = good["verification"]
-    assert verdict(good["solution"], z).endswith(
+    assert verdict(good["solution"], good["predicted"], z).endswith(
         "; prediction and verification agree within noise "
         f"({z.difference:.1f} standard errors apart, limit 5)."
     )
-    assert "DISAGREE" in verdict(bad["solution"], bad["verification"])
+    assert "DISAGREE" in verdict(bad["solution"], bad["predicted"], bad["verification"])
