@@ -10,7 +10,7 @@ from rich.markup import escape
 from lightpaint import console
 from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis, is_basis_file, read_basis, write_basis
-from lightpaint.basis.render import why_not_one_pass
+from lightpaint.basis.render import memory_needed, why_not_one_pass
 from lightpaint.doctor import examine
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_writable
@@ -215,6 +215,11 @@ def _load(options: Namespace, *, path: Path | None = None, say_how: bool = True)
 
 def _basis(scene: Scene, options: Namespace) -> Basis:
     """Render the basis, or say that it was there already."""
+    if (needed := memory_needed(scene)) > 2e9:
+        console.say(
+            f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "
+            f"{needed / 1e9:.1f} GB of memory at most"
+        )
     rendered = False
     with console.progress() as report:
 

@@ -58,13 +58,26 @@ class HalfSums:
         sums.seen = mi.Float(basis.emitters_seen.ravel().astype(np.float32))
         return sums
 
-    def mean_and_half_difference(self) -> tuple[Floats, Floats]:
-        """Of all samples, and between the halves, as arrays of `shape`."""
-        (a, b), (plane_a, plane_b) = self.spp, self.planes
-        mean = (plane_a + plane_b) / (a + b)
-        half_difference = (plane_a / a - plane_b / b) / 2
-        dr.eval(mean, half_difference)
-        return np.array(mean).reshape(self.shape), np.array(half_difference).reshape(self.shape)
+    def mean_and_half_difference(self, *, is_last: bool) -> tuple[Floats, Floats]:
+        """Of all samples, and between the halves, as arrays of `shape`.
+
+        is_last: the sums are given up meanwhile, which saves as much memory again.
+        """
+        halves = []
+        for half in range(2):
+            halves.append(np.array(self.planes[half]).reshape(self.shape))
+            if is_last:
+                self.planes[half] = None
+        (a, b), (mean, half_difference) = self.spp, halves
+        # In place, one light at a time: these are the largest arrays there are.
+        for plane_a, plane_b in zip(mean, half_difference, strict=True):
+            plane_a /= a
+            plane_b /= -b
+            plane_b += plane_a
+            plane_b /= 2
+            # A is the mean of all plus the share of B in them times the difference.
+            plane_a -= plane_b * np.float32(2 * b / (a + b))
+        return mean, half_difference
 
     def emitters_seen(self) -> npt.NDArray[np.bool_]:
         """(h, w), pixels in which any camera ray saw an emitter."""

@@ -13,7 +13,14 @@ from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
 from lightpaint.scene.emitters import RGB
-from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_loaded
+from lightpaint.scene.render import (
+    SAMPLES_PER_PASS,
+    Stream,
+    as_float32,
+    pass_seed,
+    plan_passes,
+    render_loaded,
+)
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 
@@ -69,11 +76,42 @@ def render_basis(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
             "use a smaller film or fewer lights"
         )
+    check_memory(scene)
     if start is not None and not goes_on_from(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor or seed")
     if why_not_one_pass(scene) is None:
         return _render_together(scene, spp, seed, start, keep, progress)
     return _render_separately(scene, spp, seed, progress)
+
+
+def memory_needed(scene: Scene) -> int:
+    """Bytes that a basis of `scene` takes at its peak, whatever the number of samples."""
+    height, width = scene.size
+    images = len(scene.lights) * height * width * 3 * 4
+    # Sums of two halves, the images and half differences made of them, and a copy of both
+    # where they are written to a file; passes are small beside that.
+    return 6 * images + 512 * SAMPLES_PER_PASS
+
+
+def check_memory(scene: Scene) -> None:
+    """Raise SceneError if a basis of `scene` would not fit, instead of being killed for it."""
+    needed, free = memory_needed(scene), _free_memory()
+    if free is not None and needed > free:
+        height, width = scene.size
+        raise SceneError(
+            f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
+            f"{free / 1e9:.1f} GB are free: use a smaller film or fewer lights"
+        )
+
+
+def _free_memory() -> int | None:
+    """Bytes that can be had without swapping, where the system tells (Linux)."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    except OSError:
+        return None
+    return int(found[0]) * 1024 if found else None
 
 
 def goes_on_from(scene: Scene, basis: Basis, seed: int) -> bool:
@@ -125,8 +163,8 @@ def _render_together(
     if start is not None and not plan:
         return start
 
-    def basis() -> Basis:
-        images, half_differences = sums.mean_and_half_difference()
+    def basis(*, is_last: bool = False) -> Basis:
+        images, half_differences = sums.mean_and_half_difference(is_last=is_last)
         halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
         origin = _origin(scene, seed, ONE_PASS, halves, passes)
         return Basis(_basis_lights(scene), images, half_differences, sums.emitters_seen(), origin)
@@ -159,7 +197,7 @@ def _render_together(
                     kept_s = time.monotonic()
                 let_interrupts_through()
     except KeyboardInterrupt:
-        if keep is None or not all(sums.spp) or not keep(basis()):
+        if keep is None or not all(sums.spp) or not keep(basis(is_last=True)):
             raise
         raise Interrupted(
             f"{sum(sums.spp)} of {spp} samples per pixel are kept; the same command goes on"
@@ -167,7 +205,7 @@ def _render_together(
     finally:
         del loaded, light_of
         gc.collect()
-    return basis()
+    return basis(is_last=True)
 
 
 def _render_separately(scene: Scene, spp: int, seed: int, progress: Progress) -> Basis:

@@ -12,6 +12,7 @@ from lightpaint.basis.render import (
     SEPARATE,
     WHITE,
     _render_separately,
+    memory_needed,
     render_basis,
     why_not_one_pass,
 )
@@ -263,6 +264,15 @@ def test_passes_make_up_two_equal_halves_of_the_samples(pixels: int, spp: int) -
     assert [half for half, _ in plan] == [0, 1] * len(sizes[0])
     assert min(sizes[0]) >= 1
     assert max(sizes[0]) * pixels <= max(SAMPLES_PER_PASS, pixels)
+
+
+def test_what_does_not_fit_is_refused_before_it_is_tried(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    huge = load_scene(path, parameters={"width": 10_000_000})
+    with pytest.raises(SceneError, match="5 lights at 10000000x20 .*"):
+        render_basis(huge, spp=2)
+    large = load_scene(path, parameters={"width": 600_000})
+    assert memory_needed(large) > 5 * 600_000 * 20 * 3 * 4 * 6
 
 
 def test_too_few_samples_or_too_many_lights_are_refused(tmp_path: Path) -> None:
