@@ -80,7 +80,7 @@ def one_pass(scene: Scene, names: list[str], spp: int, *, seed: int) -> tuple[fl
         accumulate(
             loaded,
             scene.integrator,
-            sensor=scene.sensor,
+            camera=scene.camera(loaded),
             light_of=light_of,
             planes=planes,
             seen=seen,
@@ -117,7 +117,7 @@ def render(scene: Scene, emission: Any, spp: int, seed: int) -> tuple[float, lis
 
     loaded = scene.load(emission)
     seconds, image = timed(
-        lambda: np.array(mi.render(loaded, sensor=scene.sensor, seed=seed, spp=spp))
+        lambda: np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
     )
     return seconds, [image[..., :3]]
 

@@ -138,7 +138,12 @@ def descend(
             parameters[key] = optimizer[name] * present[name]
         parameters.update()
         rendered = mi.render(
-            loaded, parameters, integrator=integrator, spp=ADAM_SPP, seed=step, sensor=scene.sensor
+            loaded,
+            parameters,
+            integrator=integrator,
+            spp=ADAM_SPP,
+            seed=step,
+            sensor=scene.camera(loaded),
         )
         dr.backward(dr.sum(weight * dr.square(rendered - psi), axis=None))
         optimizer.step()

@@ -23,6 +23,7 @@ from lightpaint.pipeline import (
     render_template,
     verify_result,
 )
+from lightpaint.relight.relight import check_relightable
 from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.scene.scene import Scene, load_scene
@@ -113,6 +114,8 @@ def solve(options: Namespace, given: list[str]) -> int:
     targets = [target.fitted_to(size, resize=options.resize) for target in targets]
     for folder in folders:
         check_writable(folder)
+        if scene is not None:
+            check_relightable(scene, folder / "relit.xml")
 
     for target, folder in zip(targets, folders, strict=True):
         _warn_of_pixels(target.not_finite, target.name)
@@ -125,6 +128,7 @@ def solve(options: Namespace, given: list[str]) -> int:
                 folder,
                 basis=made,
                 unpainted=options.unpainted,
+                spp=options.spp,
                 seed=options.seed,
                 command=command_line(given),
                 progress=progress,

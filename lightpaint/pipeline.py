@@ -8,15 +8,14 @@ from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
-from lightpaint.basis.render import goes_on_from, render_basis
-from lightpaint.errors import BasisError, LightpaintError, OutputError
+from lightpaint.basis.render import is_of, render_basis
+from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError
 from lightpaint.files import check_writable
 from lightpaint.images.display import choose_exposure, write_png
-from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
-from lightpaint.images.exr import read_parts
+from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relight.comparison import write_comparison
-from lightpaint.relight.relight import relight
+from lightpaint.relight.relight import check_relightable, relight
 from lightpaint.relight.report import write_report
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.render import Stream, render
@@ -104,6 +103,8 @@ def paint_with_light(
     size = basis.size if basis is not None else scene.size if scene is not None else target.size
     target = target.fitted_to(size, resize=resize)
     check_writable(folder)
+    if scene is not None:
+        check_relightable(scene, folder / "relit.xml")
 
     if basis is None:
         if scene is None:
@@ -113,13 +114,18 @@ def paint_with_light(
     predicted = combine(basis, solution.lighting)
     clear_results(folder)
     write_lighting(folder / "lighting.json", solution.lighting)
-    view = {"sensor": basis.origin.sensor, "spp": basis.origin.spp}
+    view = {
+        "sensor": basis.origin.sensor,
+        "spp": spp or (scene.spp if scene is not None else basis.origin.spp),
+    }
     write_estimate(folder / "predicted.exr", predicted, {VIEW_KEY: json.dumps(view)})
 
     relit, verification = None, None
     if scene is not None:
         relit = relight(scene, solution.lighting, folder / "relit.xml")
-        verification = verify(predicted, relit, spp=basis.origin.spp, seed=seed, progress=progress)
+        verification = verify(
+            predicted, relit, spp=scene.spp if spp is None else spp, seed=seed, progress=progress
+        )
         write_estimate(folder / "verified.exr", verification.verified, {})
     look = Look(target, basis, solution, predicted, relit, verification)
     show_look(look, folder, command=command)
@@ -161,10 +167,10 @@ def obtain_basis(
     if not use_cache:
         return render_basis(scene, spp=spp, seed=seed, progress=progress)
     start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed)
-    if start is not None and not goes_on_from(scene, start, seed):
+    if start is not None and not is_of(scene, start, seed):
         start = None
     basis = render_basis(scene, spp=spp, seed=seed, start=start, keep=cache.keep, progress=progress)
-    if basis is not start:
+    if start is None or basis.origin.spp > start.origin.spp:
         cache.keep(basis)
     return basis
 
@@ -235,7 +241,11 @@ def verify_result(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Verification:
-    """Render the relit.xml of a result folder anew and compare it with its predicted.exr."""
+    """Render the relit.xml of a result folder anew and compare it with its predicted.exr.
+
+    spp: samples per pixel (those that predicted.exr was solved with by default).
+    Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
+    """
     folder = Path(folder)
     missing = [name for name in ("predicted.exr", "relit.xml") if not (folder / name).is_file()]
     if missing:
@@ -243,18 +253,37 @@ def verify_result(
             f"{folder} is no result folder with a relit scene: it has no "
             f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
         )
-    predicted = read_estimate(folder / "predicted.exr")
-    [part] = read_parts(folder / "predicted.exr")
-    view = json.loads(part.attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(folder / "relit.xml", sensor=view.get("sensor"))
+    path = folder / "predicted.exr"
+    predicted, attributes = read_estimate_with_attributes(path)
+    sensor, solved_spp = _read_view(path, attributes.get(VIEW_KEY, "{}"))
+    relit = load_scene(folder / "relit.xml", sensor=sensor)
     return verify(
         predicted,
         relit,
-        spp=spp or view.get("spp"),
+        spp=solved_spp if spp is None else spp,
         seed=seed,
         stream=Stream.SECOND_VERIFICATION,
         progress=progress,
     )
+
+
+def _read_view(path: Path, text: str) -> tuple[str | None, int | None]:
+    """Sensor and samples per pixel that `path` notes under VIEW_KEY; None for what it lacks."""
+    try:
+        view = json.loads(text)
+        if not isinstance(view, dict):
+            raise TypeError(f"{view!r} is not an object")
+        sensor, spp = view.get("sensor"), view.get("spp")
+        if not (sensor is None or isinstance(sensor, str)):
+            raise TypeError(f"sensor is a name, not {sensor!r}")
+        # A type and no isinstance: true would pass for the number 1.
+        if not (spp is None or (type(spp) is int and spp > 0)):
+            raise TypeError(f"spp is a whole number > 0, not {spp!r}")
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ImageError(
+            f"{path} is damaged in its attribute {VIEW_KEY}: {error}; solve again"
+        ) from None
+    return sensor, spp
 
 
 def command_line(arguments: list[str]) -> str:

@@ -31,10 +31,13 @@ def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
     """Hold Ctrl-C back, and yield a function that lets it through where it does no harm.
 
     An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded
-    loops behind; between two passes it is clean.
+    loops behind; between two passes it is clean. An interrupt that is ignored, or that a
+    program around this one handles outside Python, is left alone.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: None  # signals arrive elsewhere
+    # Signals arrive in the main thread; None stands for a handler that is not Python's.
+    elsewhere = threading.current_thread() is not threading.main_thread()
+    if elsewhere or signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None):
+        yield lambda: None
         return
     pending = False
 

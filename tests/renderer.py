@@ -87,7 +87,7 @@ def mitsuba_render(
     import mitsuba as mi
 
     loaded = scene.load(emission)
-    image = np.array(mi.render(loaded, sensor=scene.sensor, seed=seed, spp=spp))[..., :3]
+    image = np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))[..., :3]
     del loaded
     gc.collect()
     return image
@@ -109,7 +109,7 @@ def one_pass(
     traced = accumulate(
         loaded,
         scene.integrator,
-        sensor=scene.sensor,
+        camera=scene.camera(loaded),
         light_of=lights_by_instance(loaded, names),
         planes=planes,
         seen=dr.zeros(mi.Float, height * width),

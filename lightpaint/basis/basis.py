@@ -133,6 +133,24 @@ class Basis:
         """(n, 3) weights of the scene as it is."""
         return np.array([light.emission for light in self.lights], dtype=np.float64)
 
+    def mix(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""
+        return mix(self.images, weights)
+
+
+def mix(images: Floats, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+    """Σ w_i Φ_i in float32, without a copy of the images.
+
+    images: (n, h, w, 3) float32; weights: (n, 3), one per light and channel. Returns (h, w, 3).
+    """
+    n, height, width, _ = images.shape
+    # With a weight for every value of a row the innermost sums run along whole rows, not
+    # over three channels at a time.
+    along_row = np.tile(np.asarray(weights, np.float32), (1, width))
+    rows = images.reshape(n, height, width * 3)
+    mixed = np.einsum("nhk,nk->hk", rows, along_row)
+    return np.asarray(mixed.reshape(height, width, 3), np.float32)
+
 
 def write_basis(path: Path, basis: Basis) -> None:
     """Write `basis` as a multi-part EXR, whole or not at all."""

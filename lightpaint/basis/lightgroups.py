@@ -97,7 +97,7 @@ def accumulate(
     scene: Any,
     integrator: Integrator,
     *,
-    sensor: int,
+    camera: Any,
     light_of: Any,
     planes: Any,
     seen: Any,
@@ -107,7 +107,7 @@ def accumulate(
 ) -> int:
     """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.
 
-    scene: an `mi.Scene` with a box-filtered film.
+    scene: an `mi.Scene`; camera: one of its sensors, with a box-filtered film.
     light_of: what `lights_by_instance` returns.
     planes: Float array of n·h·w·3 values, laid out (n, h, w, 3).
     seen: Float array of h·w values; counts the camera rays that see an emitter.
@@ -116,7 +116,6 @@ def accumulate(
     be independent have two. None: choose at random, as Mitsuba does.
     Returns the number of paths per pixel, which some samplers round up.
     """
-    camera = scene.sensors()[sensor]
     width, height = (int(v) for v in camera.film().crop_size())
     sampler = camera.sampler().clone()
     sampler.set_sample_count(spp)
@@ -186,7 +185,7 @@ def _trace(
 ):
     """Follow paths as Mitsuba's path.cpp does, step for step."""
     ray = mi.Ray3f(ray)
-    throughput = mi.Spectrum(weight)
+    throughput = mi.Spectrum(1)
     eta = mi.Float(1)
     depth = mi.UInt32(0)
     active = max_depth > 0
@@ -208,7 +207,7 @@ def _trace(
         emission = emitter.eval(si, hit & (previous_pdf > 0))
         _add(
             planes,
-            throughput * emission * _mis(previous_pdf, emitter_pdf),
+            weight * throughput * emission * _mis(previous_pdf, emitter_pdf),
             dr.fma(_light(light_of, emitter, hit), pixels, pixel),
             hit,
         )
@@ -232,7 +231,7 @@ def _trace(
         mis = dr.select(ds.delta, 1, _mis(ds.pdf, bsdf_pdf))
         _add(
             planes,
-            throughput * bsdf_value * radiance * mis,
+            weight * throughput * bsdf_value * radiance * mis,
             dr.fma(_light(light_of, ds.emitter, lit), pixels, pixel),
             lit,
         )

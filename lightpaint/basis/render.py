@@ -3,7 +3,6 @@
 import gc
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,9 @@ BLACK: RGB = (0.0, 0.0, 0.0)
 #: Seconds of work that a crash may cost.
 KEEP_EVERY_S = 30.0
 
+#: Emitters that surround the scene.
+ENVIRONMENTS = ("constant", "envmap", "sunsky")
+
 ONE_PASS = "one pass"
 SEPARATE = "separate renders"
 
@@ -42,6 +44,10 @@ def why_not_one_pass(scene: Scene) -> str | None:
         return f"the variant is {variant.variant}"
     if integrator.plugin not in ("path", "direct"):
         return f"the integrator is {integrator.plugin!r}"
+    if integrator.plugin == "direct" and integrator.samples != (1, 1):
+        return "the direct integrator draws other than one sample of emitters and BSDF"
+    if scene.has_null and not any(x.plugin in ENVIRONMENTS for x in scene.lights):
+        return "rays may pass surfaces and leave, which Mitsuba counts as black"
     if scene.has_media:
         return "the scene has participating media"
     if integrator.hide_emitters:
@@ -77,10 +83,13 @@ def render_basis(
             "use a smaller film or fewer lights"
         )
     check_memory(scene)
-    if start is not None and not goes_on_from(scene, start, seed):
+    if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor or seed")
+    if start is not None and start.origin.spp >= spp:
+        return start
     if why_not_one_pass(scene) is None:
-        return _render_together(scene, spp, seed, start, keep, progress)
+        goes_on = start is not None and start.origin.method == ONE_PASS
+        return _render_together(scene, spp, seed, start if goes_on else None, keep, progress)
     return _render_separately(scene, spp, seed, progress)
 
 
@@ -114,10 +123,11 @@ def _free_memory() -> int | None:
     return int(found[0]) * 1024 if found else None
 
 
-def goes_on_from(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Whether more samples of `scene` under `seed` may be added to `basis`."""
-    mine = _origin(scene, seed, ONE_PASS, (0, 0), (0, 0))
-    return replace(basis.origin, halves=(0, 0), passes=(0, 0)) == mine
+def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
+    """Whether `basis` was made of `scene` as it is, through its sensor, under `seed`."""
+    method = basis.origin.method
+    mine = _origin(scene, seed, method, basis.origin.halves, basis.origin.passes)
+    return basis.origin == mine
 
 
 def _origin(
@@ -160,8 +170,6 @@ def _render_together(
     names = [light.name for light in scene.lights]
     sums = HalfSums(len(names), scene.size) if start is None else HalfSums.of(start)
     plan = plan_passes(height * width, spp, done=(sums.spp[0], sums.spp[1]))
-    if start is not None and not plan:
-        return start
 
     def basis(*, is_last: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
@@ -173,7 +181,7 @@ def _render_together(
     light_of = lights_by_instance(loaded, names)
     # One sequence of choices for each half, far from all others.
     sequences = [pass_seed(seed, Stream.CHOICE, half) for half in range(2)]
-    kept_s = time.monotonic()
+    kept_s, keep_every_s = time.monotonic(), KEEP_EVERY_S
     progress("basis", 0, len(plan))
     try:
         with interruptible_between_pieces() as let_interrupts_through:
@@ -181,7 +189,7 @@ def _render_together(
                 sums.spp[half] += accumulate(
                     loaded,
                     scene.integrator,
-                    sensor=scene.sensor,
+                    camera=scene.camera(loaded),
                     light_of=light_of,
                     planes=sums.planes[half],
                     seen=sums.seen,
@@ -192,9 +200,12 @@ def _render_together(
                 sums.passes[half] += 1
                 dr.sync_thread()
                 progress("basis", k + 1, len(plan))
-                if keep is not None and time.monotonic() - kept_s > KEEP_EVERY_S and half == 1:
+                now_s = time.monotonic()
+                if keep is not None and now_s - kept_s > keep_every_s and all(sums.spp):
                     keep(basis())
                     kept_s = time.monotonic()
+                    # Where writing takes long, it must not become the work itself.
+                    keep_every_s = max(KEEP_EVERY_S, 10 * (kept_s - now_s))
                 let_interrupts_through()
     except KeyboardInterrupt:
         if keep is None or not all(sums.spp) or not keep(basis(is_last=True)):
@@ -246,7 +257,7 @@ def _emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
     loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
     direct = mi.load_dict({"type": "path", "max_depth": 1})
     image = as_float32(
-        np.array(mi.render(loaded, sensor=scene.sensor, integrator=direct, seed=0, spp=16))
+        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=16))
     )
     del loaded
     gc.collect()

@@ -1,5 +1,6 @@
 """An image made by Monte Carlo, with what is known of its noise."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,10 +73,21 @@ def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -
 
 def read_estimate(path: Path) -> Estimate:
     """Read what `write_estimate` wrote."""
-    part = read_parts(path)[0]
+    return read_estimate_with_attributes(path)[0]
+
+
+def read_estimate_with_attributes(path: Path) -> tuple[Estimate, Mapping[str, str]]:
+    """What `write_estimate` wrote, and the text attributes of its header."""
+    parts = read_parts(path)
+    if len(parts) > 1:
+        raise ImageError(
+            f"{path} has {len(parts)} parts ({', '.join(p.name for p in parts)}) instead of one: "
+            "give an image that lightpaint rendered"
+        )
+    [part] = parts
     if f"{HALF_DIFFERENCE}.R" not in part.channels:
         raise ImageError(
             f"{path} carries no {HALF_DIFFERENCE} layer, so its noise is unknown: "
             "give an image that lightpaint rendered"
         )
-    return Estimate(part.rgb(), part.rgb(HALF_DIFFERENCE))
+    return Estimate(part.rgb(), part.rgb(HALF_DIFFERENCE)), part.attributes

@@ -5,9 +5,12 @@ reference library lets pass silently (a cut-off file, missing parts, deep pixels
 ImageError here.
 """
 
+import errno
+import fcntl
 import io
 import os
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
@@ -46,6 +49,7 @@ class Part:
     attributes: text attributes of the header.
     display: (height, width) of the display window, the picture; None if it is `size`.
     offset: (y, x) of the first stored pixel in it: programs crop what is empty or keep a margin.
+    primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
     """
 
     name: str
@@ -53,6 +57,7 @@ class Part:
     attributes: Mapping[str, str] = field(default_factory=dict)
     display: tuple[int, int] | None = None
     offset: tuple[int, int] = (0, 0)
+    primaries: tuple[float, ...] | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -73,7 +78,7 @@ class Part:
             stored = pixels[top - y :, left - x :][: max(height - top, 0), : max(width - left, 0)]
             canvas[top : top + stored.shape[0], left : left + stored.shape[1]] = stored
             placed[name] = canvas
-        return Part(self.name, placed, self.attributes)
+        return Part(self.name, placed, self.attributes, primaries=self.primaries)
 
     def rgb(self, layer: str = "") -> Floats:
         """The R, G and B channels of `layer` as (height, width, 3) float32."""
@@ -85,7 +90,7 @@ class Part:
                 f"no channel {', '.join(missing)} in part {self.name!r}, "
                 f"which has {', '.join(self.channels)}"
             )
-        return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32)
+        return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32, copy=False)
 
 
 def read_attributes(path: Path) -> dict[str, str]:
@@ -147,7 +152,8 @@ def read_parts(path: Path) -> list[Part]:
             raise ImageError(f"{path} has a part without channels")
         attributes = {k: v for k, v in part.header.items() if isinstance(v, str)}
         display, offset = _windows(part.header)
-        result.append(Part(part.name() or "", channels, attributes, display, offset))
+        primaries = _primaries(part.header)
+        result.append(Part(part.name() or "", channels, attributes, display, offset, primaries))
     return result
 
 
@@ -188,6 +194,14 @@ def _windows(header: Mapping[str, Any]) -> tuple[tuple[int, int], tuple[int, int
     return (y1 - y0 + 1, x1 - x0 + 1), (y - y0, x - x0)
 
 
+def _primaries(header: Mapping[str, Any]) -> tuple[float, ...] | None:
+    """x and y of red, green, blue and white. An attribute of that name and another type is none."""
+    declared = header.get("chromaticities")
+    if not isinstance(declared, tuple) or len(declared) != 8:
+        return None
+    return tuple(float(v) for v in declared)
+
+
 def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]) -> None:
     values = 0
     for name, header in declared:
@@ -212,25 +226,49 @@ def _first_line(error: BaseException) -> str:
     return text.splitlines()[0] if text else type(error).__name__
 
 
+#: The descriptors belong to the whole process: two threads would put back each other's.
+_silencing = threading.Lock()
+
+
 @contextmanager
 def _silenced() -> Iterator[None]:
     """Keep what the C++ library prints about damaged files off the user's terminal.
 
     It writes to the process's own descriptors and, by way of Python, to `sys.stdout`, which
-    is another place in a notebook. The same news comes as an ImageError.
+    is another place in a notebook. The same news comes as an ImageError. A descriptor that
+    the process was started without stays closed.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
-    saved = [(fd, os.dup(fd)) for fd in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    with _silencing:
+        _flush_standard_streams()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        saved = [(fd, _copy_if_open(fd)) for fd in (1, 2) if fd != nowhere]
+        try:
+            for fd, _ in saved:
+                os.dup2(nowhere, fd)
+            with redirect_stdout(io.StringIO()):
+                yield
+        finally:
+            _flush_standard_streams()
+            for fd, copy in saved:
+                if copy is None:
+                    os.close(fd)
+                else:
+                    os.dup2(copy, fd)
+                    os.close(copy)
+            os.close(nowhere)
+
+
+def _flush_standard_streams() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:  # which is how Python shows that it is closed
+            stream.flush()
+
+
+def _copy_if_open(fd: int) -> int | None:
     try:
-        for fd, _ in saved:
-            os.dup2(nowhere, fd)
-        with redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        sys.stdout.flush()
-        for fd, copy in saved:
-            os.dup2(copy, fd)
-            os.close(copy)
-        os.close(nowhere)
+        # Above the standard ones, of which another may be closed and would be taken for it.
+        return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 3)
+    except OSError as error:
+        if error.errno != errno.EBADF:
+            raise
+        return None

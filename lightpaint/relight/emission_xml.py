@@ -21,17 +21,19 @@ class Changes:
     _missing: list[str] = field(default_factory=list)
 
     def set(self, kind: str, name: str, value: str) -> None:
-        """Give the element a child `<kind name=… value=…/>`, in the place of its namesake."""
-        line = tag(kind, name=name, value=value)
-        child = self.element.child_named(name)
+        """Give the element a child `<kind name=… value=…/>`, in the place of its namesake.
+
+        name: in snake_case; a namesake keeps its spelling, for Mitsuba refuses a mixture.
+        """
+        child = self._child_named(name)
         if child is None:
-            self._missing.append(line)
+            self._missing.append(tag(kind, name=name, value=value))
         else:
-            self.xml.replace(child, line)
+            self.xml.replace(child, tag(kind, name=child.attributes["name"], value=value))
 
     def number(self, name: str, otherwise: float) -> float:
         """The number that stands in the child called `name` now, or `otherwise`."""
-        child = self.element.child_named(name)
+        child = self._child_named(name)
         text = child.attributes.get("value", "") if child is not None else f"{otherwise}"
         try:
             return float(text)
@@ -42,7 +44,7 @@ class Changes:
 
     def child(self, name: str) -> "Changes":
         """Changes to the child called `name`, which must be an element of its own."""
-        child = self.element.child_named(name)
+        child = self._child_named(name)
         if child is None or child.tag == "ref":
             raise SceneError(
                 f"the {name} of a light is given by reference, and others may share it: write "
@@ -50,14 +52,35 @@ class Changes:
             )
         return Changes(self.xml, child)
 
+    def _child_named(self, name: str) -> Element | None:
+        """The child of that name, or None if there is certainly none."""
+        child = self.element.child_named(name)
+        unknown = next((c for c in self.element.children if "$" in c.name), None)
+        if child is None and unknown is not None:
+            spelt = unknown.attributes["name"]
+            raise SceneError(
+                f"{self.xml.place_of(unknown)}: <{unknown.tag} name={spelt!r}> in "
+                f"{self._title()} may be its {name}: write the name in the place of the parameter"
+            )
+        return child
+
+    def _title(self) -> str:
+        given = self.element.attributes
+        id_or_name = given.get("id") or given.get("name") or given.get("type", "")
+        return f"<{self.element.tag}> {id_or_name!r}"
+
     def finish(self) -> None:
         """Hand the insertions on; call once, last."""
         if self._missing:
             self.xml.insert_first(self.element, self._missing)
 
 
-def write_emission(changes: Changes, scene: Scene, light: Light, rgb: RGB) -> dict[str, Floats]:
+def write_emission(
+    changes: Changes, scene: Scene, light: Light, rgb: RGB, *, stem: str
+) -> dict[str, Floats]:
     """Set the emission of `light` to `rgb`, in the unit of its kind.
+
+    stem: what the names of images begin with.
 
     Returns the images, (h, w, 3) linear, that have to lie beside the relit scene, by file name.
     """
@@ -75,14 +98,17 @@ def write_emission(changes: Changes, scene: Scene, light: Light, rgb: RGB) -> di
     elif not any(rgb):
         changes.set("rgb", kind.parameter, "0 0 0")
     elif rgb != AS_AUTHORED:
-        return _scale_image(changes, scene, light, rgb)
+        return _scale_image(changes, scene, light, rgb, stem)
     return {}
 
 
-def _scale_image(changes: Changes, scene: Scene, light: Light, rgb: RGB) -> dict[str, Floats]:
+def _scale_image(
+    changes: Changes, scene: Scene, light: Light, rgb: RGB, stem: str
+) -> dict[str, Floats]:
     """Scale the image of `light` by `rgb` and refer to the result."""
+    # The number keeps apart what a file name cannot: names differ in any character.
     safe = re.sub(r"[^\w-]+", "_", light.name)
-    name = f"relit.{safe}.exr"
+    name = f"{stem}.{scene.lights.index(light)}.{safe}.exr"
     holder = changes if light.plugin == "envmap" else changes.child(light.kind.parameter)
     holder.set("string", "filename", name)
     if holder is not changes:

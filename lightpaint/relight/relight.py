@@ -34,8 +34,6 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     """
     path = Path(path)
     check_same_lights(scene, lighting)
-    if path.resolve() in {file.resolve() for file in scene.files}:
-        raise OutputError(f"{path} is the scene itself: write the relit scene somewhere else")
     for file, content in relit_files(scene, lighting.emission, path).items():
         if isinstance(content, bytes):
             write_bytes(file, content)
@@ -49,6 +47,18 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
         if not np.array_equal(np.asarray(wanted, np.float32), np.asarray(taken, np.float32)):
             raise SceneError(f"{path} did not take the emission of light {light.name!r}")
     return relit
+
+
+def check_relightable(scene: Scene, path: Path) -> None:
+    """Raise what `relight` would raise for some lighting, before a render is paid for.
+
+    The probe is a colour that no light has, so that every light needs all it may need.
+    """
+    probe: dict[str, RGB] = {
+        light.name: (0.5, 0.5, 0.5) if light.kind.is_scalar else (0.5, 0.25, 0.125)
+        for light in scene.lights
+    }
+    relit_files(scene, probe, path)
 
 
 def check_same_lights(scene: Scene, lighting: Lighting) -> None:
@@ -73,7 +83,10 @@ class _Edits:
 def relit_files(
     scene: Scene, emission: Mapping[str, RGB], path: Path
 ) -> dict[Path, bytes | Floats]:
-    """Content of the relit XML at `path`, and of the includes and images it needs beside it."""
+    """Content of the relit XML at `path`, and of the includes and images it needs beside it.
+
+    Raises OutputError if one of them would take the place of a file of the scene itself.
+    """
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
     all_dark = not any(any(rgb) for rgb in emission.values())
@@ -95,10 +108,15 @@ def relit_files(
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         defaults = scene.parameters if is_root else {}
-        content, images = _edit(edit, target.parent, scene, defaults)
+        content, images = _edit(edit, target.parent, scene, path.stem, defaults)
         # Mitsuba looks for images beside the scene, also for those of an included file.
         written |= {path.parent / name: image for name, image in images.items()}
         written[target] = content
+    originals = {file.resolve() for file in scene.originals}
+    if taken := [file for file in written if file.resolve() in originals]:
+        raise OutputError(
+            f"{taken[0]} belongs to the scene itself: write the relit scene to another folder"
+        )
     return written
 
 
@@ -122,9 +140,12 @@ def _place_of_include(file: Path, root: Path) -> Path:
 
 
 def _edit(
-    edit: _Edits, folder: Path, scene: Scene, defaults: Mapping[str, str]
+    edit: _Edits, folder: Path, scene: Scene, stem: str, defaults: Mapping[str, str]
 ) -> tuple[bytes, dict[str, Floats]]:
-    """The edited XML, to be written into `folder`, and the images it refers to, by name."""
+    """The edited XML, to be written into `folder`, and the images it refers to, by name.
+
+    stem: what the names of the images begin with.
+    """
     xml = XmlFile(edit.original)
     if xml.root.tag == "scene":
         # Assets and includes lie where the original lies; the first default wins.
@@ -137,6 +158,6 @@ def _edit(
         changes = Changes(xml, xml.element_at(offset))
         if weight is not None:
             changes.set("float", "sampling_weight", f"{weight:g}")
-        images |= write_emission(changes, scene, light, rgb)
+        images |= write_emission(changes, scene, light, rgb, stem=stem)
         changes.finish()
     return xml.edited(), images

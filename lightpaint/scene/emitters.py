@@ -100,6 +100,8 @@ def read_emission(emitter: Any, kind: EmissionKind, name: str) -> RGB:
     if value.size not in (1, 3):
         raise SceneError(f"light {name!r} has a {kind.parameter} of {value.size} values, not RGB")
     r, g, b = np.broadcast_to(value, 3).tolist()
+    if not (np.isfinite(value).all() and value.min() >= 0):
+        raise SceneError(f"light {name!r} has the {kind.parameter} {[r, g, b]}: need values >= 0")
     return r, g, b
 
 

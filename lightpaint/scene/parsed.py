@@ -18,12 +18,17 @@ from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
 
 @dataclass(frozen=True)
 class Integrator:
-    """The part of the scene's integrator that decides which light paths there are."""
+    """The part of the scene's integrator that decides which light paths there are.
+
+    plugin: of the outermost integrator; the rest is of the one that renders light, inside.
+    samples: what `direct` draws per surface point of emitters and of the BSDF.
+    """
 
     plugin: str
     max_depth: int
     rr_depth: int
     hide_emitters: bool
+    samples: tuple[int, int] = (1, 1)
 
 
 @dataclass(frozen=True)
@@ -45,9 +50,9 @@ class View:
     crop_offset: tuple[int, int]
 
     @classmethod
-    def of(cls, loaded: Any, sensor: int) -> "View":
-        """Of the sensor with that index in a loaded scene. All pairs are (x, y)."""
-        film = loaded.sensors()[sensor].film()
+    def of(cls, camera: Any, sensor: int) -> "View":
+        """Of the sensor with that index among the scene's own. All pairs are (x, y)."""
+        film = camera.film()
         size, crop_size, offset = (
             (int(pair[0]), int(pair[1]))
             for pair in (film.size(), film.crop_size(), film.crop_offset())
@@ -148,6 +153,9 @@ class ParsedScene:
         state = mi.parser.ParserState(self.state)
         for node, name in self.names.items():
             state.nodes[node].props.set_id(name)
+        # Sensors that belong to shapes stand among the others once loaded: ids tell them apart.
+        for node, name in zip(self.sensor_nodes, self.sensor_names, strict=True):
+            state.nodes[node].props.set_id(name)
         for node, setting in settings.items():
             self._apply(state, node, setting)
         if view is not None:
@@ -211,12 +219,23 @@ class ParsedScene:
         if not nodes:
             # Mitsuba's own choice for a scene that names none.
             return Integrator("path", -1, 5, False)
+        outermost = self.state.nodes[nodes[0]].props.plugin_name()
+        while self.state.nodes[nodes[0]].props.plugin_name() in ("aov", "moment"):
+            nodes = self._children_of(nodes[0], mi.ObjectType.Integrator)
+            if not nodes:
+                raise SceneError(
+                    f"{self.path} has an {outermost!r} integrator with none inside that renders "
+                    "light: put a path integrator into it"
+                )
         props = self.state.nodes[nodes[0]].props
+        shading = int(props.get("shading_samples", 1))
+        samples = (props.get("emitter_samples", shading), props.get("bsdf_samples", shading))
         return Integrator(
-            props.plugin_name(),
+            outermost,
             int(props.get("max_depth", -1)),
             int(props.get("rr_depth", 5)),
             bool(props.get("hide_emitters", False)),
+            (int(samples[0]), int(samples[1])),
         )
 
     def has_media(self) -> bool:
@@ -225,20 +244,25 @@ class ParsedScene:
         return bool(self._nodes_of(mi.ObjectType.Medium))
 
     def identity(self, sensor: int) -> str:
-        digest = hashlib.sha256()
-        for path in (*self.files, *self._assets()):
+        import mitsuba as mi
+
+        # The parsed form holds what stood in files that only the parser reads.
+        parsed = mi.parser.write_string(self.state)
+        digest = hashlib.sha256(repr((mi.__version__, parsed)).encode())
+        for path in (*self.files, *self.assets()):
             data = Path(path).read_bytes()
             digest.update(len(data).to_bytes(8, "little"))
             digest.update(data)
         digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
         return digest.hexdigest()[:32]
 
-    def _assets(self) -> Iterator[Path]:
+    def assets(self) -> Iterator[Path]:
+        """Files that plugins read: meshes, textures, tables."""
         import mitsuba as mi
 
         for node in self.state.nodes:
             for key in node.props:
-                if node.props.type(key) == mi.Properties.Type.String:
+                if "file" in key and node.props.type(key) == mi.Properties.Type.String:
                     path = Path(str(self.resolver.resolve(node.props[key])))
                     if path.is_file():
                         yield path

@@ -42,7 +42,7 @@ def plan_passes(pixels: int, spp: int, *, done: tuple[int, int] = (0, 0)) -> lis
     done: samples per pixel that each half has already.
     """
     if spp < 2:
-        raise SceneError(f"{spp} samples per pixel are too few: two halves need at least 2")
+        raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
     largest = max(1, SAMPLES_PER_PASS // pixels)
     lists = []
     for half in range(2):
@@ -72,7 +72,7 @@ def render(
         return render_loaded(
             loaded,
             scene,
-            spp=spp or scene.spp,
+            spp=scene.spp if spp is None else spp,
             seed=seed,
             stream=stream,
             label=label,
@@ -103,7 +103,10 @@ def render_loaded(
     with interruptible_between_pieces() as let_interrupts_through:
         for k, (half, pass_spp) in enumerate(passes):
             image = mi.render(
-                loaded, sensor=scene.sensor, seed=pass_seed(seed, stream, k), spp=pass_spp
+                loaded,
+                sensor=scene.camera(loaded),
+                seed=pass_seed(seed, stream, k),
+                spp=pass_spp,
             )
             # Integrators that wrap another add channels of their own behind R, G and B.
             halves[half] += pass_spp * np.array(image)[..., :3].astype(np.float64)

@@ -44,6 +44,7 @@ class Scene:
 
     view: the sensor it is seen through, and its film.
     spp: samples per pixel the scene itself asks for.
+    has_null: whether rays may pass a surface as if it were not there.
     identity: hash of the content of all XML files and assets, the parameters and the sensor.
     """
 
@@ -54,6 +55,7 @@ class Scene:
     spp: int
     integrator: Integrator
     has_media: bool
+    has_null: bool
     lights: tuple[Light, ...]
     files: tuple[Path, ...]
     identity: str
@@ -78,6 +80,15 @@ class Scene:
         raise SceneError(
             f"{self.path} has no light {name!r}: it has {', '.join(x.name for x in self.lights)}"
         )
+
+    def camera(self, loaded: Any) -> Any:
+        """The sensor this scene is seen through, in what `load` returned."""
+        return _camera(loaded, self.sensor_names[self.sensor])
+
+    @property
+    def originals(self) -> tuple[Path, ...]:
+        """All files the scene consists of: XML, meshes, textures, tables."""
+        return (*self.files, *self._parsed.assets())
 
     def load(self, emission: Mapping[str, RGB] | None = None) -> Any:
         """The `mi.Scene`, its lights set to `emission` (those not named stay as they are).
@@ -141,9 +152,11 @@ def load_scene(
 
     loaded = parsed.instantiate({})
     lights = _find_lights(parsed, loaded)
-    view = View.of(loaded, index)
-    spp = int(loaded.sensors()[index].sampler().sample_count())
-    del loaded
+    camera = _camera(loaded, parsed.sensor_names[index])
+    view = View.of(camera, index)
+    spp = int(camera.sampler().sample_count())
+    has_null = _has_null_surfaces(loaded)
+    del loaded, camera
     gc.collect()
     if min(view.crop_size) < 1:
         raise SceneError(
@@ -161,11 +174,23 @@ def load_scene(
         spp=spp,
         integrator=parsed.integrator(),
         has_media=parsed.has_media(),
+        has_null=has_null,
         lights=lights,
         files=parsed.files,
         identity=parsed.identity(index),
         _parsed=parsed,
     )
+
+
+def _camera(loaded: Any, name: str) -> Any:
+    return next(sensor for sensor in loaded.sensors() if sensor.id() == name)
+
+
+def _has_null_surfaces(loaded: Any) -> bool:
+    import mitsuba as mi
+
+    bsdfs = (shape.bsdf() for shape in loaded.shapes())
+    return any(b is not None and mi.has_flag(b.flags(), mi.BSDFFlags.Null) for b in bsdfs)
 
 
 def _find_lights(parsed: ParsedScene, loaded: Any) -> tuple[Light, ...]:

@@ -63,6 +63,7 @@ def use_variant(wanted: str | None = None) -> Backend:
     """
     global _current
     if _current is not None:
+        _check_still(_current)
         if wanted not in (None, _current.variant):
             raise BackendError(
                 f"this process already renders with {_current.variant}: "
@@ -92,6 +93,16 @@ def use_variant(wanted: str | None = None) -> Backend:
         _current = _set(mi, wanted, llvm)
     mi.set_log_level(mi.LogLevel.Error)
     return _current
+
+
+def _check_still(backend: Backend) -> None:
+    import mitsuba as mi
+
+    if mi.variant() != backend.variant:
+        raise BackendError(
+            f"mi.set_variant({mi.variant()!r}) was called after lightpaint had begun with "
+            f"{backend.variant}: set that before the first scene is loaded, and keep it"
+        )
 
 
 def _choose(mi: Any, llvm: Llvm | None) -> Backend:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import RGB, Basis, BasisLight
+from lightpaint.basis.basis import RGB, Basis, BasisLight, mix
 from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate
@@ -124,12 +124,8 @@ class Lighting:
 
 def combine(basis: Basis, lighting: Lighting) -> Estimate:
     """The predicted image Σ w_i Φ_i, with the noise that the basis gives it."""
-    weights = lighting.weights_for(basis).astype(np.float32)
-
-    def mix(images: Any) -> Any:
-        return np.einsum("nhwc,nc->hwc", images, weights, optimize=True)
-
-    return Estimate(mix(basis.images), mix(basis.half_differences))
+    weights = lighting.weights_for(basis)
+    return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
 
 
 def write_lighting(path: Path, lighting: Lighting) -> None:

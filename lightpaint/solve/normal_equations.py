@@ -16,8 +16,8 @@ from lightpaint.target.target import Target
 
 Doubles = npt.NDArray[np.float64]
 
-#: Pixels multiplied at a time: bounds the float64 copies.
-BLOCK = 2**15
+#: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
+BLOCK = 2**13
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,21 @@ def inner_products(
     weights = importance.ravel()
     colours = target.reshape(-1, 3)
     gram = np.zeros((3, n + 1, n + 1))
+    room = np.empty((n + 1, min(BLOCK, counted.size)))
     for start in range(0, counted.size, BLOCK):
         pixels = counted[start : start + BLOCK]
-        # (3, n + 1, block): the target goes along as one more row.
-        block = np.empty((3, n + 1, pixels.size))
-        block[:, :n] = rows[:, pixels].transpose(2, 0, 1)
-        block[:, n] = colours[pixels].T
-        block *= np.sqrt(weights[pixels].astype(np.float64))
-        gram += block @ block.transpose(0, 2, 1)
+        first, last = int(pixels[0]), int(pixels[-1])
+        # Pixels in one run are looked at where they are; others have to be gathered.
+        in_one_run = last - first + 1 == pixels.size
+        where = slice(first, last + 1) if in_one_run else pixels
+        lit, painted = rows[:, where], colours[where]
+        root = np.sqrt(weights[where].astype(np.float64))
+        # (n + 1, block): the target goes along as one more row.
+        block = room[:, : pixels.size]
+        for c in range(3):
+            np.multiply(lit[..., c], root, out=block[:n])
+            np.multiply(painted[:, c], root, out=block[n])
+            gram[c] += block @ block.T
     return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
 
@@ -93,7 +100,7 @@ def weighted_problem(
                 "counts; give a mask of those that should"
             )
     if unpainted > 0:
-        current = np.einsum("nhwc,nc->hwc", basis.images, basis.present_weights, optimize=True)
+        current = basis.mix(basis.present_weights)
         rest = unpainted * np.maximum(1 - importance, 0)
         rest = np.where(basis.emitters_seen, 0, rest)
         total = importance + rest

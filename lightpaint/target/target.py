@@ -13,6 +13,9 @@ from lightpaint.images.exr import Floats, Part, read_parts
 #: Channel that holds importance in a file whose RGB is not premultiplied.
 WEIGHT_CHANNEL = "W"
 
+#: CIE xy of red, green, blue and white of Rec.709, the colours of every image here.
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
 
 @dataclass(frozen=True)
 class Target:
@@ -98,10 +101,11 @@ def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
 
     What counts is, in this order: `mask` (its Y, W, A or R channel); the file's W channel;
     its alpha, by which RGB is then taken to be premultiplied, as OpenEXR prescribes;
-    without any of them, every pixel alike.
+    without any of them, every pixel alike. Where such an alpha is 0 no colour was painted,
+    and a mask does not make one.
 
-    Raises ImageError for files that cannot be read, TargetError for what cannot be solved
-    for, SizeError if target and mask differ in size.
+    Raises ImageError for files that cannot be read or declare other primaries, TargetError
+    for what cannot be solved for, SizeError if target and mask differ in size.
     """
     path = Path(path)
     stored = _single_part(path)
@@ -110,6 +114,7 @@ def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
         image = part.rgb()
     except ImageError as error:
         raise ImageError(f"{path} is no RGB image: {error}") from None
+    _check_primaries(path, part)
     importance, alpha = None, part.channels.get("A")
     if mask is not None:
         importance = _read_mask(Path(mask))
@@ -124,6 +129,9 @@ def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
         importance = alpha.astype(np.float32)
     if alpha is not None and WEIGHT_CHANNEL not in part.channels:
         image = _unpremultiplied(image, alpha.astype(np.float32))
+        if mask is not None and importance is not None:
+            # Premultiplied black over nothing is the absence of a colour, not black.
+            importance = np.where(alpha > 0, importance, np.float32(0))
 
     finite = np.asarray(np.isfinite(image).all(axis=-1))
     # Pixels that the file does not store were not painted.
@@ -136,6 +144,17 @@ def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
         importance=np.where(finite, weights, 0).astype(np.float32),
         everything=importance is None,
         not_finite=int(finite.size - finite.sum()),
+    )
+
+
+def _check_primaries(path: Path, part: Part) -> None:
+    # Files round the numbers: to three decimals, or to float16.
+    if part.primaries is None or np.allclose(part.primaries, REC709, rtol=0, atol=1e-3):
+        return
+    xy = [f"({x:.4g}, {y:.4g})" for x, y in zip(*[iter(part.primaries)] * 2, strict=True)]
+    raise ImageError(
+        f"{path} declares the primaries {', '.join(xy[:3])} and the white {xy[3]} (chromaticities "
+        "in CIE xy), but linear Rec.709 is expected: convert it and export it again"
     )
 
 

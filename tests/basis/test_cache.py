@@ -94,3 +94,12 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "file" / "cache"))
     assert obtain_basis(scene, spp=4).origin.spp == 4
+
+
+def test_separate_renders_are_kept_as_well(tmp_path: Path) -> None:
+    log: list[int] = []
+    path = write_room(tmp_path, integrator='<integrator type="volpath"/>')
+    scene = load_scene(path)
+    obtain_basis(scene, spp=4)
+    assert obtain_basis(scene, spp=4, progress=passes(log)).origin.spp == 4
+    assert log == []

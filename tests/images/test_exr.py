@@ -3,6 +3,9 @@
 import os
 import resource
 import struct
+import subprocess
+import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -135,6 +138,69 @@ def test_the_terminal_is_given_back(tmp_path: Path, capfd: pytest.CaptureFixture
     os.write(1, b"out")
     os.write(2, b"err")
     assert capfd.readouterr() == ("out", "err")
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- 2>&-", "<&- >&- 2>&-"])
+def test_reading_without_a_terminal(tmp_path: Path, closed: str):
+    """Services start programs so; `sys.stdout` is None then. What is open stays as it was."""
+    write_rgb(tmp_path / "a.exr", np.ones((2, 3, 3)))
+    code = """
+import os, sys
+from pathlib import Path
+from lightpaint.images.exr import read_attributes, read_parts
+
+def standard():
+    return [os.readlink(f"/proc/self/fd/{k}") if os.path.exists(f"/proc/self/fd/{k}") else None
+            for k in (0, 1, 2)]
+
+before = standard()
+read_attributes(Path("a.exr"))
+pixels = read_parts(Path("a.exr"))[0].rgb()
+Path("said").write_text(f"{pixels.shape} {standard() == before}")
+"""
+    (tmp_path / "read.py").write_text(code)
+    root = Path(__file__).parents[2]
+    subprocess.run(
+        ["sh", "-c", f'"$0" read.py {closed}', sys.executable],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(root)},
+        check=False,
+        timeout=60,
+    )
+    assert (tmp_path / "said").read_text() == "(2, 3, 3) True"
+
+
+def test_threads_that_read_at_once_give_the_terminal_back(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    path = tmp_path / "cut.exr"
+    path.write_bytes(_written(path, "parts")[:-1])
+    before = [os.stat(fd) for fd in (1, 2)]
+    began = threading.Barrier(4)
+
+    def read() -> None:
+        began.wait()
+        for _ in range(20):
+            with pytest.raises(ImageError):
+                read_parts(path)
+
+    threads = [threading.Thread(target=read) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [os.path.samestat(os.stat(fd), b) for fd, b in zip((1, 2), before, strict=True)] == [
+        True,
+        True,
+    ]
+    print("out")
+    assert capfd.readouterr() == ("out\n", "")
+
+
+def test_float32_pixels_are_copied_once(monkeypatch: pytest.MonkeyPatch):
+    stacked = np.zeros((2, 3, 3), np.float32)
+    monkeypatch.setattr(np, "stack", lambda *_args, **_options: stacked)
+    assert Part("p", rgb_channels(stacked)).rgb() is stacked
 
 
 @pytest.mark.parametrize(

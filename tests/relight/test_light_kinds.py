@@ -184,3 +184,19 @@ def test_a_shared_texture_is_left_alone(assets: Path) -> None:
     with pytest.raises(SceneError, match="by reference"):
         relight(scene, lighting.with_emission("it", (1, 2, 3)), assets / "x" / "relit.xml")
     assert not (assets / "x").exists()
+
+
+def test_images_of_lights_with_nearly_the_same_name_stay_apart(assets: Path) -> None:
+    screens = "".join(
+        KINDS["screen"][0].replace('id="it"', f'id="{name}"') for name in ("key 1", "key/1")
+    )
+    scene = load_scene(write_room(assets, lights=screens))
+    basis = render_basis(scene, spp=64)
+    lighting = Lighting.present(basis).with_emission("key 1", (1, 2, 3))
+    lighting = lighting.with_emission("key/1", (3, 1, 0.5))
+    relit = relight(scene, lighting, assets / "out" / "a.xml")
+    predicted = combine(basis, lighting)
+    other = Lighting.present(basis).with_emission("key 1", (9, 1, 1))
+    relight(scene, other, assets / "out" / "b.xml")
+    assert len(list((assets / "out").glob("*.exr"))) == 3
+    assert verify(predicted, relit, spp=64).agrees

@@ -13,7 +13,7 @@ from renderer import CORNELL, LIGHTS, REPOSITORY, mitsuba_render, one_pass, writ
 
 from lightpaint.basis.render import render_basis
 from lightpaint.errors import LightingError, OutputError, SceneError
-from lightpaint.relight.relight import relight
+from lightpaint.relight.relight import check_relightable, relight
 from lightpaint.relight.verify import verify
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.solve.lighting import Lighting, LightSetting, combine
@@ -207,6 +207,21 @@ def test_wrong_lights_and_the_scene_itself_are_refused(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="the scene itself"):
         relight(scene, lighting_of(scene, {}), path)
     assert path.read_bytes() == before
+
+
+def test_includes_and_images_of_the_scene_are_never_overwritten(tmp_path: Path) -> None:
+    include = tmp_path / "lights.xml"
+    include.write_text(f'<scene version="3.0.0">{LIGHTS["bulb"]}</scene>', encoding="utf-8")
+    scene = load_scene(write_room(tmp_path, lights='<include filename="lights.xml"/>'))
+    before = include.read_bytes()
+    lighting = random_lighting(scene, 1)
+    with pytest.raises(OutputError, match=r"lights\.xml belongs to the scene"):
+        relight(scene, lighting, tmp_path / "relit.xml")
+    with pytest.raises(OutputError, match=r"lights\.xml belongs to the scene"):
+        check_relightable(scene, tmp_path / "relit.xml")
+    assert include.read_bytes() == before
+    assert not (tmp_path / "relit.xml").exists()
+    assert relight(scene, lighting, tmp_path / "out" / "relit.xml").lights
 
 
 def test_relit_beside_the_scene_and_through_a_relative_path(

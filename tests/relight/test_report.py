@@ -321,6 +321,20 @@ def test_energy_shares_in_closed_form(make_basis: Any):
     )
 
 
+def test_energy_shares_equal_the_plain_sum(make_basis: Any):
+    """In float32 a sum of 40 000 pixels of 1000, one of which is 1 more, would not notice it."""
+    images = np.full((3, 200, 203, 3), 1000, np.float32)
+    images[1, 7, 9] += 1
+    images[2] = np.random.default_rng(4).random((200, 203, 3))
+    basis = make_basis(images=images)
+    lighting = Lighting.of_weights(basis, np.array([[1.0, 1, 1], [1, 1, 1], [9, 0, 500]]))
+    flux = images.astype(np.float64).sum(axis=(1, 2))
+    energy = (flux * lighting.weights_for(basis)) @ [0.2126, 0.7152, 0.0722]
+    shares = energy_shares(basis, lighting)
+    np.testing.assert_allclose(shares, energy / energy.sum(), rtol=1e-12)
+    assert shares[1] > shares[0]
+
+
 def test_energy_shares_sum_to_one(make_basis: Any):
     basis = make_basis(7)
     shares = energy_shares(basis, Lighting.present(basis))

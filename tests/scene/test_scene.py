@@ -1,10 +1,12 @@
 """Loading scenes: which lights there are, what they are called, and what is refused."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import CORNELL, LIGHTS, write_room
+from renderer import CORNELL, LIGHTS, mitsuba_render, write_room
 
 from lightpaint.errors import BackendError, SceneError
 from lightpaint.scene.scene import load_scene
@@ -45,13 +47,13 @@ def test_names_come_from_emitter_else_shape_else_plugin_and_number(tmp_path: Pat
 def test_emission_is_read_from_the_loaded_light_not_from_its_text(tmp_path: Path) -> None:
     lights = """
         <emitter type="point" id="grey"><spectrum name="intensity" value="3"/></emitter>
-        <emitter type="point" id="silent"/>
-        <emitter type="constant" id="preset"><spectrum name="radiance" type="d65"/></emitter>"""
-    lights = lights.replace('<spectrum name="radiance" type="d65"/>', "")
+        <emitter type="point" id="silent"/>"""
     scene = load_scene(write_room(tmp_path, lights=lights))
     np.testing.assert_allclose(scene.light("silent").emission, [1, 1, 1], rtol=1e-6)
-    # A constant spectrum is not a grey colour in RGB: what Mitsuba makes of it counts.
-    assert all(v > 0 for v in scene.light("grey").emission)
+    # What was read, set as a colour, is the picture that Mitsuba makes of the scene itself.
+    read = {light.name: light.emission for light in scene.lights}
+    asked = mitsuba_render(scene, read, seed=1, spp=4)
+    np.testing.assert_allclose(asked, mitsuba_render(scene, seed=1, spp=4), rtol=1e-5, atol=1e-6)
 
 
 def test_parameters_and_includes(tmp_path: Path) -> None:
@@ -63,6 +65,50 @@ def test_parameters_and_includes(tmp_path: Path) -> None:
     assert scene.size == (20, 10)
     assert {light.name for light in scene.lights} == {"bulb", "sky"}
     assert scene.light("bulb").file == 1
+
+
+def test_identity_follows_files_that_only_the_parser_reads(tmp_path: Path) -> None:
+    (tmp_path / "lamp.spd").write_text("400 1\n700 2\n", encoding="ascii")
+    light = """<emitter type="point"><spectrum name="intensity" filename="lamp.spd"/></emitter>"""
+    path = write_room(tmp_path, lights=light)
+    first = load_scene(path).identity
+    (tmp_path / "lamp.spd").write_text("400 1\n700 3\n", encoding="ascii")
+    assert load_scene(path).identity != first
+
+
+def test_a_sensor_in_a_shape_is_not_the_camera(tmp_path: Path) -> None:
+    meter = """<shape type="rectangle"><sensor type="irradiancemeter"><film type="hdrfilm">
+        <integer name="width" value="1"/><integer name="height" value="1"/></film></sensor>
+        </shape>"""
+    path = write_room(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('<sensor type="persp', meter + '<sensor type="persp'))
+    scene = load_scene(path)
+    assert scene.sensor_names == ("camera",)
+    assert scene.size == (20, 24)
+    assert mitsuba_render(scene, seed=0, spp=2).shape == (20, 24, 3)
+
+
+def test_negative_light_is_refused(tmp_path: Path) -> None:
+    light = '<emitter type="point" id="hole"><rgb name="intensity" value="1 -2 1"/></emitter>'
+    with pytest.raises(SceneError, match="'hole' has the intensity"):
+        load_scene(write_room(tmp_path, lights=light))
+
+
+def test_another_variant_afterwards_is_noticed(tmp_path: Path) -> None:
+    code = (
+        "import lightpaint as lp, sys; s = lp.load_scene(sys.argv[1])\n"
+        "import mitsuba as mi; mi.set_variant('scalar_rgb')\n"
+        "try: lp.load_scene(sys.argv[1])\n"
+        "except lp.LightpaintError as error: print(error)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, str(write_room(tmp_path))],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "mi.set_variant('scalar_rgb') was called" in answer.stdout
 
 
 def test_found_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

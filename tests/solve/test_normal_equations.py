@@ -57,6 +57,39 @@ def test_images_larger_than_a_block(pixels: int):
     np.testing.assert_allclose(norm2, expected[:, 2, 2], rtol=PRECISION)
 
 
+def test_a_run_of_pixels_is_not_gathered_and_comes_to_the_same():
+    """The fast path and its twin: a black pixel that counts, past a gap, makes all be gathered."""
+    images, target, _ = _problem(4, (9, 8))
+    run = np.zeros((9, 8), np.float32)
+    run[2:7] = np.random.default_rng(2).random((5, 8)) + 0.5
+    gathered, seen = run.copy(), images.copy()
+    gathered[8, 7] = 1
+    seen[:, 8, 7] = 0
+    unpainted = target.copy()
+    unpainted[8, 7] = 0
+    read = _Watched(images)
+    for got, want in zip(
+        inner_products(read, target, run), inner_products(seen, unpainted, gathered), strict=True
+    ):
+        np.testing.assert_allclose(got, want, rtol=PRECISION)
+    assert _Watched.gathered == 0
+
+
+class _Watched(np.ndarray):  # type: ignore[type-arg]
+    """Pixels that count how often they are gathered by index."""
+
+    gathered = 0
+
+    def __new__(cls, pixels: Any) -> "_Watched":
+        return np.asarray(pixels).view(cls)
+
+    def __getitem__(self, where: Any) -> Any:
+        _Watched.gathered += isinstance(where, tuple) and any(
+            isinstance(k, np.ndarray) for k in where
+        )
+        return super().__getitem__(where)
+
+
 @pytest.mark.parametrize("garbage", [1e30, np.nan, np.inf])
 def test_pixels_without_importance_are_not_read(garbage: float):
     images, target, importance = _problem(3, (8, 9))

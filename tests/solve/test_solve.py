@@ -1,5 +1,6 @@
 """From basis and target to lighting: what is minimised, and known lightings coming back."""
 
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,7 @@ def test_one_residual_stands_for_two(make_basis: Any, unpainted: float):
     basis = make_basis(4, SIZE, seen=_seen())
     target = _random_target()
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
-    current = np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), basis.present_weights)
+    current = basis.mix(basis.present_weights)
     a = target.importance.astype(np.float64)
     rest = unpainted * np.where(basis.emitters_seen, 0, np.maximum(1 - a, 0))
 
@@ -180,6 +181,30 @@ def test_quality_tells_the_objective_of_the_answer(make_basis: Any):
     np.testing.assert_allclose(solution.quality.relative_objective, expected / norm2, rtol=1e-6)
     assert solution.lighting.target == "painted"
     assert solution.lighting.scene_identity == basis.origin.scene_identity
+
+
+def test_mixing_copies_no_basis(make_basis: Any):
+    """Neither a prediction nor the current look needs a basis twice in memory."""
+    basis = make_basis(24, (60, 80))
+    rng = np.random.default_rng(3)
+    target = _target(rng.random((60, 80, 3)), rng.random((60, 80)))
+    one = basis.images[0].nbytes
+    expected = np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), basis.present_weights)
+    tracemalloc.start()
+    try:
+        mixed = basis.mix(basis.present_weights)
+        _, mixing = tracemalloc.get_traced_memory()
+        tracemalloc.reset_peak()
+        weighted_problem(basis, target, unpainted=1.0)
+        _, weighting = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert mixed.dtype == np.float32
+    # 24 products of numbers up to 1, summed in float32.
+    np.testing.assert_allclose(mixed, expected, rtol=24 * np.finfo(np.float32).eps)
+    assert mixing < 2 * one + 2**16
+    # A handful of float64 images, each twice the size of one light's, not 24 more.
+    assert weighting < 20 * one
 
 
 def test_combine_mixes_images_and_noise_alike(make_basis: Any):

@@ -87,9 +87,22 @@ def test_the_mask_goes_before_both(write: Any, image: Any, alpha: Any):
 
 def test_with_a_mask_rgb_stays_premultiplied_by_alpha(write: Any, image: Any, alpha: Any):
     path = write(rgb=image * alpha[..., None], A=alpha)
-    target = read_target(path, mask=write("mask.exr", Y=np.ones(SIZE, np.float32)))
-    np.testing.assert_array_equal(target.importance, 1)
+    mask = np.full(SIZE, 0.5, np.float32)
+    target = read_target(path, mask=write("mask.exr", Y=mask))
+    np.testing.assert_array_equal(target.importance[alpha > 0], 0.5)
     np.testing.assert_array_equal(target.image[alpha > 0], image[alpha > 0])
+
+
+def test_a_mask_paints_nothing_where_alpha_is_zero(write: Any, image: Any, alpha: Any):
+    """There RGB is undefined: it must not come to count as painted black."""
+    assert (alpha == 0).any()
+    mask = write("mask.exr", Y=np.ones(SIZE, np.float32))
+    target = read_target(write(rgb=image * alpha[..., None], A=alpha), mask=mask)
+    np.testing.assert_array_equal(target.importance, alpha > 0)
+    assert target.importance.dtype == np.float32
+    # Beside a W channel RGB is not premultiplied, and alpha has no say.
+    target = read_target(write(rgb=image, A=alpha, W=alpha), mask=mask)
+    np.testing.assert_array_equal(target.importance, 1)
 
 
 MASK_CHANNELS = ["Y", "W", "A", "R"]
@@ -171,6 +184,39 @@ def test_importance_of_nothing(write: Any, image: Any):
             read_target(path, mask=mask)
     with pytest.raises(TargetError, match="nan holds NaN or Inf in every pixel"):
         read_target(write("nan.exr", image * np.nan))
+
+
+def _write_declared(path: Path, image: Any, chromaticities: Any) -> Path:
+    header = {"type": OpenEXR.scanlineimage, "chromaticities": chromaticities}
+    channels = {name: np.ascontiguousarray(c) for name, c in rgb_channels(image).items()}
+    OpenEXR.File(header, channels).write(str(path))
+    return path
+
+
+REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+REC2020 = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)
+ACESCG = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
+
+
+@pytest.mark.parametrize(
+    ("primaries", "named"),
+    [
+        (REC2020, r"\(0\.708, 0\.292\), \(0\.17, 0\.797\), \(0\.131, 0\.046\)"),
+        (ACESCG, r"white \(0\.3217, 0\.3377\)"),
+        # Rec.709 but for a white that is further off than rounding.
+        ((*REC709[:6], 0.3144, 0.329), r"white \(0\.3144, 0\.329\)"),
+    ],
+)
+def test_other_primaries_are_refused(tmp_path: Path, image: Any, primaries: Any, named: str):
+    path = _write_declared(tmp_path / "wide.exr", image, primaries)
+    with pytest.raises(ImageError, match=rf"wide\.exr .*{named}.* linear Rec\.709 is expected"):
+        read_target(path)
+
+
+@pytest.mark.parametrize("primaries", [REC709, (*REC709[:6], 0.3127, 0.3291)])
+def test_rec709_may_be_declared(tmp_path: Path, image: Any, primaries: Any):
+    path = _write_declared(tmp_path / "look.exr", image, primaries)
+    np.testing.assert_array_equal(read_target(path).image, image)
 
 
 def test_no_rgb(write: Any, alpha: Any):

@@ -1,0 +1,74 @@
+"""Ctrl-C between two pieces of work, and whose handler stands meanwhile."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from lightpaint.progress import interruptible_between_pieces
+
+
+@pytest.fixture(autouse=True)
+def _own_handler() -> Iterator[None]:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_waits_for_the_end_of_a_piece():
+    done = []
+
+    def work() -> None:
+        with interruptible_between_pieces() as let_through:
+            let_through()
+            signal.raise_signal(signal.SIGINT)
+            done.append("the piece")
+            let_through()
+            done.append("another")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["the piece"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_interrupt_in_the_last_piece_is_not_lost():
+    with pytest.raises(KeyboardInterrupt), interruptible_between_pieces():
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ignored_interrupts_stay_ignored():
+    """As under nohup, or in the background of a script."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with interruptible_between_pieces() as let_through:
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        signal.raise_signal(signal.SIGINT)
+        let_through()
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_a_handler_outside_python_is_left_alone(monkeypatch: pytest.MonkeyPatch):
+    """It could not be put back: `signal.signal` does not take the None that stands for it."""
+    installed: list[Any] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(signal, "getsignal", lambda _signal: None)
+        patch.setattr(signal, "signal", lambda *given: installed.append(given))
+        with interruptible_between_pieces() as let_through:
+            let_through()
+    assert installed == []
+
+
+def test_other_threads_get_no_signals():
+    done = []
+
+    def work() -> None:
+        with interruptible_between_pieces() as let_through:
+            let_through()
+            done.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done == [signal.default_int_handler]
