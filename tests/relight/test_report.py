@@ -157,7 +157,7 @@ def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):
     assert all("label" in control["inside"].split() for control in controls)
     assert len(page.all("option")) == 8
     chosen = re.findall(r"selected>([^<]+)<", text)
-    assert chosen == ["target", "verified"]
+    assert chosen == ["target", "predicted"]
 
 
 def test_names_are_text_whatever_they_are(make_basis: Any):
