@@ -173,7 +173,7 @@ def verify(options: Namespace, _given: list[str]) -> int:
 def cache(options: Namespace, _given: list[str]) -> int:
     """`lightpaint cache [clear]`"""
     if options.action == "clear":
-        console.write(f"{bases.clear()} bases deleted from {bases.folder()}")
+        console.write(f"{bases.clear()} deleted from {bases.folder()}")
         return 0
     table = console.table("scene", "sensor", "spp", "seed", "MB", "file")
     for entry in reversed(bases.entries()):

@@ -10,13 +10,13 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.render import is_of, render_basis
 from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError
-from lightpaint.files import check_writable
+from lightpaint.files import check_writable, write_text
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relight.comparison import write_comparison
 from lightpaint.relight.relight import check_relightable, relight
-from lightpaint.relight.report import write_report
+from lightpaint.relight.report import report_page
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene, load_scene
@@ -186,8 +186,7 @@ def show_look(look: Look, folder: Path, *, command: str) -> None:
         predicted=look.predicted.image,
         verified=verified,
     )
-    write_report(
-        folder / "report.html",
+    page = report_page(
         basis=look.basis,
         target=look.target,
         solution=look.solution,
@@ -195,6 +194,7 @@ def show_look(look: Look, folder: Path, *, command: str) -> None:
         verification=look.verification,
         command=command,
     )
+    write_text(folder / "report.html", page)
 
 
 def render_template(

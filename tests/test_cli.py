@@ -38,11 +38,12 @@ RESULTS = {
 }
 
 
-def run(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """`lightpaint …` in `folder`."""
+def run(folder: Path, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
+    """`lightpaint …` in `folder`, with these environment variables."""
     return subprocess.run(
         [sys.executable, "-m", "lightpaint.cli", *map(str, arguments)],
         cwd=folder,
+        env={**os.environ, **variables},
         capture_output=True,
         text=True,
         check=False,
@@ -264,13 +265,7 @@ def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
 
 
 def test_a_terminal_without_unicode_loses_no_result(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "lightpaint.cli", "lights", str(CORNELL)],
-        env={**os.environ, "PYTHONIOENCODING": "ascii"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run(tmp_path, "lights", CORNELL, PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
     assert "W/(m? sr)" in done.stdout
 
@@ -473,21 +468,14 @@ obtain_basis(scene, spp=100_000)
 
 
 def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
-    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
-
     def call(*arguments: object) -> str:
-        return subprocess.run(
-            [sys.executable, "-m", "lightpaint.cli", *map(str, arguments)],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+        done = run(tmp_path, *arguments, LIGHTPAINT_CACHE=str(tmp_path / "cache"))
+        assert done.returncode == 0, done.stderr
+        return done.stdout
 
     call("basis", CORNELL, "--spp", "2", "--no-cache")
     assert "scene.xml" not in call("cache")
     call("basis", CORNELL, "--spp", "2")
     assert "scene.xml" in call("cache", "list")
-    assert "1 bases deleted" in call("cache", "clear")
+    assert "1 deleted" in call("cache", "clear")
     assert "scene.xml" not in call("cache")

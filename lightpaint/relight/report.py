@@ -7,11 +7,9 @@ content policy forbids it.
 
 from html import escape
 from importlib import resources
-from pathlib import Path
 from string import Template
 
 from lightpaint.basis.basis import Basis
-from lightpaint.files import write_text
 from lightpaint.images.display import encode_display
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
@@ -24,35 +22,11 @@ from lightpaint.relight.report_tables import (
     verification_table,
     versions,
 )
-from lightpaint.relight.verdict import energy_shares, verdict
+from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.solve import Solution
 from lightpaint.target.target import Target
-
-__all__ = ["energy_shares", "report_page", "verdict", "write_report"]
-
-
-def write_report(
-    path: Path,
-    *,
-    basis: Basis,
-    target: Target,
-    solution: Solution,
-    predicted: Estimate,
-    verification: Verification | None,
-    command: str,
-) -> None:
-    """Write `report_page` to `path`, whole or not at all."""
-    page = report_page(
-        basis=basis,
-        target=target,
-        solution=solution,
-        predicted=predicted,
-        verification=verification,
-        command=command,
-    )
-    write_text(path, page)
 
 
 def report_page(

@@ -4,7 +4,6 @@ import base64
 import io
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,16 @@ from PIL import Image
 from lightpaint.errors import SizeError
 from lightpaint.images.display import encode_display, to_8_bit
 from lightpaint.images.estimate import Estimate
-from lightpaint.relight.report import energy_shares, report_page, verdict, write_report
+from lightpaint.relight.report import report_page
 from lightpaint.relight.report_pictures import data_uri, thumbnail
 from lightpaint.relight.report_tables import hex_color
-from lightpaint.relight.verdict import noise_residual, relative_residual, share_met
+from lightpaint.relight.verdict import (
+    energy_shares,
+    noise_residual,
+    relative_residual,
+    share_met,
+    verdict,
+)
 from lightpaint.relight.verify import compare
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.solve import solve
@@ -238,12 +243,6 @@ def test_the_numbers_are_there(make_basis: Any):
         "in 0 pixels",
     ):
         assert number in text
-
-
-def test_the_file_is_the_page(make_basis: Any, tmp_path: Path):
-    result = _result(make_basis)
-    write_report(tmp_path / "report.html", **result)
-    assert (tmp_path / "report.html").read_text(encoding="utf-8") == report_page(**result)
 
 
 def test_a_page_of_usual_size_can_be_mailed(make_basis: Any):
