@@ -93,29 +93,33 @@ def mitsuba_render(
     return image
 
 
-def one_pass(
-    scene: Scene, *, seed: int, spp: int, turn: tuple[int, int] | None = None
-) -> np.ndarray:
-    """The planes of a single pass at exactly this seed, (n, h, w, 3) float32."""
+def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.ndarray:
+    """The planes of a single pass at exactly this seed, (n, h, w, 3) float32.
+
+    plain: with Mitsuba's own numbers and choices; else as a basis is rendered, unguided yet.
+    """
     import drjit as dr
     import mitsuba as mi
 
-    from lightpaint.basis.lightgroups import accumulate, lights_by_instance
+    from lightpaint.basis.guide import Guide
+    from lightpaint.basis.lightgroups import Guided, accumulate, lights_by_instance
 
     names = [light.name for light in scene.lights]
     height, width = scene.size
     loaded = scene.load(dict.fromkeys(names, (1.0, 1.0, 1.0)))
     planes = dr.zeros(mi.Float, len(names) * height * width * 3)
+    light_of = lights_by_instance(loaded, names)
+    guide = Guide(loaded, light_of, scene.eye(loaded))
     traced = accumulate(
         loaded,
         scene.integrator,
         camera=scene.camera(loaded),
-        light_of=lights_by_instance(loaded, names),
+        light_of=light_of,
         planes=planes,
         seen=dr.zeros(mi.Float, height * width),
         seed=seed,
         spp=spp,
-        turn=turn,
+        guided=None if plain else Guided(seed, 0, guide),
     )
     del loaded
     gc.collect()

@@ -32,6 +32,7 @@ FORMAT_KEY = "lightpaint.format"
 ORIGIN_KEY = "lightpaint.origin"
 LIGHT_KEY = "lightpaint.light"
 EMITTERS_SEEN = "emitters seen"
+LEARNED = "learned"
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,8 @@ class Basis:
     of the samples: the noise of `images`. Where an interrupt left the halves unequal, it
     overstates the noise a little.
     emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
+    learned: (2, cells, emitters) float32, what the renderer found out on the way about which
+    emitter matters where, or None. Going on needs it, nobody else.
     """
 
     lights: tuple[BasisLight, ...]
@@ -99,6 +102,7 @@ class Basis:
     half_differences: Floats
     emitters_seen: npt.NDArray[np.bool_]
     origin: Origin
+    learned: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.lights)
@@ -161,7 +165,12 @@ def write_basis(path: Path, basis: Basis) -> None:
         parts.append(Part(light.name, channels, attributes))
     seen = basis.emitters_seen.astype(np.float16)
     # The format's rule: a part name never repeats, so a light may not take this one.
-    parts.append(Part(_free_name(basis.names), {"Y": seen}))
+    parts.append(Part(_free_name(EMITTERS_SEEN, basis.names), {"Y": seen}))
+    if basis.learned is not None:
+        received, asked = basis.learned
+        channels = {"received": received, "asked": asked}
+        # A table and no picture; the format wants one display window for all parts.
+        parts.append(Part(_free_name(LEARNED, basis.names), channels, display=basis.size))
     head = {
         FORMAT_KEY: FORMAT,
         ORIGIN_KEY: json.dumps(asdict(basis.origin), ensure_ascii=False),
@@ -185,7 +194,9 @@ def read_basis(path: Path) -> Basis:
             "make one with lightpaint basis"
         )
     lit = [p for p in parts if LIGHT_KEY in p.attributes]
-    seen = [p for p in parts if LIGHT_KEY not in p.attributes and "Y" in p.channels]
+    others = [p.channels for p in parts if LIGHT_KEY not in p.attributes]
+    seen = [channels["Y"] for channels in others if "Y" in channels]
+    learned = [np.stack([c["received"], c["asked"]]) for c in others if "asked" in c]
     if not lit or not seen:
         raise BasisError(f"{path} has lost parts of its basis: make it again with lightpaint basis")
     try:
@@ -195,8 +206,9 @@ def read_basis(path: Path) -> Basis:
             lights=lights,
             images=np.stack([p.rgb() for p in lit]),
             half_differences=np.stack([p.rgb(HALF_DIFFERENCE) for p in lit]),
-            emitters_seen=seen[0].channels["Y"] > 0,
+            emitters_seen=seen[0] > 0,
             origin=origin,
+            learned=learned[0] if learned else None,
         )
     except (
         AttributeError,
@@ -236,8 +248,7 @@ def _light(data: dict[str, Any]) -> BasisLight:
     return BasisLight(emission=(r, g, b), **data)
 
 
-def _free_name(taken: tuple[str, ...]) -> str:
-    name = EMITTERS_SEEN
+def _free_name(name: str, taken: tuple[str, ...]) -> str:
     while name in taken:
         name += "_"
     return name

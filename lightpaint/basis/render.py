@@ -46,12 +46,11 @@ def why_not_one_pass(scene: Scene) -> str | None:
         return f"the integrator is {integrator.plugin!r}"
     if integrator.plugin == "direct" and integrator.samples != (1, 1):
         return "the direct integrator draws other than one sample of emitters and BSDF"
-    if scene.has_null and not any(x.plugin in ENVIRONMENTS for x in scene.lights):
+    backdrop = any(x.plugin in ENVIRONMENTS for x in scene.lights) and not integrator.hide_emitters
+    if scene.has_null and not backdrop:
         return "rays may pass surfaces and leave, which Mitsuba counts as black"
     if scene.has_media:
         return "the scene has participating media"
-    if integrator.hide_emitters:
-        return "the integrator hides emitters"
     return None
 
 
@@ -164,23 +163,32 @@ def _render_together(
     """All lights in one path-traced pass after another (see lightgroups.py)."""
     import drjit as dr
 
-    from lightpaint.basis.lightgroups import HalfSums, accumulate, lights_by_instance
+    from lightpaint.basis.guide import Guide
+    from lightpaint.basis.lightgroups import Guided, HalfSums, accumulate, lights_by_instance
 
     height, width = scene.size
     names = [light.name for light in scene.lights]
     sums = HalfSums(len(names), scene.size) if start is None else HalfSums.of(start)
-    plan = plan_passes(height * width, spp, done=(sums.spp[0], sums.spp[1]))
+    plan = plan_passes(height * width, spp, done=(sums.spp[0], sums.spp[1]), growing=True)
 
     def basis(*, is_last: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
         halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
         origin = _origin(scene, seed, ONE_PASS, halves, passes)
-        return Basis(_basis_lights(scene), images, half_differences, sums.emitters_seen(), origin)
+        return Basis(
+            _basis_lights(scene),
+            images,
+            half_differences,
+            sums.emitters_seen(),
+            origin,
+            guide.learned(),
+        )
 
     loaded = scene.load(dict.fromkeys(names, WHITE))
     light_of = lights_by_instance(loaded, names)
-    # One sequence of choices for each half, far from all others.
-    sequences = [pass_seed(seed, Stream.CHOICE, half) for half in range(2)]
+    guide = Guide(loaded, light_of, scene.eye(loaded), start.learned if start else None)
+    # One stream of numbers for each half, far from all others.
+    streams = [pass_seed(seed, Stream.NUMBERS, half) for half in range(2)]
     kept_s, keep_every_s = time.monotonic(), KEEP_EVERY_S
     progress("basis", 0, len(plan))
     try:
@@ -195,7 +203,7 @@ def _render_together(
                     seen=sums.seen,
                     seed=pass_seed(seed, Stream.BASIS, 2 * sums.passes[half] + half),
                     spp=pass_spp,
-                    turn=(sequences[half], sums.spp[half]),
+                    guided=Guided(streams[half], sums.spp[half], guide),
                 )
                 sums.passes[half] += 1
                 dr.sync_thread()

@@ -158,7 +158,10 @@ def read_parts(path: Path) -> list[Part]:
 
 
 def write_parts(path: Path, parts: Sequence[Part]) -> None:
-    """Write a multi-part EXR with lossless ZIP compression, whole or not at all."""
+    """Write a multi-part EXR with lossless ZIP compression, whole or not at all.
+
+    All parts must have one display window; its size is that of the part where it says none.
+    """
     exr_parts = []
     for part in parts:
         header = {
@@ -166,6 +169,9 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
             "compression": OpenEXR.ZIP_COMPRESSION,
             **part.attributes,
         }
+        if part.display is not None:
+            height, width = part.display
+            header["displayWindow"] = ((0, 0), (width - 1, height - 1))
         channels = {n: np.ascontiguousarray(c) for n, c in part.channels.items()}
         exr_parts.append(OpenEXR.Part(header, channels, part.name))
     with replacing(path) as beside:

@@ -85,6 +85,10 @@ class Scene:
         """The sensor this scene is seen through, in what `load` returned."""
         return _camera(loaded, self.sensor_names[self.sensor])
 
+    def eye(self, loaded: Any) -> Any:
+        """Where that sensor stands, as an `mi.Point3f`."""
+        return self.camera(loaded).world_transform().translation()
+
     @property
     def originals(self) -> tuple[Path, ...]:
         """All files the scene consists of: XML, meshes, textures, tables."""

@@ -37,9 +37,18 @@ def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:
     for done in range(0, 20, 4):
         rest = plan_passes(24 * 20, 40, done=(done, done))
         assert rest == whole[2 * done // 4 :]
-    assert plan_passes(24 * 20, 40, done=(8, 4))[0] == (0, 4)
+    assert plan_passes(24 * 20, 40, done=(8, 4))[0] == (1, 4)
     assert sum(size for half, size in plan_passes(24 * 20, 40, done=(8, 4)) if half) == 16
     assert plan_passes(24 * 20, 40, done=(20, 20)) == []
+
+
+def test_who_learns_begins_with_small_passes() -> None:
+    plan = plan_passes(24 * 20, 40, growing=True)
+    assert [size for half, size in plan if half == 0] == [1, 1, 2, 4, 4, 4, 4]
+    for done in range(1, len(plan)):
+        have = [sum(size for half, size in plan[:done] if half == which) for which in range(2)]
+        rest = plan_passes(24 * 20, 40, done=(have[0], have[1]), growing=True)
+        assert rest == plan[done:]
 
 
 @pytest.mark.parametrize("through_a_file", [True, False])
@@ -65,9 +74,11 @@ def test_an_interrupt_keeps_what_is_done(tmp_path: Path, after: int) -> None:
         if done == after:
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(Interrupted, match=f"{4 * after} of 40"):
+    plan = plan_passes(24 * 20, 40, growing=True)
+    done = sum(size for _, size in plan[:after])
+    with pytest.raises(Interrupted, match=f"{done} of 40"):
         render_basis(scene, spp=40, keep=keep, progress=press_ctrl_c)
-    assert kept[-1].origin.spp == 4 * after
+    assert kept[-1].origin.spp == done
     same(render_basis(scene, spp=40, start=kept[-1]), render_basis(scene, spp=40))
 
 

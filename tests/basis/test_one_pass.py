@@ -186,10 +186,6 @@ def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
     [
         ('<integrator type="volpath"/>', "volpath"),
         ('<integrator type="ptracer"/>', "ptracer"),
-        (
-            '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>',
-            "hides emitters",
-        ),
     ],
 )
 def test_what_one_pass_cannot_serve_is_rendered_separately(
@@ -273,7 +269,26 @@ def test_equal_seeds_repeat_and_others_differ(tmp_path: Path) -> None:
     assert np.abs(a.images - c.images).max() > 0.01 * a.images.max()
 
 
-def test_taking_turns_is_unbiased_at_any_length_and_less_noisy(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lights", [("panel", "sky"), ("panel", "bulb", "beam")])
+def test_hidden_emitters_are_hidden_from_the_camera_alone(
+    tmp_path: Path, lights: tuple[str, ...]
+) -> None:
+    hidden = '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>'
+    veil = """<shape type="rectangle" id="veil"><transform name="to_world"><scale value="0.4"/>
+        <translate z="1.5" y="1"/></transform><emitter type="area"/></shape>"""
+    here = "".join(LIGHTS[name] for name in lights) + veil
+    scene = load_scene(write_room(tmp_path, lights=here, integrator=hidden))
+    assert why_not_one_pass(scene) is None
+    white = {light.name: WHITE for light in scene.lights}
+    planes = one_pass(scene, seed=3, spp=16)
+    rendered = mitsuba_render(scene, white, seed=3, spp=16)
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+    assert not render_basis(scene, spp=4).emitters_seen.any()
+    shown = mitsuba_render(load_scene(write_room(tmp_path, lights=here)), white, seed=3, spp=16)
+    assert shown.sum() > 1.1 * rendered.sum()
+
+
+def test_better_numbers_are_unbiased_at_any_length_and_less_noisy(tmp_path: Path) -> None:
     """Against choosing at random, for a scene whose lights have no other noise."""
     lamps = "".join(
         f"""<emitter type="point"><point name="position" x="{0.4 * k - 0.8}" y="1" z="1"/>
@@ -283,18 +298,16 @@ def test_taking_turns_is_unbiased_at_any_length_and_less_noisy(tmp_path: Path) -
     integrator = '<integrator type="path"><integer name="max_depth" value="2"/></integrator>'
     scene = load_scene(write_room(tmp_path, lights=lamps, integrator=integrator))
     for spp in (3, 40):
-        turns = np.stack(
-            [one_pass(scene, seed=k, spp=spp, turn=(1000 * k, 0)) for k in range(1, 9)]
-        )
+        better = np.stack([one_pass(scene, seed=k, spp=spp, plain=False) for k in range(1, 9)])
         chance = np.stack([one_pass(scene, seed=k, spp=spp) for k in range(100, 108)])
-        gap = turns.mean(axis=(0, 2, 3)) - chance.mean(axis=(0, 2, 3))
+        gap = better.mean(axis=(0, 2, 3)) - chance.mean(axis=(0, 2, 3))
         error = np.sqrt(
-            sum(x.mean(axis=(2, 3)).var(axis=0, ddof=1) / len(x) for x in (turns, chance))
+            sum(x.mean(axis=(2, 3)).var(axis=0, ddof=1) / len(x) for x in (better, chance))
         )
         # Noise: four and a half standard errors, five lights in three channels.
         assert (np.abs(gap) <= 4.5 * error).all()
         # What is left is the noise of edges within a pixel.
-        assert turns.var(axis=0).mean() < 0.8 * chance.var(axis=0).mean()
+        assert better.var(axis=0).mean() < 0.8 * chance.var(axis=0).mean()
 
 
 def test_pass_seeds_never_meet() -> None:

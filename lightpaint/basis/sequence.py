@@ -1,0 +1,74 @@
+"""Evenly spread numbers in the place of random ones: scrambled Sobol' points, in pairs.
+
+The samples of a pixel are terms of one sequence. Any stretch of it that begins at a multiple
+of a power of two and is as long covers the unit square evenly (a (0, 2)-sequence), and passes
+go on where the one before stopped. Pixels, halves and dimensions are shuffled and scrambled
+apart (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020); every number alone is
+uniform, so estimates stay unbiased.
+
+Import it once a variant is set and not a scalar one: its arrays do not exist before.
+"""
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+
+import drjit as dr
+import mitsuba as mi
+
+#: Pairs of numbers that a path takes before its first vertex, and at each vertex.
+FILM, APERTURE, TIME, FIRST_VERTEX = range(4)
+PAIRS_PER_VERTEX = 3
+
+
+class SobolPairs:
+    """The numbers of many paths: each path is one term of the sequence of its pixel.
+
+    pixel, term: UInt32 arrays. stream: other streams share nothing with this one.
+    """
+
+    def __init__(self, pixel, stream, term):
+        self._key, _ = mi.sample_tea_32(pixel, stream)
+        self._reversed_term = dr.brev(term)
+
+    def pair(self, dimension):
+        """Two numbers in [0, 1) per path, evenly spread together over the terms."""
+        seed = hashed(self._key + dimension * mi.UInt32(0x9E3779B9))
+        # The terms are shuffled so that pairs of unlike dimensions do not go together. A
+        # shuffled term, its bits reversed, is the first Sobol' dimension as it stands.
+        x = _scrambled(self._reversed_term, seed)
+        # The second is its polynomial over GF(2) taken at 1 + x, block by block.
+        y = mi.UInt32(x)
+        for shift, low_halves in _BLOCKS:
+            y ^= (y & mi.UInt32(low_halves)) << shift
+        x ^= seed * mi.UInt32(0x2C1B3C6D)
+        y ^= seed * mi.UInt32(0x297A2D39)
+        return mi.Point2f(_unit(x), _unit(y))
+
+    def at_vertex(self, depth, which):
+        """Pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
+        return self.pair(FIRST_VERTEX + which + depth * PAIRS_PER_VERTEX)
+
+
+_BLOCKS = ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555))
+
+
+def hashed(x):
+    """A UInt32 in which every bit depends on all bits of `x`."""
+    x = mi.UInt32(x)
+    x ^= x >> 16
+    x *= mi.UInt32(0x7FEB352D)
+    x ^= x >> 15
+    x *= mi.UInt32(0x846CA68B)
+    return x ^ (x >> 16)
+
+
+def _scrambled(reversed_bits, seed):
+    """Owen-scramble numbers whose bits are in reversed order (Laine and Karras 2011)."""
+    x = reversed_bits + seed
+    for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
+        x ^= x * mi.UInt32(factor)
+    return x
+
+
+def _unit(x):
+    """The leading 24 bits as a number in [0, 1)."""
+    return mi.Float(x >> 8) * (1 / 2**24)
