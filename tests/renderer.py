@@ -110,7 +110,7 @@ def one_pass(
         loaded,
         scene.integrator,
         camera=scene.camera(loaded),
-        light_of=lights_by_instance(loaded, names),
+        light_of=lights_by_instance(loaded, scene.plane_of),
         planes=planes,
         seen=dr.zeros(mi.Float, height * width),
         seed=seed,

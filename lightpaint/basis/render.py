@@ -46,7 +46,7 @@ def why_not_one_pass(scene: Scene) -> str | None:
         return f"the integrator is {integrator.plugin!r}"
     if integrator.plugin == "direct" and integrator.samples != (1, 1):
         return "the direct integrator draws other than one sample of emitters and BSDF"
-    if scene.has_null and not any(x.plugin in ENVIRONMENTS for x in scene.lights):
+    if scene.has_null and not any(x.plugin in ENVIRONMENTS for x in scene.emitters):
         return "rays may pass surfaces and leave, which Mitsuba counts as black"
     if scene.has_media:
         return "the scene has participating media"
@@ -147,7 +147,15 @@ def _origin(
 def _basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
     return tuple(
         BasisLight(
-            x.name, x.plugin, x.kind.parameter, x.kind.unit, x.emission, x.form, x.kind.is_scalar
+            x.name,
+            x.plugin,
+            x.parameter,
+            x.unit,
+            x.emission,
+            x.form,
+            x.is_scalar,
+            x.is_fixed,
+            x.member_names,
         )
         for x in scene.lights
     )
@@ -178,7 +186,7 @@ def _render_together(
         return Basis(_basis_lights(scene), images, half_differences, sums.emitters_seen(), origin)
 
     loaded = scene.load(dict.fromkeys(names, WHITE))
-    light_of = lights_by_instance(loaded, names)
+    light_of = lights_by_instance(loaded, scene.plane_of)
     # One sequence of choices for each half, far from all others.
     sequences = [pass_seed(seed, Stream.CHOICE, half) for half in range(2)]
     kept_s, keep_every_s = time.monotonic(), KEEP_EVERY_S
