@@ -115,8 +115,8 @@ def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> s
     return ""
 
 
-def check_rendered(emitter: Any, plugin: str, name: str) -> None:
-    """Raise SceneError if Mitsuba loads the emitter but cannot render it here."""
+def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:
+    """Raise SceneError if `integrator` cannot render the emitter, though Mitsuba has loaded it."""
     import drjit as dr
     import mitsuba as mi
 
@@ -125,15 +125,18 @@ def check_rendered(emitter: Any, plugin: str, name: str) -> None:
             f"light {name!r} is a {plugin} emitter, which Mitsuba cannot render here: "
             f"{NOT_RENDERED[plugin]}"
         )
-    # An emission that only spectral variants know fails when it is first asked for; inside a
-    # render that failure would take the process with it.
+    # What is not implemented fails when it is first asked for; after a render that failed, the
+    # process would be good for nothing.
+    middle = mi.Point2f(0.5)
     try:
-        emitter.sample_direction(dr.zeros(mi.SurfaceInteraction3f), mi.Point2f(0.5))
+        emitter.sample_direction(dr.zeros(mi.SurfaceInteraction3f), middle)
+        if integrator == "ptracer":
+            emitter.sample_ray(0.0, 0.5, middle, middle)
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise SceneError(
-            f"light {name!r} cannot be rendered in {mi.variant()}: Mitsuba says {reason!r}; give "
-            "it a colour, <rgb .../>"
+            f"light {name!r} cannot be rendered by {integrator} in {mi.variant()}: Mitsuba says "
+            f"{reason!r}; give it a colour, <rgb .../>"
         ) from None
 
 

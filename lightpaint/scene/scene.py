@@ -274,7 +274,7 @@ def _find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
         plugin = node.props.plugin_name()
         kind = emission_kind(emitter, plugin)
         if kind is None:
-            check_rendered(emitter, plugin, name)
+            check_rendered(emitter, plugin, name, parsed.integrator().plugin)
         emission = read_emission(emitter, kind, name)
         found.append(
             Emitter(

@@ -25,10 +25,7 @@ COLOUR = (0.25, 1.5, 3.0)
 def lighting_of(scene: Scene, rgb: RGB) -> Lighting:
     """All lights at `rgb`."""
     return Lighting(
-        tuple(
-            LightSetting(x.name, x.plugin, x.parameter, x.unit, rgb, rgb)
-            for x in scene.lights
-        )
+        tuple(LightSetting(x.name, x.plugin, x.parameter, x.unit, rgb, rgb) for x in scene.lights)
     )
 
 
@@ -130,9 +127,7 @@ def test_old_scenes_keep_their_spelling(tmp_path: Path, version: str) -> None:
     emission: dict[str, RGB] = {bulb.name: (0, 0, 0), sky.name: COLOUR}
     lighting = Lighting(
         tuple(
-            LightSetting(
-                x.name, x.plugin, x.parameter, x.unit, emission[x.name], emission[x.name]
-            )
+            LightSetting(x.name, x.plugin, x.parameter, x.unit, emission[x.name], emission[x.name])
             for x in scene.lights
         )
     )
