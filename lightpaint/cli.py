@@ -162,13 +162,13 @@ def _add_lights(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="name=a,b,c",
-        help="adjust these emitters as one light; may be repeated, adds to the lights file's",
+        help="adjust these emitters, by name or pattern, as one light; may be repeated",
     )
     parser.add_argument(
         "--lights-file",
         metavar="F.toml",
         help="lights and groups (default: <scene>.lights.toml where there is one); --lights "
-        "replaces its lights, --group its group of that name",
+        "replaces its list, --group adds to its groups or replaces the one of that name",
     )
     parser.add_argument(
         "--no-lights-file",

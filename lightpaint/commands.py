@@ -100,7 +100,9 @@ def basis(options: Namespace, _given: list[str]) -> int:
     scene = _load(options)
     made = _basis(scene, options)
     write_basis(output, made)
-    console.write(f"{output}: {len(made.lights)} lights, {made.origin.spp} samples per pixel")
+    kept = " and what is kept" if made.is_fixed.any() else ""
+    count = int((~made.is_fixed).sum())
+    console.write(f"{output}: {count} lights{kept}, {made.origin.spp} samples per pixel")
     return 0
 
 

@@ -538,6 +538,7 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
     # The command line replaces the list, and adds groups or replaces namesakes.
     assert names("--lights", "pair,b*") == ["bulb", "beam", "pair", "rest"]
     assert names("--group", "pair=panel,bulb") == ["pair", "rest"]
+    assert names("--group", "two=bulb,beam") == ["two", "pair", "rest"]
     assert names("--group", "two=bulb,beam", "--lights", "two") == ["two", "rest"]
     assert len(names("--no-lights-file")) == 5
     other = tmp_path / "other.toml"

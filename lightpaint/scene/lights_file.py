@@ -34,8 +34,10 @@ def read_lights_file(path: Path) -> LightsFile:
 
     Raises SceneError, with the line where the TOML is wrong, or with the key that is.
     """
+    text = ""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        data = tomllib.loads(text)
     except FileNotFoundError:
         raise SceneError(f"no such lights file: {path}") from None
     except OSError as error:
@@ -43,7 +45,9 @@ def read_lights_file(path: Path) -> LightsFile:
     except UnicodeDecodeError as error:
         raise SceneError(f"{path} is not text in UTF-8: {error.reason}") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise SceneError(f"{path} is not TOML: {error}") from None
+        end = f"at line {text.rstrip().count(chr(10)) + 1}, the end"
+        reason = str(error).replace("at end of document", end)
+        raise SceneError(f"{path} is not TOML: {reason}") from None
     if unknown := [key for key in data if key not in KNOWN]:
         raise SceneError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(KNOWN)}")
     groups = data.get("groups", {})

@@ -180,7 +180,8 @@ def load_scene(
     they are. All by default.
     groups: name → names or patterns of emitters that are adjusted as one light.
     lights_file: TOML with such lights and groups, instead of the one beside the scene.
-    `lights` replaces what it lists, `groups` are added to its own or replace namesakes.
+    `lights` replaces what it lists, `groups` are added to its own or replace namesakes;
+    without `lights` they are adjusted beside what it lists.
     use_lights_file: False leaves the one beside the scene alone.
 
     Raises SceneError, with Mitsuba's own message where it refuses the scene, and
@@ -228,7 +229,7 @@ def load_scene(
         lights=choose_lights(
             emitters,
             scene=str(path),
-            lights=asked.lights if lights is None else lights,
+            lights=_chosen(asked, lights, groups or {}),
             groups={**asked.groups, **(groups or {})},
         ),
         files=parsed.files,
@@ -254,6 +255,16 @@ def _lights_file(scene: Path, named: str | Path | None, *, use_lights_file: bool
         return read_lights_file(Path(named))
     beside = lights_file_beside(scene)
     return read_lights_file(beside) if use_lights_file and beside.is_file() else LightsFile()
+
+
+def _chosen(
+    asked: LightsFile, lights: Iterable[str] | None, groups: Iterable[str]
+) -> Iterable[str] | None:
+    """What to adjust, by the lights file and by what was given along with it."""
+    if lights is not None or asked.lights is None:
+        return lights
+    # Who makes a group here and now means to adjust it.
+    return (*asked.lights, *groups)
 
 
 def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:

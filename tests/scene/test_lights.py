@@ -149,6 +149,7 @@ def test_lights_file(tmp_path: Path) -> None:
     ("text", "words"),
     [
         (b'lights = ["key"]\n[groups\n', "hall.lights.toml is not TOML: .*line 2"),
+        (b"[groups]\nlights = [\n\n", "line 2, the end"),
         (b"lights = 'key'", "lights is a list"),
         (b"lights = []", "lights is a list"),
         (b"lights = [1]", "lights is a list"),
