@@ -48,7 +48,7 @@ def lights_table(basis: Basis, solution: Solution) -> str:
 def _emission_cells(light: BasisLight, setting: LightSetting) -> str:
     """Colour, emission before and after, and their unit."""
     if light.is_fixed:
-        return '<td></td><td class="rgb"></td><td class="rgb">kept</td><td class="unit"></td>'
+        return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td>'
     return (
         f"<td>{_swatch(setting.emission)}</td>"
         f'<td class="rgb">{_rgb(light.emission)}</td>'
