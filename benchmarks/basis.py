@@ -73,7 +73,7 @@ def one_pass(scene: Scene, names: list[str], spp: int, *, seed: int) -> tuple[fl
     loaded = scene.load(dict.fromkeys(names, WHITE))
     planes = dr.zeros(mi.Float, len(names) * height * width * 3)
     seen = dr.zeros(mi.Float, height * width)
-    light_of = lights_by_instance(loaded, names)
+    light_of = lights_by_instance(loaded, scene.plane_of)
     dr.eval(planes, seen)
 
     def work() -> Image:

@@ -53,10 +53,12 @@ def _parser() -> argparse.ArgumentParser:
 
     lights = _command(commands, "lights", "list the lights of a scene")
     _add_scene(lights)
+    _add_lights(lights)
     lights.add_argument("--json", action="store_true", help="as JSON, for other programs")
 
     basis = _command(commands, "basis", "render the image of each light alone")
     _add_scene(basis)
+    _add_lights(basis)
     _add_sampling(basis)
     _add_cache(basis)
     _add_output(basis, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
@@ -90,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
+    _add_lights(solve)
     _add_sampling(solve)
     _add_cache(solve)
     _add_view(solve)
@@ -144,6 +147,37 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     _add_variant(parser)
 
 
+def _add_lights(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--lights",
+        type=_names,
+        action="extend",
+        metavar="a,b,window_*",
+        help="lights to adjust, by name or pattern; the others stay as they are (default: all)",
+    )
+    parser.add_argument(
+        "--group",
+        dest="groups",
+        type=_group,
+        action="append",
+        default=[],
+        metavar="name=a,b,c",
+        help="adjust these emitters, by name or pattern, as one light; may be repeated",
+    )
+    parser.add_argument(
+        "--lights-file",
+        metavar="F.toml",
+        help="lights and groups (default: <scene>.lights.toml where there is one); --lights "
+        "replaces its list, --group adds to its groups or replaces the one of that name",
+    )
+    parser.add_argument(
+        "--no-lights-file",
+        dest="use_lights_file",
+        action="store_false",
+        help="leave the lights file beside the scene alone",
+    )
+
+
 def _add_variant(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-m",
@@ -184,6 +218,20 @@ def _key_value(text: str) -> tuple[str, str]:
     if not key or not equals:
         raise argparse.ArgumentTypeError(f"{text!r} is not key=value")
     return key, value
+
+
+def _names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",")]
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of names, a,b,c")
+    return names
+
+
+def _group(text: str) -> tuple[str, list[str]]:
+    name, equals, members = text.partition("=")
+    if not name.strip() or not equals:
+        raise argparse.ArgumentTypeError(f"{text!r} is not name=a,b,c")
+    return name.strip(), _names(members)
 
 
 class _at_least:  # noqa: N801 (used as a function)

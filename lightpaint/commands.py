@@ -4,6 +4,7 @@ import json
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
@@ -23,9 +24,11 @@ from lightpaint.pipeline import (
     render_template,
     verify_result,
 )
-from lightpaint.relight.relight import check_relightable
+from lightpaint.relight.relight import check_relightable, scene_of
 from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
+from lightpaint.scene.emitters import MULTIPLE
+from lightpaint.scene.lights import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.solve.lighting import read_lighting
@@ -36,32 +39,57 @@ def lights(options: Namespace, _given: list[str]) -> int:
     """`lightpaint lights SCENE`"""
     scene = _load(options)
     if options.json:
-        listed = [
-            {
-                "name": light.name,
-                "plugin": light.plugin,
-                "parameter": light.kind.parameter,
-                "unit": light.kind.unit,
-                "emission": list(light.emission),
-                "form": light.form,
-                "sampling_weight": light.sampling_weight,
-            }
-            for light in scene.lights
-        ]
+        listed = [_described(light) for light in scene.lights]
         console.write(json.dumps({"scene": str(scene.path), "lights": listed}, indent=2))
         return 0
     table = console.table("light", "plugin", "emission R G B", "unit", "size or place", "sampling")
     for light in scene.lights:
-        table.add_row(
-            escape(light.name),
-            light.plugin,
-            console.numbers(light.emission),
-            light.kind.unit,
-            light.form,
-            f"{light.sampling_weight:g}",
-        )
+        single = light.member_names == (light.name,) and not light.is_fixed
+        if not single:
+            what = "kept as it is" if light.is_fixed else console.numbers(light.emission)
+            unit = "" if light.is_fixed else light.unit
+            count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
+            table.add_row(escape(light.name), light.plugin, what, unit, count, "")
+        for member in light.members:
+            table.add_row(
+                escape(member.name if single else f"  {member.name}"),
+                member.plugin,
+                console.numbers(member.emission),
+                member.kind.unit if member.kind is not None else MULTIPLE,
+                member.form,
+                f"{member.sampling_weight:g}",
+            )
     console.print_table(table)
     return 0
+
+
+def _described(light: Light) -> dict[str, Any]:
+    """A light, and the emitters in it, for other programs."""
+    members = [
+        {
+            "name": member.name,
+            "plugin": member.plugin,
+            "parameter": member.kind.parameter if member.kind is not None else WHOLE_EMISSION,
+            "unit": member.kind.unit if member.kind is not None else MULTIPLE,
+            "emission": list(member.emission),
+            "form": member.form,
+            "sampling_weight": member.sampling_weight,
+        }
+        for member in light.members
+    ]
+    about = {
+        "name": light.name,
+        "plugin": light.plugin,
+        "parameter": light.parameter,
+        "unit": light.unit,
+        "emission": list(light.emission),
+        "form": light.form,
+        "is_fixed": light.is_fixed,
+        "members": members,
+    }
+    if len(members) == 1:
+        about["sampling_weight"] = light.members[0].sampling_weight
+    return about
 
 
 def basis(options: Namespace, _given: list[str]) -> int:
@@ -72,7 +100,9 @@ def basis(options: Namespace, _given: list[str]) -> int:
     scene = _load(options)
     made = _basis(scene, options)
     write_basis(output, made)
-    console.write(f"{output}: {len(made.lights)} lights, {made.origin.spp} samples per pixel")
+    kept = " and what is kept" if made.is_fixed.any() else ""
+    count = int((~made.is_fixed).sum())
+    console.write(f"{output}: {count} lights{kept}, {made.origin.spp} samples per pixel")
     return 0
 
 
@@ -87,7 +117,7 @@ def template(options: Namespace, _given: list[str]) -> int:
                 "pass --force"
             )
     check_writable(output.parent)
-    scene = _load(options, say_how=False)
+    scene = _load(options, is_to_solve=False)
     with console.progress() as progress:
         picture = render_template(
             scene, output, spp=options.spp, seed=options.seed, progress=progress
@@ -144,11 +174,11 @@ def relight(options: Namespace, _given: list[str]) -> int:
     answers = [read_lighting(path) for path in options.lightings]
     names = [a.target or Path(p).stem for a, p in zip(answers, options.lightings, strict=True)]
     folders = _folders(options.output, names)
-    scene = _load(options, say_how=False)
+    scene = _load(options, is_to_solve=False)
     for folder in folders:
         check_writable(folder)
     for lighting, folder in zip(answers, folders, strict=True):
-        if lighting.scene_identity not in ("", scene.identity):
+        if lighting.scene_identity not in ("", scene_of(scene, lighting).identity):
             console.say(f"{folder}: the lighting was solved for another state of the scene")
         with console.progress() as progress:
             relight_look(
@@ -201,16 +231,35 @@ def doctor(options: Namespace, _given: list[str]) -> int:
     return 2 if missing else 0
 
 
-def _load(options: Namespace, *, path: Path | None = None, say_how: bool = True) -> Scene:
+def _load(options: Namespace, *, path: Path | None = None, is_to_solve: bool = True) -> Scene:
+    """The scene that was asked for, and what is worth knowing of it.
+
+    is_to_solve: whether its lights are looked at, and not only their sum.
+    """
+    chosen: dict[str, Any] = {"use_lights_file": False}
+    if is_to_solve:
+        chosen = {
+            "lights": options.lights,
+            "groups": _groups(options.groups),
+            "lights_file": options.lights_file,
+            "use_lights_file": options.use_lights_file,
+        }
     scene = load_scene(
         path or options.scene,
         sensor=options.sensor,
         parameters=dict(options.parameters),
         variant=options.variant,
+        **chosen,
     )
+    if is_to_solve:
+        if scene.lights_file is not None:
+            console.say(f"lights and groups as in {scene.lights_file}")
+        obstacles = [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]
+        if obstacles:
+            console.say(f"left as it is: {'; '.join(obstacles)}")
     if note := use_variant().note:
         console.say(note)
-    elif say_how and (reason := why_not_one_pass(scene)):
+    elif is_to_solve and (reason := why_not_one_pass(scene)):
         console.say(
             f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
         )
@@ -247,18 +296,27 @@ def _basis(scene: Scene, options: Namespace) -> Basis:
     return made
 
 
+def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
+    """Emitters by name of the group. Given twice, a group has both lists."""
+    groups: dict[str, list[str]] = {}
+    for name, members in given:
+        groups[name] = groups.get(name, []) + members
+    return groups
+
+
 def _show(look: Look, folder: Path) -> None:
     shares = energy_shares(look.basis, look.lighting)
     table = console.table("light", "plugin", "emission now", "solved R G B", "unit", "share")
     for light, now, share in zip(look.lighting.lights, look.basis.lights, shares, strict=True):
-        off = not any(light.emission)
-        unreached = light.name in look.solution.quality.unreached
+        solved = "off" if not any(light.emission) else console.numbers(light.emission)
+        if light.name in look.solution.quality.unreached and any(light.emission):
+            solved += " (kept)"
         table.add_row(
             escape(light.name),
             light.plugin,
-            console.numbers(now.emission),
-            "off" if off else console.numbers(light.emission) + (" (kept)" if unreached else ""),
-            light.unit,
+            "" if light.is_fixed else console.numbers(now.emission),
+            "kept" if light.is_fixed else solved,
+            "" if light.is_fixed else light.unit,
             f"{100 * share:.1f} %",
         )
     console.print_table(table)
@@ -300,7 +358,8 @@ def _folders(output: str | None, names: Sequence[str]) -> list[Path]:
 
 def _check_nothing_to_render(options: Namespace) -> None:
     asked = {"-s": options.sensor, "-D": options.parameters, "-m": options.variant}
-    asked |= {"--spp": options.spp}
+    asked |= {"--lights": options.lights, "--group": options.groups}
+    asked |= {"--lights-file": options.lights_file, "--spp": options.spp}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"

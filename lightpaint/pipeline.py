@@ -2,7 +2,7 @@
 
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +75,8 @@ def paint_with_light(
     seed: int = 0,
     sensor: int | str | None = None,
     parameters: Mapping[str, object] | None = None,
+    lights: Iterable[str] | None = None,
+    groups: Mapping[str, Iterable[str]] | None = None,
     resize: bool = False,
     use_cache: bool = True,
     command: str = "",
@@ -87,13 +89,16 @@ def paint_with_light(
     a scene, relit.xml and verified.exr.
     basis: one made before of the same scene; taken from the cache or rendered if not given.
     unpainted: weight of unpainted pixels against the current look.
+    sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
     spp, seed: of the basis and, with other random numbers, of the verification.
 
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
     """
     folder = Path(folder)
     if isinstance(scene, str | Path):
-        scene = load_scene(scene, sensor=sensor, parameters=parameters)
+        scene = load_scene(
+            scene, sensor=sensor, parameters=parameters, lights=lights, groups=groups
+        )
     if isinstance(basis, str | Path):
         basis = read_basis(Path(basis))
     if scene is not None and basis is not None:
@@ -144,6 +149,13 @@ def clear_results(folder: Path) -> None:
 def check_same_view(scene: Scene, basis: Basis) -> None:
     """Raise BasisError unless `basis` was made of `scene` as it is, through its sensor."""
     origin, sensor = basis.origin, scene.sensor_names[scene.sensor]
+    mine = {light.name: light.member_names for light in scene.lights}
+    its = {light.name: light.members for light in basis.lights}
+    if mine != its:
+        raise BasisError(
+            f"the basis has the lights {', '.join(its)}, and {scene.path} was loaded with "
+            f"{', '.join(mine)}: load it with the same lights and groups"
+        )
     if (origin.scene_identity, origin.sensor) != (scene.identity, sensor):
         what = "another state of the scene" if origin.sensor == sensor else "another sensor"
         raise BasisError(
@@ -256,7 +268,7 @@ def verify_result(
     path = folder / "predicted.exr"
     predicted, attributes = read_estimate_with_attributes(path)
     sensor, solved_spp = _read_view(path, attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(folder / "relit.xml", sensor=sensor)
+    relit = load_scene(folder / "relit.xml", sensor=sensor, use_lights_file=False)
     return verify(
         predicted,
         relit,

@@ -108,7 +108,7 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
     height, width = scene.size
     loaded = scene.load(dict.fromkeys(names, (1.0, 1.0, 1.0)))
     planes = dr.zeros(mi.Float, len(names) * height * width * 3)
-    light_of = lights_by_instance(loaded, names)
+    light_of = lights_by_instance(loaded, scene.plane_of)
     guide = Guide(loaded, light_of, scene.eye(loaded))
     traced = accumulate(
         loaded,

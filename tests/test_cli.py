@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -12,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
-from renderer import REPOSITORY, write_room
+from renderer import LIGHTS, REPOSITORY, write_room
 
 from lightpaint import paint_with_light, read_basis
 from lightpaint.basis.render import render_basis
@@ -479,3 +480,92 @@ def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
     assert "scene.xml" in call("cache", "list")
     assert "1 deleted" in call("cache", "clear")
     assert "scene.xml" not in call("cache")
+
+
+CHECKERS = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
+    <rotate y="1" angle="90"/><translate x="-1" y="1"/></transform><emitter type="area">
+    <texture type="checkerboard" name="radiance"/></emitter></shape>"""
+
+
+def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
+    room = write_room(tmp_path, lights="".join(LIGHTS.values()) + CHECKERS)
+    choice = ("--group", "warm=panel,bulb", "--lights", "warm,s*")
+    done = run(tmp_path, "lights", room, *choice, "--json")
+    assert "left as it is: 'screen' has a textured radiance" in done.stderr
+    listed = {light["name"]: light for light in json.loads(done.stdout)["lights"]}
+    members = {name: [m["name"] for m in light["members"]] for name, light in listed.items()}
+    assert members == {
+        "warm": ["panel", "bulb"],
+        "sun": ["sun"],
+        "sky": ["sky"],
+        "rest": ["beam", "screen"],
+    }
+    assert [name for name, light in listed.items() if light["is_fixed"]] == ["rest"]
+    assert "  beam" in succeed(tmp_path, "lights", room, *choice)
+
+    succeed(tmp_path, "template", room, "-o", "t.exr", "--spp", 16)
+    output = succeed(tmp_path, "solve", room, "t.exr", *choice, "--spp", 64, "-o", "out")
+    assert "agree within noise" in output
+    assert re.search(r"^rest .* kept ", output, re.MULTILINE)
+    assert "agree within noise" in succeed(tmp_path, "verify", "out")
+    succeed(tmp_path, "relight", room, "out/lighting.json", "-o", "again", "--spp", 4)
+    again, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
+    assert again.read_bytes() == relit.read_bytes()
+
+    # The same from a basis of its own, which keeps what it was made with.
+    succeed(tmp_path, "basis", room, *choice, "--spp", 64, "-o", "b.basis.exr")
+    succeed(tmp_path, "solve", "b.basis.exr", "t.exr", "-o", "from_basis")
+    answers = [
+        json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))
+        for name in ("out", "from_basis")
+    ]
+    assert answers[0] == answers[1]
+    line = refused(tmp_path, "solve", "b.basis.exr", "t.exr", "--lights", "sky", "-o", "no")
+    assert "--lights cannot change a saved basis" in line
+
+
+def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    beside = tmp_path / "room.lights.toml"
+    beside.write_text('lights = ["pair"]\n[groups]\npair = ["sun", "sky"]\n', encoding="utf-8")
+
+    def names(*arguments: object) -> list[str]:
+        text = succeed(tmp_path, "lights", room, "--json", *arguments)
+        return [light["name"] for light in json.loads(text)["lights"]]
+
+    assert names() == ["pair", "rest"]
+    assert "room.lights.toml" in run(tmp_path, "lights", room).stderr
+    # The command line replaces the list, and adds groups or replaces namesakes.
+    assert names("--lights", "pair,b*") == ["bulb", "beam", "pair", "rest"]
+    assert names("--group", "pair=panel,bulb") == ["pair", "rest"]
+    assert names("--group", "two=bulb,beam") == ["two", "pair", "rest"]
+    assert names("--group", "two=bulb,beam", "--lights", "two") == ["two", "rest"]
+    assert len(names("--no-lights-file")) == 5
+    other = tmp_path / "other.toml"
+    other.write_text('[groups]\nall = ["*"]\n', encoding="utf-8")
+    assert names("--lights-file", other) == ["all"]
+
+    beside.write_text("lights = [", encoding="utf-8")
+    line = refused(tmp_path, "basis", room)
+    assert "room.lights.toml is not TOML" in line
+    assert "line 1" in line
+    # What has no use for lights does not read it.
+    succeed(tmp_path, "template", room, "--spp", 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--group", "bulb"), "is not name=a,b,c"),
+        (("--group", "=bulb"), "is not name=a,b,c"),
+        (("--group", "g="), "is not a list of names"),
+        (("--lights", "bulb,,sky"), "is not a list of names"),
+        (("--lights", "blub"), "did you mean 'bulb'"),
+        (("--group", "sun=bulb,sky"), "has the name of a light"),
+        (("--lights-file", "gone.toml"), "no such lights file: gone.toml"),
+    ],
+)
+def test_wrong_choices_are_refused_in_one_line(
+    tmp_path: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    assert words in refused(tmp_path, "lights", write_room(tmp_path), *arguments)

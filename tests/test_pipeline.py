@@ -74,7 +74,7 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     expected: tuple[str | None, int | None],
 ):
     used: list[Any] = []
-    monkeypatch.setattr(pipeline, "load_scene", lambda _path, sensor: used.append(sensor))
+    monkeypatch.setattr(pipeline, "load_scene", lambda _path, sensor, **_: used.append(sensor))
     monkeypatch.setattr(pipeline, "verify", lambda *_args, spp, **_options: used.append(spp))
     folder = _result(tmp_path, None if view is None else json.dumps(view))
     verify_result(folder, spp=given)

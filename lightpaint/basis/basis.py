@@ -43,6 +43,8 @@ class BasisLight:
     emission: its present RGB emission in the scene, in that unit.
     form: its place and size, for people.
     is_scalar: whether it can only be scaled as a whole, and has one weight for all channels.
+    is_fixed: whether it is what stays as it is: its weight is 1, whatever is painted.
+    members: names of the emitters it consists of; itself if none are given.
     """
 
     name: str
@@ -52,8 +54,14 @@ class BasisLight:
     emission: RGB
     form: str = ""
     is_scalar: bool = False
+    is_fixed: bool = False
+    members: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.members:
+            object.__setattr__(self, "members", (self.name,))
+        if self.is_fixed and self.emission != (1, 1, 1):
+            raise BasisError(f"light {self.name!r} is kept, and its emission is not 1")
         if not all(math.isfinite(v) and v >= 0 for v in self.emission):
             raise BasisError(
                 f"light {self.name!r} has the emission {list(self.emission)}: "
@@ -137,6 +145,11 @@ class Basis:
         """(n, 3) weights of the scene as it is."""
         return np.array([light.emission for light in self.lights], dtype=np.float64)
 
+    @property
+    def is_fixed(self) -> npt.NDArray[np.bool_]:
+        """(n,), which lights stay as they are, with weight 1."""
+        return np.array([light.is_fixed for light in self.lights], dtype=bool)
+
     def mix(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""
         return mix(self.images, weights)
@@ -160,7 +173,7 @@ def write_basis(path: Path, basis: Basis) -> None:
     """Write `basis` as a multi-part EXR, whole or not at all."""
     parts = []
     for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
-        attributes = {LIGHT_KEY: json.dumps(asdict(light), ensure_ascii=False)}
+        attributes = {LIGHT_KEY: json.dumps(_light_fields(light), ensure_ascii=False)}
         channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
         parts.append(Part(light.name, channels, attributes))
     seen = basis.emitters_seen.astype(np.float16)
@@ -243,9 +256,22 @@ def _origin(data: dict[str, Any]) -> Origin:
     return Origin(halves=(a, b), passes=(p, q), **data)
 
 
+def _light_fields(light: BasisLight) -> dict[str, Any]:
+    """What the file says of a light; what goes without saying for one emitter is left out."""
+    data = asdict(light)
+    if light.members == (light.name,):
+        del data["members"]
+    if not light.is_fixed:
+        del data["is_fixed"]
+    return data
+
+
 def _light(data: dict[str, Any]) -> BasisLight:
     r, g, b = (float(v) for v in data.pop("emission"))
-    return BasisLight(emission=(r, g, b), **data)
+    members = data.pop("members", [])
+    if not isinstance(members, list):
+        raise TypeError(f"members is a list of names, not {members!r}")
+    return BasisLight(emission=(r, g, b), members=tuple(map(str, members)), **data)
 
 
 def _free_name(name: str, taken: tuple[str, ...]) -> str:

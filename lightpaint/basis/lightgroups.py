@@ -17,7 +17,7 @@ Import it once a variant is set and not a scalar one: its arrays do not exist be
 # a static checker cannot follow.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,12 +86,15 @@ class HalfSums:
         return np.array(self.seen).reshape(self.shape[1:3]) > 0
 
 
-def lights_by_instance(scene: Any, names: Sequence[str]) -> Any:
-    """UInt32 array that maps the Dr.Jit instance id of an emitter to its index in `names`."""
+def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
+    """UInt32 array that maps the Dr.Jit instance id of an emitter to the plane of its light.
+
+    plane_of: index of the plane by the emitter's name.
+    """
     instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
     table = np.zeros(max(instances) + 1, dtype=np.uint32)
     for instance, emitter in zip(instances, scene.emitters(), strict=True):
-        table[instance] = names.index(emitter.id())
+        table[instance] = plane_of[emitter.id()]
     return mi.UInt32(table)
 
 

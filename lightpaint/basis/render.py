@@ -46,8 +46,8 @@ def why_not_one_pass(scene: Scene) -> str | None:
         return f"the integrator is {integrator.plugin!r}"
     if integrator.plugin == "direct" and integrator.samples != (1, 1):
         return "the direct integrator draws other than one sample of emitters and BSDF"
-    backdrop = any(x.plugin in ENVIRONMENTS for x in scene.lights) and not integrator.hide_emitters
-    if scene.has_null and not backdrop:
+    backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
+    if scene.has_null and (integrator.hide_emitters or not backdrop):
         return "rays may pass surfaces and leave, which Mitsuba counts as black"
     if scene.has_media:
         return "the scene has participating media"
@@ -146,7 +146,15 @@ def _origin(
 def _basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
     return tuple(
         BasisLight(
-            x.name, x.plugin, x.kind.parameter, x.kind.unit, x.emission, x.form, x.kind.is_scalar
+            x.name,
+            x.plugin,
+            x.parameter,
+            x.unit,
+            x.emission,
+            x.form,
+            x.is_scalar,
+            x.is_fixed,
+            x.member_names,
         )
         for x in scene.lights
     )
@@ -185,7 +193,7 @@ def _render_together(
         )
 
     loaded = scene.load(dict.fromkeys(names, WHITE))
-    light_of = lights_by_instance(loaded, names)
+    light_of = lights_by_instance(loaded, scene.plane_of)
     guide = Guide(loaded, light_of, scene.eye(loaded), start.learned if start else None)
     # One stream of numbers for each half, far from all others.
     streams = [pass_seed(seed, Stream.NUMBERS, half) for half in range(2)]

@@ -9,7 +9,8 @@ from lightpaint.errors import SceneError
 from lightpaint.images.exr import Floats
 from lightpaint.relight.xml_edit import Element, XmlFile, tag
 from lightpaint.scene.emitters import AS_AUTHORED, RGB, Scaling
-from lightpaint.scene.scene import Light, Scene
+from lightpaint.scene.lights import Emitter
+from lightpaint.scene.scene import Scene
 
 
 @dataclass
@@ -76,42 +77,43 @@ class Changes:
 
 
 def write_emission(
-    changes: Changes, scene: Scene, light: Light, rgb: RGB, *, stem: str
+    changes: Changes, scene: Scene, emitter: Emitter, rgb: RGB, *, stem: str
 ) -> dict[str, Floats]:
-    """Set the emission of `light` to `rgb`, in the unit of its kind.
+    """Set the emission of `emitter` to `rgb`, in the unit of its kind.
 
     stem: what the names of images begin with.
 
     Returns the images, (h, w, 3) linear, that have to lie beside the relit scene, by file name.
     """
-    kind = light.kind
+    kind = emitter.kind
+    assert kind is not None  # what cannot be scaled is never set
     if kind.scaling is Scaling.COLOUR:
         changes.set("rgb", kind.parameter, " ".join(f"{np.float32(v):.9g}" for v in rgb))
     elif kind.scaling is Scaling.FACTORS:
-        holder = changes if light.plugin == "sunsky" else changes.child(kind.parameter)
+        holder = changes if emitter.plugin == "sunsky" else changes.child(kind.parameter)
         for factor in kind.factors:
             holder.set("float", factor, f"{holder.number(factor, 1.0) * rgb[0]:.9g}")
         if holder is not changes:
             holder.finish()
-    elif light.plugin != "area" and len(set(rgb)) == 1:
+    elif emitter.plugin != "area" and len(set(rgb)) == 1:
         changes.set("float", "scale", f"{changes.number('scale', 1.0) * rgb[0]:.9g}")
     elif not any(rgb):
         changes.set("rgb", kind.parameter, "0 0 0")
     elif rgb != AS_AUTHORED:
-        return _scale_image(changes, scene, light, rgb, stem)
+        return _scale_image(changes, scene, emitter, kind.parameter, rgb, stem)
     return {}
 
 
 def _scale_image(
-    changes: Changes, scene: Scene, light: Light, rgb: RGB, stem: str
+    changes: Changes, scene: Scene, emitter: Emitter, parameter: str, rgb: RGB, stem: str
 ) -> dict[str, Floats]:
-    """Scale the image of `light` by `rgb` and refer to the result."""
+    """Scale the image of `emitter` by `rgb` and refer to the result."""
     # The number keeps apart what a file name cannot: names differ in any character.
-    safe = re.sub(r"[^\w-]+", "_", light.name)
-    name = f"{stem}.{scene.lights.index(light)}.{safe}.exr"
-    holder = changes if light.plugin == "envmap" else changes.child(light.kind.parameter)
+    safe = re.sub(r"[^\w-]+", "_", emitter.name)
+    name = f"{stem}.{scene.emitters.index(emitter)}.{safe}.exr"
+    holder = changes if emitter.plugin == "envmap" else changes.child(parameter)
     holder.set("string", "filename", name)
     if holder is not changes:
         holder.set("boolean", "raw", "true")
         holder.finish()
-    return {name: scene.emitted_image(light) * np.asarray(rgb, np.float32)}
+    return {name: scene.emitted_image(emitter) * np.asarray(rgb, np.float32)}

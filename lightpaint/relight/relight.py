@@ -5,7 +5,7 @@ survive and a diff shows the lights and nothing else.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,7 +17,8 @@ from lightpaint.images.exr import Floats, write_rgb
 from lightpaint.relight.emission_xml import Changes, write_emission
 from lightpaint.relight.xml_edit import XmlFile, tag
 from lightpaint.scene.emitters import RGB, Scaling
-from lightpaint.scene.scene import Light, Scene, load_scene
+from lightpaint.scene.lights import Emitter
+from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.solve.lighting import Lighting
 
 
@@ -29,23 +30,28 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     scaled images of lights that emit one. A light that is off keeps its emitter, is black
     and is never sampled.
 
-    Raises LightingError if the two name different lights, SceneError where the XML cannot
+    Which emitters make up each light is what `lighting` says, however `scene` ties them;
+    those it keeps are not touched. In the scene returned every emitter is a light.
+
+    Raises LightingError if the two name different emitters, SceneError where the XML cannot
     express the answer, OutputError if `path` cannot be written.
     """
     path = Path(path)
-    check_same_lights(scene, lighting)
+    scene = scene_of(scene, lighting)
     for file, content in relit_files(scene, lighting.emission, path).items():
         if isinstance(content, bytes):
             write_bytes(file, content)
         else:
             write_rgb(file, content)
-    relit = load_scene(path, sensor=scene.sensor)
-    for light in scene.lights:
-        if light.kind.scaling is not Scaling.COLOUR:
+    relit = load_scene(path, sensor=scene.sensor, use_lights_file=False)
+    taken = {emitter.name: emitter.emission for emitter in relit.emitters}
+    for emitter, wanted in _settings(scene, lighting.emission):
+        if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
             continue  # as authored means something else there
-        wanted, taken = lighting.emission[light.name], relit.light(light.name).emission
-        if not np.array_equal(np.asarray(wanted, np.float32), np.asarray(taken, np.float32)):
-            raise SceneError(f"{path} did not take the emission of light {light.name!r}")
+        if not np.array_equal(
+            np.asarray(wanted, np.float32), np.asarray(taken[emitter.name], np.float32)
+        ):
+            raise SceneError(f"{path} did not take the emission of light {emitter.name!r}")
     return relit
 
 
@@ -55,29 +61,51 @@ def check_relightable(scene: Scene, path: Path) -> None:
     The probe is a colour that no light has, so that every light needs all it may need.
     """
     probe: dict[str, RGB] = {
-        light.name: (0.5, 0.5, 0.5) if light.kind.is_scalar else (0.5, 0.25, 0.125)
+        light.name: (0.5, 0.5, 0.5) if light.is_scalar else (0.5, 0.25, 0.125)
         for light in scene.lights
+        if not light.is_fixed
     }
     relit_files(scene, probe, path)
 
 
-def check_same_lights(scene: Scene, lighting: Lighting) -> None:
-    """Raise LightingError unless `lighting` names exactly the lights of `scene`."""
-    given, there = set(lighting.emission), {light.name for light in scene.lights}
+def scene_of(scene: Scene, lighting: Lighting) -> Scene:
+    """`scene` with its emitters tied as `lighting` ties them.
+
+    Raises LightingError unless it names exactly the emitters of `scene`, and gives each light
+    in the unit that the scene has it in.
+    """
+    given = {name for members in lighting.members.values() for name in members}
+    there = {emitter.name for emitter in scene.emitters}
     if given != there:
         raise LightingError(
             f"the lighting does not fit {scene.path}: it lacks "
             f"{', '.join(sorted(there - given)) or 'no light'} and names "
             f"{', '.join(sorted(given - there)) or 'none'} that the scene has not"
         )
+    tied = scene.with_lights(lighting.members, lighting.fixed)
+    for setting in lighting.lights:
+        if (unit := tied.light(setting.name).unit) != setting.unit:
+            raise LightingError(
+                f"the lighting has light {setting.name!r} in {setting.unit}, but in {scene.path} "
+                f"as it is now it would be {unit}: solve again"
+            )
+    return tied
+
+
+def _settings(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
+    """What each emitter that is adjusted is set to. emission: by name of light."""
+    for light in scene.lights:
+        if not light.is_fixed:
+            for member in light.members:
+                yield member, light.emission_of(member, emission[light.name])
 
 
 @dataclass
 class _Edits:
-    """What changes in one file: the settings of the lights in it, by byte offset."""
+    """What changes in one file: the settings of the emitters in it, by byte offset."""
 
     original: Path
-    settings: dict[int, tuple[Light, RGB, float | None]] = field(default_factory=dict)
+    settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
 
 
 def relit_files(
@@ -89,19 +117,22 @@ def relit_files(
     """
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
-    all_dark = not any(any(rgb) for rgb in emission.values())
-    for light in scene.lights:
-        file = scene.files[light.file]
-        rgb = emission[light.name]
-        setting = (light, rgb, _sampling_weight(light, rgb, all_dark))
+    changed = dict(_settings(scene, emission))
+    kept = [emitter for emitter in scene.emitters if emitter not in changed]
+    # Mitsuba refuses a scene in which no emitter may be sampled.
+    all_dark = not any(map(any, changed.values())) and not any(e.sampling_weight for e in kept)
+    for emitter, rgb in changed.items():
+        file = scene.files[emitter.file]
+        setting = (emitter, rgb, _sampling_weight(emitter, rgb, all_dark))
         here = edits.setdefault(file.resolve(), _Edits(file)).settings
-        if light.offset in here and here[light.offset][1:] != setting[1:]:
-            raise SceneError(
-                f"{file} is included more than once, and its light would have to be both "
-                f"{here[light.offset][0].name!r} and {light.name!r} with different emissions: "
-                "include two copies of it"
-            )
-        here[light.offset] = setting
+        if emitter.offset in here and here[emitter.offset][1:] != setting[1:]:
+            raise _included_twice(file, here[emitter.offset][0], emitter)
+        here[emitter.offset] = setting
+    for emitter in kept:
+        file = scene.files[emitter.file]
+        here = edits.get(file.resolve(), _Edits(file)).settings
+        if emitter.offset in here:
+            raise _included_twice(file, here[emitter.offset][0], emitter)
 
     written: dict[Path, bytes | Floats] = {}
     for edit in edits.values():
@@ -120,11 +151,18 @@ def relit_files(
     return written
 
 
-def _sampling_weight(light: Light, rgb: RGB, all_dark: bool) -> float | None:
+def _included_twice(file: Path, one: Emitter, other: Emitter) -> SceneError:
+    return SceneError(
+        f"{file} is included more than once, and its light would have to be both "
+        f"{one.name!r} and {other.name!r} with different emissions: "
+        "include two copies of it, or tie the two into a group"
+    )
+
+
+def _sampling_weight(emitter: Emitter, rgb: RGB, all_dark: bool) -> float | None:
     """The sampling weight to write, or None to leave it as it is."""
     if any(rgb):
-        return 1.0 if light.sampling_weight == 0 else None
-    # Mitsuba refuses a scene in which no emitter may be sampled.
+        return 1.0 if emitter.sampling_weight == 0 else None
     return None if all_dark else 0.0
 
 
@@ -154,10 +192,10 @@ def _edit(
         lines += [tag("default", name=k, value=v) for k, v in defaults.items()]
         xml.insert_first(xml.root, lines)
     images: dict[str, Floats] = {}
-    for offset, (light, rgb, weight) in edit.settings.items():
+    for offset, (emitter, rgb, weight) in edit.settings.items():
         changes = Changes(xml, xml.element_at(offset))
         if weight is not None:
             changes.set("float", "sampling_weight", f"{weight:g}")
-        images |= write_emission(changes, scene, light, rgb, stem=stem)
+        images |= write_emission(changes, scene, emitter, rgb, stem=stem)
         changes.finish()
     return xml.edited(), images

@@ -37,10 +37,7 @@ def lights_table(basis: Basis, solution: Solution) -> str:
             f'title="{what}"></td>'
             f'<th scope="row">{name}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
-            f"<td>{_swatch(setting.emission)}</td>"
-            f'<td class="rgb">{_rgb(light.emission)}</td>'
-            f'<td class="rgb">{_rgb(setting.emission)}</td>'
-            f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
+            f"{_emission_cells(light, setting)}"
             f"<td>{change(light, setting, solution.quality.unreached)}</td>"
             f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
             f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
@@ -48,10 +45,24 @@ def lights_table(basis: Basis, solution: Solution) -> str:
     return "".join(rows)
 
 
+def _emission_cells(light: BasisLight, setting: LightSetting) -> str:
+    """Colour, emission before and after, and their unit."""
+    if light.is_fixed:
+        return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td>'
+    return (
+        f"<td>{_swatch(setting.emission)}</td>"
+        f'<td class="rgb">{_rgb(light.emission)}</td>'
+        f'<td class="rgb">{_rgb(setting.emission)}</td>'
+        f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
+    )
+
+
 def change(light: BasisLight, setting: LightSetting, unreached: tuple[str, ...]) -> str:
     """In words or as a ratio of luminance, what happens to a light."""
     before = float(luminance(np.array(light.emission)))
     after = float(luminance(np.array(setting.emission)))
+    if light.is_fixed:
+        return "kept as it is"
     if light.name in unreached:
         return "unchanged: reaches nothing painted"
     if after == 0:
@@ -105,13 +116,17 @@ def render_table(basis: Basis, target: Target, solution: Solution) -> str:
     height, width = basis.size
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
+    adjusted = int((~basis.is_fixed).sum())
     facts = [
         ("Solve converged", "yes" if q.converged else stopped),
-        ("Lights", f"{len(basis.lights)}, of them {_lights_off(solution) or 'none'} off"),
+        ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels"),
         ("Basis", f"{origin.method}, {origin.spp} samples per pixel, seed {origin.seed}"),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
     ]
+    for light in basis.lights:
+        if light.is_fixed:
+            facts.append(("Kept as they are", ", ".join(light.members)))
     if q.unreached:
         facts.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
     if target.not_finite:

@@ -61,15 +61,16 @@ PLUGINS = {
 }
 
 
-def emission_kind(emitter: Any, plugin: str, name: str) -> EmissionKind:
-    """How the loaded emitter `name` is scaled. Raises SceneError if lightpaint cannot."""
+#: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
+NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
+
+
+def emission_kind(emitter: Any, plugin: str) -> EmissionKind | None:
+    """How a loaded emitter is scaled; None where lightpaint cannot scale it."""
     import mitsuba as mi
 
     if plugin not in PLUGINS:
-        raise SceneError(
-            f"light {name!r} is an emitter of kind {plugin!r}, which lightpaint cannot solve for: "
-            f"it takes {', '.join(PLUGINS)}; remove that light or replace it"
-        )
+        return None
     parameter, unit = PLUGINS[plugin]
     keys = set(mi.traverse(emitter).keys())
     if plugin == "sunsky":
@@ -80,29 +81,63 @@ def emission_kind(emitter: Any, plugin: str, name: str) -> EmissionKind:
         return EmissionKind(Scaling.COLOUR, parameter, unit)
     if f"{parameter}.scale" in keys:
         return EmissionKind(Scaling.FACTORS, parameter, MULTIPLE, ("scale",))
-    raise SceneError(
-        f"light {name!r} has a textured {parameter} that lightpaint cannot scale: "
-        f"use a bitmap, or one colour, <rgb name={parameter!r} .../>"
-    )
+    return None
 
 
-def read_emission(emitter: Any, kind: EmissionKind, name: str) -> RGB:
+def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
     """The emission of a loaded Mitsuba emitter, as linear RGB in the unit of `kind`.
 
     Read from the loaded object and not from the XML text, where a spectrum, a preset or
-    nothing at all may stand.
+    nothing at all may stand. Raises SceneError for values that are no RGB colour.
     """
     import mitsuba as mi
 
-    if kind.scaling is not Scaling.COLOUR:
+    if kind is None or kind.scaling is not Scaling.COLOUR:
         return AS_AUTHORED
     value = np.array(mi.traverse(emitter)[f"{kind.parameter}.value"], dtype=float).ravel()
     if value.size not in (1, 3):
         raise SceneError(f"light {name!r} has a {kind.parameter} of {value.size} values, not RGB")
     r, g, b = np.broadcast_to(value, 3).tolist()
-    if not (np.isfinite(value).all() and value.min() >= 0):
-        raise SceneError(f"light {name!r} has the {kind.parameter} {[r, g, b]}: need values >= 0")
+    if not np.isfinite(value).all():
+        raise SceneError(f"light {name!r} has the {kind.parameter} {[r, g, b]}: not finite")
     return r, g, b
+
+
+def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> str:
+    """What keeps a light from being solved for, in words behind its name; "" if nothing."""
+    if plugin not in PLUGINS:
+        return f"is a {plugin} emitter, which lightpaint cannot scale"
+    if kind is None:
+        parameter = PLUGINS[plugin][0]
+        return f"has a textured {parameter} that is neither a bitmap nor one colour"
+    if min(emission) < 0:
+        return f"has a negative {kind.parameter}, {' '.join(f'{v:g}' for v in emission)}"
+    return ""
+
+
+def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:
+    """Raise SceneError if `integrator` cannot render the emitter, though Mitsuba has loaded it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if plugin in NOT_RENDERED:
+        raise SceneError(
+            f"light {name!r} is a {plugin} emitter, which Mitsuba cannot render here: "
+            f"{NOT_RENDERED[plugin]}"
+        )
+    # What is not implemented fails when it is first asked for; after a render that failed, the
+    # process would be good for nothing.
+    middle = mi.Point2f(0.5)
+    try:
+        emitter.sample_direction(dr.zeros(mi.SurfaceInteraction3f), middle)
+        if integrator == "ptracer":
+            emitter.sample_ray(0.0, 0.5, middle, middle)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise SceneError(
+            f"light {name!r} cannot be rendered by {integrator} in {mi.variant()}: Mitsuba says "
+            f"{reason!r}; give it a colour, <rgb .../>"
+        ) from None
 
 
 def describe_form(emitter: Any, plugin: str) -> str:
@@ -113,8 +148,8 @@ def describe_form(emitter: Any, plugin: str) -> str:
         x, y, z = np.array(point, dtype=float).ravel()[:3]
         return f"({x:.2f}, {y:.2f}, {z:.2f})"
 
-    if plugin == "area":
-        shape = emitter.get_shape()
+    shape = emitter.get_shape()
+    if shape is not None:
         box = shape.bbox()
         area = float(np.array(shape.surface_area()).ravel()[0])
         return f"area {area:.3g} at {at(box.center())}"
@@ -123,6 +158,8 @@ def describe_form(emitter: Any, plugin: str) -> str:
     parameters = mi.traverse(emitter)
     if "position" in parameters:
         return f"at {at(parameters['position'])}"
+    if "to_world" not in parameters:
+        return ""
     matrix = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)
     if plugin == "directional":
         return f"towards {at(matrix[:3, 2])}"

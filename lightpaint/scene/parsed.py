@@ -33,9 +33,12 @@ class Integrator:
 
 @dataclass(frozen=True)
 class EmitterSetting:
-    """What an emitter is set to: emission in the unit of `kind`, and how often it is sampled."""
+    """What an emitter is set to: emission in the unit of `kind`, and how often it is sampled.
 
-    kind: EmissionKind
+    kind: None for an emitter that cannot be scaled, only taken out: its emission is black.
+    """
+
+    kind: EmissionKind | None
     emission: RGB
     sampling_weight: float
 
@@ -104,6 +107,11 @@ class ParsedScene:
         self.sensor_names = tuple(
             self.state.nodes[k].props.id() or f"sensor_{i}" for i, k in enumerate(self.sensor_nodes)
         )
+        self.shape_of = {
+            child: shape
+            for shape in self._nodes_of(kinds.Shape)
+            for child in self._children_of(shape, kinds.Emitter)
+        }
         self.names = self._name_lights()
 
     def _nodes_of(self, kind: Any) -> list[int]:
@@ -119,13 +127,6 @@ class ParsedScene:
 
     def _name_lights(self) -> dict[int, str]:
         """Names by node: emitter id, else the id of its shape, else `<plugin>_<k>`."""
-        import mitsuba as mi
-
-        shape_of = {
-            child: shape
-            for shape in self._nodes_of(mi.ObjectType.Shape)
-            for child in self._children_of(shape, mi.ObjectType.Emitter)
-        }
         names: dict[int, str] = {}
         taken: set[str] = set()
         count: dict[str, int] = {}
@@ -133,7 +134,7 @@ class ParsedScene:
             props = self.state.nodes[node].props
             plugin = props.plugin_name()
             count[plugin] = count.get(plugin, -1) + 1
-            shape = shape_of.get(node)
+            shape = self.shape_of.get(node)
             shape_id = self.state.nodes[shape].props.id() if shape is not None else ""
             base = props.id() or shape_id or f"{plugin}_{count[plugin]}"
             name, k = base, 2
@@ -176,8 +177,12 @@ class ParsedScene:
 
         kind, rgb = setting.kind, setting.emission
         props = state.nodes[node].props
+        if kind is None:
+            self._darken(state, node)
         props["sampling_weight"] = setting.sampling_weight
-        if kind.scaling is Scaling.COLOUR:
+        if kind is None:
+            pass
+        elif kind.scaling is Scaling.COLOUR:
             props[kind.parameter] = mi.ScalarColor3f(*rgb)
         elif kind.scaling is Scaling.FACTORS:
             # The numbers stand in the emitter itself or in its texture.
@@ -193,6 +198,18 @@ class ParsedScene:
                 props["scale"] = 0.0
         elif rgb != AS_AUTHORED:
             raise SceneError(f"an image of light can be loaded black or as it is, not times {rgb}")
+
+    def _darken(self, state: Any, node: int) -> None:
+        """Put a black emitter in the place of one that has no numbers to turn."""
+        import mitsuba as mi
+
+        props = state.nodes[node].props
+        for key in list(props):
+            del props[key]
+        # An emitter stays: without one, the shape would get another surface.
+        on_shape = node in self.shape_of
+        props.set_plugin_name("area" if on_shape else "point")
+        props["radiance" if on_shape else "intensity"] = mi.ScalarColor3f(0)
 
     def child_named(self, node: int, name: str) -> int | None:
         """The node that is referenced by `node` under `name`."""
@@ -243,7 +260,7 @@ class ParsedScene:
 
         return bool(self._nodes_of(mi.ObjectType.Medium))
 
-    def identity(self, sensor: int) -> str:
+    def content(self, sensor: int) -> str:
         import mitsuba as mi
 
         # The parsed form holds what stood in files that only the parser reads.

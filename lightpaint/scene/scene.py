@@ -5,8 +5,9 @@ time, and no reference to one of its emitters may outlive it.
 """
 
 import gc
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import hashlib
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,28 +15,19 @@ import numpy as np
 
 from lightpaint.errors import SceneError
 from lightpaint.images.exr import Floats
-from lightpaint.scene.emitters import RGB, EmissionKind, describe_form, emission_kind, read_emission
+from lightpaint.scene.emitters import (
+    AS_AUTHORED,
+    RGB,
+    check_rendered,
+    describe_form,
+    emission_kind,
+    read_emission,
+    why_not_adjusted,
+)
+from lightpaint.scene.lights import Emitter, Light, choose_lights, lights_of
+from lightpaint.scene.lights_file import LightsFile, lights_file_beside, read_lights_file
 from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, View
 from lightpaint.scene.variant import use_variant
-
-
-@dataclass(frozen=True)
-class Light:
-    """One light of a scene: what a person adjusts.
-
-    emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
-    file, offset: where its element's `<` stands: index into Scene.files, byte offset.
-    """
-
-    name: str
-    plugin: str
-    kind: EmissionKind
-    emission: RGB
-    form: str
-    sampling_weight: float
-    node: int
-    file: int
-    offset: int
 
 
 @dataclass(frozen=True)
@@ -45,7 +37,9 @@ class Scene:
     view: the sensor it is seen through, and its film.
     spp: samples per pixel the scene itself asks for.
     has_null: whether rays may pass a surface as if it were not there.
-    identity: hash of the content of all XML files and assets, the parameters and the sensor.
+    emitters: all of them; lights: what is adjusted, and last what is kept, if anything is.
+    content: hash of all XML files and assets, the parameters and the sensor.
+    lights_file: the lights file that went into `lights`, if one did.
     """
 
     path: Path
@@ -56,10 +50,48 @@ class Scene:
     integrator: Integrator
     has_media: bool
     has_null: bool
+    emitters: tuple[Emitter, ...]
     lights: tuple[Light, ...]
     files: tuple[Path, ...]
-    identity: str
+    content: str
+    lights_file: Path | None
     _parsed: "ParsedScene" = field(repr=False)
+
+    @property
+    def identity(self) -> str:
+        """What makes two bases of this scene the same: `content`, and how emitters are tied."""
+        # Of a scene whose emitters are all adjusted one by one it is the content alone.
+        if all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights):
+            return self.content
+        tied = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
+        return hashlib.sha256(repr((self.content, tied)).encode()).hexdigest()[:32]
+
+    @property
+    def plane_of(self) -> Mapping[str, int]:
+        """Index among the lights of the one that an emitter belongs to, by the emitter's name."""
+        return {m.name: k for k, light in enumerate(self.lights) for m in light.members}
+
+    def with_lights(
+        self, members: Mapping[str, Sequence[str]], fixed: Collection[str] = ()
+    ) -> "Scene":
+        """This scene with its emitters tied to other lights.
+
+        members: name of a light → names of its emitters; fixed: lights that stay as they are.
+        Raises SceneError unless every emitter of the scene, and no other, is named once.
+        """
+        given = [name for names in members.values() for name in names]
+        there = {emitter.name for emitter in self.emitters}
+        if set(given) != there:
+            raise SceneError(
+                f"{self.path} has other emitters than are asked for: it lacks "
+                f"{', '.join(sorted(set(given) - there)) or 'none'} and also has "
+                f"{', '.join(sorted(there - set(given))) or 'none'}"
+            )
+        if len(given) > len(there) or not all(members.values()):
+            raise SceneError(
+                f"every emitter belongs to one light, and every light has one: not so in {members}"
+            )
+        return replace(self, lights=lights_of(self.emitters, members, fixed))
 
     @property
     def sensor(self) -> int:
@@ -99,26 +131,32 @@ class Scene:
 
         The film is replaced by a box-filtered RGB float32 one of the same size, for basis
         and verification alike. A light set to black is never sampled. Drop the scene, and
-        all that came from it, before loading another. Lights that are images can only be
-        black or as authored here: other multiples take files (see relight).
+        all that came from it, before loading another. Lights that are images, and what is
+        kept, can only be black or as authored here: other multiples take files (see relight).
         """
-        emission = emission or {}
-        # Mitsuba refuses a scene in which no emitter may be sampled.
-        all_dark = len(emission) == len(self.lights) and not any(map(any, emission.values()))
-        settings = {}
-        for name, rgb in emission.items():
+        settings: dict[int, EmitterSetting] = {}
+        for name, rgb in (emission or {}).items():
             light = self.light(name)
-            # A light the scene keeps switched off is sampled again once it shines.
-            weight = light.sampling_weight or 1.0
-            weight = weight if any(rgb) or all_dark else 0.0
-            settings[light.node] = EmitterSetting(light.kind, rgb, weight)
+            if not light.is_fixed:
+                settings |= {m.node: _setting(m, light.emission_of(m, rgb)) for m in light.members}
+            elif not any(rgb):
+                settings |= {m.node: _setting(m, rgb) for m in light.members}
+            elif tuple(rgb) != AS_AUTHORED:
+                raise SceneError(f"what is kept can be loaded black or as it is, not times {rgb}")
+        own = {emitter.node: emitter.sampling_weight for emitter in self.emitters}
+        if not any((own | {node: x.sampling_weight for node, x in settings.items()}).values()):
+            # Mitsuba refuses a scene in which no emitter may be sampled.
+            settings = {
+                node: replace(x, sampling_weight=own[node] or 1.0) for node, x in settings.items()
+            }
         return self._parsed.instantiate(settings, self.view)
 
-    def emitted_image(self, light: Light) -> Floats:
-        """The image that `light` emits, (h, w, 3) linear Rec.709, without its scale."""
+    def emitted_image(self, emitter: Emitter) -> Floats:
+        """The image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
         import mitsuba as mi
 
-        path, raw = self._parsed.image_file(light.node, light.kind.parameter)
+        assert emitter.kind is not None
+        path, raw = self._parsed.image_file(emitter.node, emitter.kind.parameter)
         bitmap = mi.Bitmap(str(path))
         if raw:
             bitmap.set_srgb_gamma(False)
@@ -132,12 +170,23 @@ def load_scene(
     sensor: int | str | None = None,
     parameters: Mapping[str, object] | None = None,
     variant: str | None = None,
+    lights: Iterable[str] | None = None,
+    groups: Mapping[str, Iterable[str]] | None = None,
+    lights_file: str | Path | None = None,
+    use_lights_file: bool = True,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
     sensor: index or id of the sensor to look through (the first by default).
     parameters: values for the `$name` parameters of the XML (Mitsuba's `-D`).
     variant: Mitsuba variant to run, where the process has none yet.
+    lights: names or patterns (`window_*`) of the lights to adjust; the others are kept as
+    they are. All by default.
+    groups: name → names or patterns of emitters that are adjusted as one light.
+    lights_file: TOML with such lights and groups, instead of the one beside the scene.
+    `lights` replaces what it lists, `groups` are added to its own or replace namesakes;
+    without `lights` they are adjusted beside what it lists.
+    use_lights_file: False leaves the one beside the scene alone.
 
     Raises SceneError, with Mitsuba's own message where it refuses the scene, and
     BackendError if Mitsuba cannot run.
@@ -154,8 +203,9 @@ def load_scene(
     parsed = ParsedScene(path, values, backend.variant)
     index = _sensor_index(sensor, parsed.sensor_names, path)
 
+    asked = _lights_file(path, lights_file, use_lights_file=use_lights_file)
     loaded = parsed.instantiate({})
-    lights = _find_lights(parsed, loaded)
+    emitters = _find_emitters(parsed, loaded)
     camera = _camera(loaded, parsed.sensor_names[index])
     view = View.of(camera, index)
     spp = int(camera.sampler().sample_count())
@@ -167,7 +217,7 @@ def load_scene(
             f"{path} has a film of {view.crop_size[0]}x{view.crop_size[1]} pixels: "
             "there is nothing to render"
         )
-    if not lights:
+    if not emitters:
         raise SceneError(f"{path} has no lights: add at least one emitter")
 
     return Scene(
@@ -179,9 +229,16 @@ def load_scene(
         integrator=parsed.integrator(),
         has_media=parsed.has_media(),
         has_null=has_null,
-        lights=lights,
+        emitters=emitters,
+        lights=choose_lights(
+            emitters,
+            scene=str(path),
+            lights=_chosen(asked, lights, groups or {}),
+            groups={**asked.groups, **(groups or {})},
+        ),
         files=parsed.files,
-        identity=parsed.identity(index),
+        content=parsed.content(index),
+        lights_file=asked.path,
         _parsed=parsed,
     )
 
@@ -197,8 +254,31 @@ def _has_null_surfaces(loaded: Any) -> bool:
     return any(b is not None and mi.has_flag(b.flags(), mi.BSDFFlags.Null) for b in bsdfs)
 
 
-def _find_lights(parsed: ParsedScene, loaded: Any) -> tuple[Light, ...]:
-    """The lights that take part in the scene, in document order."""
+def _lights_file(scene: Path, named: str | Path | None, *, use_lights_file: bool) -> LightsFile:
+    if named is not None:
+        return read_lights_file(Path(named))
+    beside = lights_file_beside(scene)
+    return read_lights_file(beside) if use_lights_file and beside.is_file() else LightsFile()
+
+
+def _chosen(
+    asked: LightsFile, lights: Iterable[str] | None, groups: Iterable[str]
+) -> Iterable[str] | None:
+    """What to adjust, by the lights file and by what was given along with it."""
+    if lights is not None or asked.lights is None:
+        return lights
+    # Who makes a group here and now means to adjust it.
+    return (*asked.lights, *groups)
+
+
+def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
+    # An emitter the scene keeps switched off is sampled again once it shines.
+    weight = (emitter.sampling_weight or 1.0) if any(rgb) else 0.0
+    return EmitterSetting(emitter.kind, rgb, weight)
+
+
+def _find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
+    """The emitters that take part in the scene, in document order."""
     node_of = {name: node for node, name in parsed.names.items()}
     found = []
     for emitter in loaded.emitters():
@@ -207,21 +287,25 @@ def _find_lights(parsed: ParsedScene, loaded: Any) -> tuple[Light, ...]:
             raise SceneError(f"emitter {name!r} does not stand in {parsed.path} as itself")
         node = parsed.state.nodes[node_of[name]]
         plugin = node.props.plugin_name()
-        kind = emission_kind(emitter, plugin, name)
+        kind = emission_kind(emitter, plugin)
+        if kind is None:
+            check_rendered(emitter, plugin, name, parsed.integrator().plugin)
+        emission = read_emission(emitter, kind, name)
         found.append(
-            Light(
+            Emitter(
                 name=name,
                 plugin=plugin,
                 kind=kind,
-                emission=read_emission(emitter, kind, name),
+                emission=emission,
                 form=describe_form(emitter, plugin),
                 sampling_weight=float(emitter.sampling_weight()),
                 node=node_of[name],
                 file=node.file_index,
                 offset=node.offset - 1,
+                obstacle=why_not_adjusted(plugin, kind, emission),
             )
         )
-    return tuple(sorted(found, key=lambda light: light.node))
+    return tuple(sorted(found, key=lambda emitter: emitter.node))
 
 
 def _sensor_index(wanted: int | str | None, names: Sequence[str], path: Path) -> int:

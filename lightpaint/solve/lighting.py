@@ -25,6 +25,8 @@ class LightSetting:
 
     emission: linear RGB in `unit`, the parameter's own unit in Mitsuba.
     weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
+    is_fixed: whether it is what stays as it is in the scene, with weight 1.
+    members: names of the emitters it consists of; itself if none are given.
     """
 
     name: str
@@ -33,12 +35,20 @@ class LightSetting:
     unit: str
     emission: RGB
     weight: RGB
+    is_fixed: bool = False
+    members: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.members:
+            object.__setattr__(self, "members", (self.name,))
         for what, rgb in (("emission", self.emission), ("weight", self.weight)):
             if not all(math.isfinite(v) and v >= 0 for v in rgb):
                 raise LightingError(
                     f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
+                )
+            if self.is_fixed and rgb != (1, 1, 1):
+                raise LightingError(
+                    f"light {self.name!r} is kept as it is, so its {what} is 1 1 1, not {list(rgb)}"
                 )
 
 
@@ -73,6 +83,19 @@ class Lighting:
         names = [light.name for light in self.lights]
         if len(set(names)) != len(names):
             raise LightingError(f"light names repeat: {', '.join(names)}")
+        members = [name for light in self.lights for name in light.members]
+        if len(set(members)) != len(members):
+            raise LightingError(f"an emitter is in two lights: {', '.join(sorted(members))}")
+
+    @property
+    def members(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the emitters of each light, by its name."""
+        return {light.name: light.members for light in self.lights}
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Names of the lights that stay as they are."""
+        return frozenset(light.name for light in self.lights if light.is_fixed)
 
     @property
     def emission(self) -> Mapping[str, RGB]:
@@ -119,6 +142,13 @@ class Lighting:
                 "lighting and basis name different lights: "
                 f"missing {', '.join(missing) or 'none'}; unknown {', '.join(unknown) or 'none'}"
             )
+        for light in basis.lights:
+            if set(light.members) != set(self.members[light.name]):
+                raise LightingError(
+                    f"light {light.name!r} is not the same in both: of "
+                    f"{', '.join(self.members[light.name])} in the lighting, of "
+                    f"{', '.join(light.members)} in the basis"
+                )
         return np.array([given[name] for name in basis.names], dtype=np.float64)
 
 
@@ -142,6 +172,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
                 "unit": light.unit,
                 "emission": list(light.emission),
                 "weight": list(light.weight),
+                **_ties(light),
             }
             for light in lighting.lights
         },
@@ -194,11 +225,33 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _setting(light: BasisLight, weight: RGB) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
-        light.name, light.plugin, light.parameter, light.unit, emission=weight, weight=weight
+        light.name,
+        light.plugin,
+        light.parameter,
+        light.unit,
+        emission=weight,
+        weight=weight,
+        is_fixed=light.is_fixed,
+        members=light.members,
     )
 
 
+def _ties(light: LightSetting) -> dict[str, Any]:
+    """What the file says of a light only where it does not go without saying."""
+    ties: dict[str, Any] = {}
+    if light.is_fixed:
+        ties["is_fixed"] = True
+    if light.members != (light.name,):
+        ties["members"] = list(light.members)
+    return ties
+
+
 def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
+    is_fixed, members = data.get("is_fixed", False), data.get("members", [name])
+    if not isinstance(is_fixed, bool):
+        raise TypeError(f"is_fixed is true or false, not {is_fixed!r}")
+    if not (isinstance(members, list) and members and all(isinstance(m, str) for m in members)):
+        raise TypeError(f"members is a list of names, not {members!r}")
     return LightSetting(
         name,
         str(data["plugin"]),
@@ -206,6 +259,8 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
         str(data["unit"]),
         _read_rgb(data["emission"]),
         _read_rgb(data["weight"]),
+        is_fixed,
+        tuple(members),
     )
 
 

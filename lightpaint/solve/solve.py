@@ -40,18 +40,25 @@ def solve(
     start: lighting to begin with (the present one by default): a good guess saves sweeps,
     the answer is the same.
 
+    Lights that are kept have weight 1; the others make up what they leave of the target.
+
     Raises SizeError if basis and target differ in size, TargetError if nothing counts.
     """
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     equations = NormalEquations.of(basis, image, importance)
-    begin = basis.present_weights if start is None else start.weights_for(basis)
-    is_scalar = [light.is_scalar for light in basis.lights]
-    result = solve_normal_equations(equations, begin, is_scalar=is_scalar)
+    weights = basis.present_weights if start is None else start.weights_for(basis)
+    free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
+    result = solve_normal_equations(
+        equations.holding(basis.is_fixed),
+        weights[free],
+        is_scalar=[basis.lights[k].is_scalar for k in free],
+    )
+    weights[free] = result.weights
 
-    objective = equations.objective(result.weights)
+    objective = equations.objective(weights)
     norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
-    unreached = tuple(n for n, ok in zip(basis.names, result.reached, strict=True) if not ok)
+    unreached = tuple(basis.names[k] for k, ok in zip(free, result.reached, strict=True) if not ok)
     quality = Quality(
         kkt_residual=_rgb(result.kkt_residual),
         objective=_rgb(objective),
@@ -60,7 +67,7 @@ def solve(
         converged=result.converged,
         unreached=unreached,
     )
-    lighting = Lighting.of_weights(basis, result.weights, target=target.name, quality=quality)
+    lighting = Lighting.of_weights(basis, weights, target=target.name, quality=quality)
     return Solution(lighting, image, importance)
 
 

@@ -23,7 +23,7 @@ def lighting_of(scene: Scene, emission: dict[str, tuple[float, float, float]]) -
     """A lighting that sets the given lights and leaves the others."""
     return Lighting(
         tuple(
-            LightSetting(x.name, x.plugin, x.kind.parameter, x.kind.unit, rgb, rgb)
+            LightSetting(x.name, x.plugin, x.parameter, x.unit, rgb, rgb)
             for x in scene.lights
             for rgb in [emission.get(x.name, x.emission)]
         )
@@ -103,12 +103,12 @@ def test_off_is_black_and_never_sampled_and_the_emitter_stays(tmp_path: Path) ->
     relit = relight(scene, dark, tmp_path / "out" / "relit.xml")
     assert [x.name for x in relit.lights] == [x.name for x in scene.lights]
     assert relit.light("bulb").emission == (0, 0, 0)
-    assert relit.light("bulb").sampling_weight == 0
-    assert relit.light("beam").sampling_weight == 1
+    assert relit.light("bulb").members[0].sampling_weight == 0
+    assert relit.light("beam").members[0].sampling_weight == 1
     # And on again from there.
     again = relight(relit, lighting_of(relit, {"bulb": (1, 2, 3)}), tmp_path / "two" / "relit.xml")
     assert again.light("bulb").emission == (1, 2, 3)
-    assert again.light("bulb").sampling_weight == 1
+    assert again.light("bulb").members[0].sampling_weight == 1
 
 
 def test_all_lights_off_still_loads(tmp_path: Path) -> None:

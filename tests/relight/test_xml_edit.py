@@ -25,10 +25,7 @@ COLOUR = (0.25, 1.5, 3.0)
 def lighting_of(scene: Scene, rgb: RGB) -> Lighting:
     """All lights at `rgb`."""
     return Lighting(
-        tuple(
-            LightSetting(x.name, x.plugin, x.kind.parameter, x.kind.unit, rgb, rgb)
-            for x in scene.lights
-        )
+        tuple(LightSetting(x.name, x.plugin, x.parameter, x.unit, rgb, rgb) for x in scene.lights)
     )
 
 
@@ -130,15 +127,13 @@ def test_old_scenes_keep_their_spelling(tmp_path: Path, version: str) -> None:
     emission: dict[str, RGB] = {bulb.name: (0, 0, 0), sky.name: COLOUR}
     lighting = Lighting(
         tuple(
-            LightSetting(
-                x.name, x.plugin, x.kind.parameter, x.kind.unit, emission[x.name], emission[x.name]
-            )
+            LightSetting(x.name, x.plugin, x.parameter, x.unit, emission[x.name], emission[x.name])
             for x in scene.lights
         )
     )
     relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
     relit.load()
-    assert [x.sampling_weight for x in relit.lights] == [0, 1]
+    assert [x.sampling_weight for x in relit.emitters] == [0, 1]
     text = (tmp_path / "out" / "old.xml").read_text("utf-8")
     assert text.count("samplingWeight") == 1
     assert "sampling_weight" not in text

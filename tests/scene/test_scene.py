@@ -64,7 +64,7 @@ def test_parameters_and_includes(tmp_path: Path) -> None:
     scene = load_scene(path, parameters={"width": 10})
     assert scene.size == (20, 10)
     assert {light.name for light in scene.lights} == {"bulb", "sky"}
-    assert scene.light("bulb").file == 1
+    assert scene.light("bulb").members[0].file == 1
 
 
 def test_identity_follows_files_that_only_the_parser_reads(tmp_path: Path) -> None:
@@ -89,10 +89,12 @@ def test_a_sensor_in_a_shape_is_not_the_camera(tmp_path: Path) -> None:
     assert mitsuba_render(scene, seed=0, spp=2).shape == (20, 24, 3)
 
 
-def test_negative_light_is_refused(tmp_path: Path) -> None:
+def test_light_that_is_no_light_is_named(tmp_path: Path) -> None:
     light = '<emitter type="point" id="hole"><rgb name="intensity" value="1 -2 1"/></emitter>'
-    with pytest.raises(SceneError, match="'hole' has the intensity"):
+    with pytest.raises(SceneError, match="'hole' has a negative intensity"):
         load_scene(write_room(tmp_path, lights=light))
+    with pytest.raises(SceneError, match=r"'hole' has the intensity .*: not finite"):
+        load_scene(write_room(tmp_path, lights=light.replace("-2", "inf")))
 
 
 def test_another_variant_afterwards_is_noticed(tmp_path: Path) -> None:

@@ -218,3 +218,37 @@ def test_a_light_that_stands_twice_is_refused(tmp_path: Path):
     )
     with pytest.raises(LightingError, match="twice among a, a"):
         read_lighting(path)
+
+
+@given(members=st.lists(st.text(max_size=5), min_size=1, unique=True))
+def test_what_a_light_consists_of_there_and_back(
+    tmp_path_factory: pytest.TempPathFactory, members: list[str]
+) -> None:
+    path = tmp_path_factory.mktemp("l") / "lighting.json"
+    one = (1.0, 1.0, 1.0)
+    kept = LightSetting("rest", "area", "emission", "×", one, one, True, tuple(members))
+    write_lighting(path, Lighting((kept,)))
+    assert read_lighting(path).lights == (kept,)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"members": []}, "members is a list"),
+        ({"members": "lamp"}, "members is a list"),
+        ({"members": [1]}, "members is a list"),
+        ({"is_fixed": 1}, "is_fixed is true or false"),
+        ({"is_fixed": True, "weight": [2, 1, 1], "emission": [1, 1, 1]}, "is kept as it is"),
+        ({"members": ["other"]}, "an emitter is in two lights"),
+    ],
+)
+def test_ties_that_are_wrong(tmp_path: Path, change: dict[str, Any], words: str) -> None:
+    path = tmp_path / "lighting.json"
+    one = (1.0, 1.0, 1.0)
+    lights = [LightSetting(name, "area", "radiance", "W", one, one) for name in ("lamp", "other")]
+    write_lighting(path, Lighting(tuple(lights)))
+    data = json.loads(path.read_text(encoding="utf-8"))
+    data["lights"]["lamp"] |= change
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(LightingError, match=words):
+        read_lighting(path)

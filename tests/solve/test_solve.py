@@ -1,10 +1,14 @@
 """From basis and target to lighting: what is minimised, and known lightings coming back."""
 
 import tracemalloc
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from lightpaint.errors import LightingError, SizeError, TargetError
 from lightpaint.solve.lighting import Lighting, combine
@@ -219,3 +223,65 @@ def test_combine_mixes_images_and_noise_alike(make_basis: Any):
     np.testing.assert_allclose(
         estimate.half_difference, np.einsum("nhwc,nc->hwc", halves, w), atol=1e-5
     )
+
+
+def _with_fixed(basis: Any, fixed: list[int]) -> Any:
+    lights = [
+        replace(light, is_fixed=True, emission=(1.0, 1.0, 1.0)) if k in fixed else light
+        for k, light in enumerate(basis.lights)
+    ]
+    return replace(basis, lights=tuple(lights))
+
+
+@given(n=st.integers(2, 6), seed=st.integers(0, 50), data=st.data())
+def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
+    make_basis: Any, n: int, seed: int, data: st.DataObject
+) -> None:
+    fixed = data.draw(st.lists(st.integers(0, n - 1), max_size=n - 1, unique=True))
+    basis = _with_fixed(make_basis(n, SIZE, seed=seed), fixed)
+    target = _target(n / 2 * _random_target(seed + 1).image, _random_target(seed + 2).importance)
+    solution = solve(basis, target)
+    weights = solution.lighting.weights_for(basis)
+    assert (weights[fixed] == 1).all()
+    assert solution.lighting.fixed == {basis.names[k] for k in fixed}
+    assert solution.quality.converged
+
+    free = [k for k in range(n) if k not in fixed]
+    root = np.sqrt(target.importance.astype(np.float64)).ravel()
+    for c in range(3):
+        columns = basis.images[..., c].reshape(n, -1).astype(np.float64) * root
+        left = target.image[..., c].ravel() * root - columns[fixed].sum(axis=0)
+        expected, norm = nnls(columns[free].T, left)
+        # The solver stops at a KKT residual of 1e-10 of a problem that is well conditioned.
+        np.testing.assert_allclose(weights[free, c], expected, atol=1e-7)
+        assert solution.quality.objective[c] == pytest.approx(norm**2, rel=1e-9)
+
+
+@pytest.mark.parametrize("unpainted", [0.0, 0.3])
+def test_keeping_a_light_is_painting_without_it(make_basis: Any, unpainted: float) -> None:
+    basis = make_basis(4, SIZE, seed=5)
+    held = _with_fixed(basis, [1])
+    others = replace(
+        basis,
+        lights=tuple(np.delete(np.array(basis.lights, object), 1)),
+        images=np.delete(basis.images, 1, axis=0),
+        half_differences=np.delete(basis.half_differences, 1, axis=0),
+    )
+    target = _random_target()
+    bare = replace(target, image=target.image - basis.images[1])
+    found = solve(held, target, unpainted=unpainted).lighting.emission
+    alone = solve(others, bare, unpainted=unpainted).lighting.emission
+    for name in others.names:
+        np.testing.assert_allclose(found[name], alone[name], atol=1e-6)  # float32 pixels
+
+
+def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
+    basis = _with_fixed(make_basis(3, SIZE), [0, 2])
+    black = solve(basis, _target(np.zeros((*SIZE, 3)))).lighting
+    assert black.weights_for(basis).tolist() == [[1, 1, 1], [0, 0, 0], [1, 1, 1]]
+    alone = _with_fixed(make_basis(2, SIZE), [0, 1])
+    everything = solve(alone, _random_target())
+    assert everything.quality.converged
+    assert (everything.lighting.weights_for(alone) == 1).all()
+    with pytest.raises(LightingError, match="kept as it is, so its emission is 1 1 1"):
+        black.with_emission(basis.names[0], (2, 2, 2))
