@@ -1,150 +1,160 @@
 """What a basis costs: one pass for all lights against n renders and one beauty render.
 
-    python benchmarks/basis.py [SCENE] [--spp N] [--repeats K]
+    python benchmarks/basis.py [--lights 12 64 256] [--spp N] [--repeats K] [--only M]
 
-Everything runs in one process with its kernels warm, in turns, and ratios are taken between
-neighbours in time. Variance is that of a plane, averaged over pixels and channels, from
-independent renders; "at equal time" divides by what the samples cost.
+12 lights are the gallery's; larger numbers hang in a hall made for the purpose. Everything
+runs in one process with its kernels warm, in turns, and ratios are taken between neighbours
+in time. Loading is not counted. Variance is that of a plane, averaged over pixels and
+channels, from the difference of two independent halves; "at equal time" divides by what the
+samples cost. Where there are many lights, only M of them, evenly spread over the list, are
+rendered alone, and their time is scaled to all.
 """
 
 import argparse
 import gc
+import multiprocessing
+import resource
 import statistics
+import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from hall import write_hall
 
 from lightpaint import load_scene
-from lightpaint.basis.render import BLACK, WHITE
+from lightpaint.basis.render import BLACK, WHITE, render_basis
+from lightpaint.scene.render import Stream, render_loaded
 from lightpaint.scene.scene import Scene
 
 GALLERY = Path(__file__).parent.parent / "scenes" / "gallery" / "scene.xml"
-Image = npt.NDArray[Any]
+HALL_SIZE = {"width": 480, "height": 270}
+
+
+class Run(NamedTuple):
+    """Seconds, and the variance of the mean of each plane."""
+
+    seconds: float
+    variances: npt.NDArray[np.float64]
 
 
 def main() -> None:
-    """Print the table."""
+    """Print a table for each number of lights."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scene", nargs="?", default=GALLERY)
-    parser.add_argument("--spp", type=int, default=16)
+    parser.add_argument("--lights", type=int, nargs="+", default=[12, 64, 256])
+    parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--only", type=int, default=16)
     options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for lights in options.lights:
+            path = GALLERY
+            if lights != 12:
+                path = write_hall(Path(folder), lights, **HALL_SIZE)
+            measure(load_scene(path), options.spp, options.repeats, options.only)
+            for spp in (options.spp // 8, options.spp):
+                print(f"peak memory at {spp:3d} spp: {peak_memory(path, spp) / 1e9:.2f} GB")
 
-    scene = load_scene(options.scene)
+
+def measure(scene: Scene, spp: int, repeats: int, only: int) -> None:
+    """Render and print one table."""
     names = [light.name for light in scene.lights]
     height, width = scene.size
-    print(f"{options.scene}: {len(names)} lights, {width}x{height}, {options.spp} spp\n")
-    runs: dict[str, list[tuple[float, list[Image]]]] = {
-        "one pass": [],
-        "beauty": [],
-        "n renders": [],
-    }
-    for repeat in range(options.repeats + 1):
-        for name, method in (("one pass", one_pass), ("beauty", beauty), ("n renders", separate)):
-            if repeat == 0 and name == "n renders":
-                continue  # its kernels are the beauty render's
-            runs[name].append(method(scene, names, options.spp, seed=repeat))
-            gc.collect()  # the scene it loaded
-            print(f"  {name}: {runs[name][-1][0]:.2f} s", flush=True)
-    runs["one pass"].pop(0)  # the first of each compiled
-    runs["beauty"].pop(0)
-    report(runs, names)
+    # An odd step, for kinds of lights take turns in the hall.
+    alone = names[:: max(1, len(names) // only) | 1]
+    print(f"\n{scene.path.name}: {len(names)} lights, {width}x{height}, {spp} spp")
+    one: list[Run] = []
+    beauty: list[Run] = []
+    own: list[Run] = []
+    for repeat in range(repeats + 1):
+        one.append(one_pass(scene, spp, seed=repeat))
+        beauty.append(beauty_render(scene, names, spp, seed=repeat))
+        print(f"  one pass {one[-1].seconds:.2f} s, beauty {beauty[-1].seconds:.2f} s", flush=True)
+        if repeat == 0:  # kernels are compiled
+            one.clear()
+            beauty.clear()
+            continue
+        own.append(separate(scene, alone, names, spp, seed=repeat))
+        print(f"  n renders {own[-1].seconds:.2f} s", flush=True)
+    report(names, alone, one=one, beauty=beauty, own=own)
 
 
-def timed(work: Callable[[], Image]) -> tuple[float, Image]:
-    """(seconds, result) of `work`."""
-    start = time.perf_counter()
-    result = work()
-    return time.perf_counter() - start, result
+def one_pass(scene: Scene, spp: int, *, seed: int) -> Run:
+    """The basis as lightpaint renders it, from the first pass to the finished arrays."""
+    begun: list[float] = []
+
+    def progress(_label: str, _done: int, _total: int) -> None:
+        begun.append(time.perf_counter())
+
+    basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
+    seconds = time.perf_counter() - begun[0]
+    variances = np.square(basis.half_differences, dtype=np.float64).mean(axis=(1, 2, 3))
+    del basis
+    gc.collect()
+    return Run(seconds, variances)
 
 
-def one_pass(scene: Scene, names: list[str], spp: int, *, seed: int) -> tuple[float, list[Image]]:
-    """All planes from one pass."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from lightpaint.basis.lightgroups import accumulate, lights_by_instance
-
-    height, width = scene.size
-    loaded = scene.load(dict.fromkeys(names, WHITE))
-    planes = dr.zeros(mi.Float, len(names) * height * width * 3)
-    seen = dr.zeros(mi.Float, height * width)
-    light_of = lights_by_instance(loaded, scene.plane_of)
-    dr.eval(planes, seen)
-
-    def work() -> Image:
-        accumulate(
-            loaded,
-            scene.integrator,
-            camera=scene.camera(loaded),
-            light_of=light_of,
-            planes=planes,
-            seen=seen,
-            seed=seed,
-            spp=spp,
-            turn=(seed * 1000, 0),
-        )
-        return np.array(planes)
-
-    seconds, result = timed(work)
-    images = list(result.reshape(len(names), height, width, 3) / spp)
-    return seconds, images
-
-
-def beauty(scene: Scene, names: list[str], spp: int, *, seed: int) -> tuple[float, list[Image]]:
+def beauty_render(scene: Scene, names: list[str], spp: int, *, seed: int) -> Run:
     """One ordinary render with all lights on."""
-    return render(scene, dict.fromkeys(names, WHITE), spp, seed)
+    return _render(scene, dict.fromkeys(names, WHITE), spp, seed)
 
 
-def separate(scene: Scene, names: list[str], spp: int, *, seed: int) -> tuple[float, list[Image]]:
-    """One ordinary render per light; loading is not counted."""
-    total, images = 0.0, []
-    for k, name in enumerate(names):
+def separate(scene: Scene, alone: list[str], names: list[str], spp: int, *, seed: int) -> Run:
+    """An ordinary render for each light in `alone`; time for all."""
+    runs = []
+    for k, name in enumerate(alone):
         emission = {other: WHITE if other == name else BLACK for other in names}
-        seconds, image = render(scene, emission, spp, seed * 1000 + k)
-        total += seconds
-        images += image
-    return total, images
+        runs.append(_render(scene, emission, spp, seed * 1000 + k))
+    seconds = sum(run.seconds for run in runs) / len(alone) * len(names)
+    return Run(seconds, np.concatenate([run.variances for run in runs]))
 
 
-def render(scene: Scene, emission: Any, spp: int, seed: int) -> tuple[float, list[Image]]:
-    """`mi.render` of the scene, its film overridden as for the basis."""
-    import mitsuba as mi
-
+def _render(
+    scene: Scene, emission: dict[str, tuple[float, float, float]], spp: int, seed: int
+) -> Run:
     loaded = scene.load(emission)
-    seconds, image = timed(
-        lambda: np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
+    start = time.perf_counter()
+    image = render_loaded(loaded, scene, spp=spp, seed=seed, stream=Stream.TEMPLATE)
+    seconds = time.perf_counter() - start
+    del loaded
+    gc.collect()
+    return Run(
+        seconds, np.square(image.half_difference, dtype=np.float64).mean(keepdims=True)[0, 0]
     )
-    return seconds, [image[..., :3]]
 
 
-def report(runs: dict[str, list[tuple[float, list[Image]]]], names: list[str]) -> None:
+def report(
+    names: list[str], alone: list[str], *, one: list[Run], beauty: list[Run], own: list[Run]
+) -> None:
     """Print times as medians, ratios as medians of the ratios run by run."""
-    times = {name: [seconds for seconds, _ in made] for name, made in runs.items()}
     print(f"\n{'method':12s} {'median s':>9s} {'of a beauty render':>19s}")
-    for name, seconds in times.items():
-        ratio = statistics.median(a / b for a, b in zip(seconds, times["beauty"], strict=True))
-        print(f"{name:12s} {statistics.median(seconds):9.2f} {ratio:18.2f}x")
-    speed = statistics.median(
-        a / b for a, b in zip(times["n renders"], times["one pass"], strict=True)
-    )
+    for name, runs in (("one pass", one), ("beauty", beauty), ("n renders", own)):
+        ratio = statistics.median(a.seconds / b.seconds for a, b in zip(runs, beauty, strict=True))
+        print(f"{name:12s} {statistics.median(r.seconds for r in runs):9.2f} {ratio:18.2f}x")
+    speed = statistics.median(a.seconds / b.seconds for a, b in zip(own, one, strict=True))
     print(f"\none pass is {speed:.1f}x faster than {len(names)} renders at equal spp\n")
-    if len(times["beauty"]) < 2:
-        return
     print(f"{'light':16s} {'variance vs its own render':>27s} {'at equal time':>14s}")
+    ours = np.mean([run.variances for run in one], axis=0)
+    theirs = np.mean([run.variances for run in own], axis=0)
     gains = []
-    for k, name in enumerate(names):
-        one, own = (
-            np.var([images[k] for _, images in runs[m]], axis=0, ddof=1).mean()
-            for m in ("one pass", "n renders")
-        )
-        gains.append(speed * own / one)
-        print(f"{name:16s} {one / own:26.2f}x {gains[-1]:13.1f}x lower")
-    print(f"{'geometric mean':43s} {np.exp(np.mean(np.log(gains))):14.1f}x lower")
+    for k, name in enumerate(alone):
+        ratio = ours[names.index(name)] / theirs[k]
+        gains.append(speed / ratio)
+        print(f"{name:16s} {ratio:26.2f}x {gains[-1]:13.1f}x lower")
+    print(f"{'geometric mean':43s} {np.exp(np.mean(np.log(gains))):14.1f}x lower\n")
+
+
+def peak_memory(path: Path, spp: int) -> int:
+    """Bytes that a process takes which renders that basis and nothing else."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(_render_and_look, (path, spp))
+
+
+def _render_and_look(path: Path, spp: int) -> int:
+    render_basis(load_scene(path), spp=spp)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 if __name__ == "__main__":

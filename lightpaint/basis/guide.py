@@ -74,10 +74,18 @@ class Guide:
         if not self._learning:
             return
         # As it will be read from a file, so that going on from one makes no difference.
-        received, asked = self.learned().astype(np.float64)
-        cumulative = np.cumsum(_probabilities(received, asked, self._lights), axis=1)
+        received, asked = self.learned()
+        # Most cells of the table are nowhere: there the choice is even.
+        known = asked.any(axis=1)
+        cumulative = np.tile(
+            np.arange(1, self.count + 1, dtype=np.float32) / self.count, (self.cells, 1)
+        )
+        found = _probabilities(
+            received[known].astype(np.float64), asked[known].astype(np.float64), self._lights
+        )
+        cumulative[known] = np.cumsum(found, axis=1)
         cumulative[:, -1] = 1
-        self._cumulative = mi.Float(cumulative.astype(np.float32).ravel())
+        self._cumulative = mi.Float(cumulative.ravel())
         self._learning = bool(asked.sum() < ENOUGH)
         self._learns = dr.opaque(mi.Bool, self._learning)
         dr.eval(self._cumulative)
