@@ -240,6 +240,28 @@ def test_other_samplers(tmp_path: Path, sampler: str) -> None:
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
 
 
+@pytest.mark.parametrize(
+    "wrapper",
+    [
+        '<integrator type="aov"><string name="aovs" value="dd:depth,nn:sh_normal"/>{}</integrator>',
+        '<integrator type="moment">{}</integrator>',
+        '<integrator type="moment"><integrator type="aov"><string name="aovs" value="dd:depth"/>'
+        "{}</integrator></integrator>",
+    ],
+)
+def test_a_wrapped_path_is_one_pass(tmp_path: Path, wrapper: str) -> None:
+    scene = load_scene(write_room(tmp_path, integrator=wrapper.format(INTEGRATORS["path"])))
+    assert why_not_one_pass(scene) is None
+    planes = one_pass(scene, seed=11, spp=16)
+    rendered = mitsuba_render(scene, {x.name: WHITE for x in scene.lights}, seed=11, spp=16)
+    assert rendered.max() > 0
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+    inside = load_scene(
+        write_room(tmp_path, integrator=wrapper.format("<integrator type='volpath'/>"))
+    )
+    assert "volpath" in str(why_not_one_pass(inside))
+
+
 def test_wrapped_integrators_hide_what_the_inner_one_hides(tmp_path: Path) -> None:
     inner = '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>'
     aovs = '<string name="aovs" value="dd:depth"/>'
