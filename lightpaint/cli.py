@@ -58,12 +58,14 @@ def _parser() -> argparse.ArgumentParser:
     basis = _command(commands, "basis", "render the image of each light alone")
     _add_scene(basis)
     _add_sampling(basis)
+    _add_resolution(basis)
     _add_cache(basis)
     _add_output(basis, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
 
     template = _command(commands, "template", "render the current look, to paint over")
     _add_scene(template)
     _add_sampling(template)
+    _add_resolution(template)
     _add_output(template, "F.exr", "file to write, a PNG beside it (default: template.exr)")
     template.add_argument(
         "--force", action="store_true", help="replace an existing file (default: refuse)"
@@ -91,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
     _add_sampling(solve)
+    _add_resolution(solve)
     _add_cache(solve)
     _add_view(solve)
 
@@ -163,6 +166,15 @@ def _add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene'
         default=0,
         metavar="S",
         help="random seed (default: %(default)s)",
+    )
+
+
+def _add_resolution(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--resolution",
+        metavar="1/N|WxH",
+        help="render on a film reduced by a whole factor, like 1/4 or 320x180; the verification "
+        "of solve keeps the whole film (default: the whole film)",
     )
 
 

@@ -29,7 +29,7 @@ from lightpaint.relight.verify import Verification
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.solve.lighting import read_lighting
-from lightpaint.target.target import read_target
+from lightpaint.target.target import Target, read_target
 
 
 def lights(options: Namespace, _given: list[str]) -> int:
@@ -111,7 +111,7 @@ def solve(options: Namespace, given: list[str]) -> int:
     else:
         scene, made = _load(options, path=source), None
         size = scene.size
-    targets = [target.fitted_to(size, resize=options.resize) for target in targets]
+    targets = [_fitted(target, size, options) for target in targets]
     for folder in folders:
         check_writable(folder)
         if scene is not None:
@@ -208,6 +208,8 @@ def _load(options: Namespace, *, path: Path | None = None, say_how: bool = True)
         parameters=dict(options.parameters),
         variant=options.variant,
     )
+    if resolution := getattr(options, "resolution", None):
+        scene = scene.reduced(resolution)
     if note := use_variant().note:
         console.say(note)
     elif say_how and (reason := why_not_one_pass(scene)):
@@ -215,6 +217,17 @@ def _load(options: Namespace, *, path: Path | None = None, say_how: bool = True)
             f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
         )
     return scene
+
+
+def _fitted(target: Target, size: tuple[int, int], options: Namespace) -> Target:
+    """`target` at the size of the basis. Says so where nobody has asked for another size."""
+    fitted = target.fitted_to(size, resize=options.resize)
+    if fitted.size != target.size and not (options.resize or options.resolution):
+        console.say(
+            f"{target.name}: {target.size[1]}x{target.size[0]} pixels averaged to the basis's "
+            f"{size[1]}x{size[0]}"
+        )
+    return fitted
 
 
 def _basis(scene: Scene, options: Namespace) -> Basis:
@@ -300,7 +313,7 @@ def _folders(output: str | None, names: Sequence[str]) -> list[Path]:
 
 def _check_nothing_to_render(options: Namespace) -> None:
     asked = {"-s": options.sensor, "-D": options.parameters, "-m": options.variant}
-    asked |= {"--spp": options.spp}
+    asked |= {"--spp": options.spp, "--resolution": options.resolution}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"

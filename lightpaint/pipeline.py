@@ -11,6 +11,7 @@ from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.render import is_of, render_basis
 from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError
 from lightpaint.files import check_writable, write_text
+from lightpaint.images.blocks import whole_factor
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.progress import Progress, silent
@@ -74,6 +75,7 @@ def paint_with_light(
     spp: int | None = None,
     seed: int = 0,
     sensor: int | str | None = None,
+    resolution: str | None = None,
     parameters: Mapping[str, object] | None = None,
     resize: bool = False,
     use_cache: bool = True,
@@ -87,6 +89,8 @@ def paint_with_light(
     a scene, relit.xml and verified.exr.
     basis: one made before of the same scene; taken from the cache or rendered if not given.
     unpainted: weight of unpainted pixels against the current look.
+    resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
+    verification has the whole film.
     spp, seed: of the basis and, with other random numbers, of the verification.
 
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
@@ -94,6 +98,8 @@ def paint_with_light(
     folder = Path(folder)
     if isinstance(scene, str | Path):
         scene = load_scene(scene, sensor=sensor, parameters=parameters)
+    if scene is not None and resolution is not None:
+        scene = scene.reduced(resolution)
     if isinstance(basis, str | Path):
         basis = read_basis(Path(basis))
     if scene is not None and basis is not None:
@@ -150,6 +156,11 @@ def check_same_view(scene: Scene, basis: Basis) -> None:
             f"the basis shows {what}: it was made of {origin.scene} through {origin.sensor}, not "
             f"of {scene.path} as it is through {sensor}; make it again"
         )
+    if whole_factor(scene.size, basis.size) is None:
+        raise BasisError(
+            f"the basis is {basis.size[1]}x{basis.size[0]} but {scene.path} renders "
+            f"{scene.size[1]}x{scene.size[0]}, which is no whole multiple: make it again"
+        )
 
 
 def obtain_basis(
@@ -166,7 +177,7 @@ def obtain_basis(
     """
     if not use_cache:
         return render_basis(scene, spp=spp, seed=seed, progress=progress)
-    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed)
+    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if start is not None and not is_of(scene, start, seed):
         start = None
     basis = render_basis(scene, spp=spp, seed=seed, start=start, keep=cache.keep, progress=progress)

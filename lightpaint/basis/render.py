@@ -80,11 +80,11 @@ def render_basis(
     if len(scene.lights) * height * width * 3 >= 2**32:
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
-            "use a smaller film or fewer lights"
+            "use --resolution or fewer lights"
         )
     check_memory(scene)
     if start is not None and not is_of(scene, start, seed):
-        raise BasisError("the basis to go on from was made of another scene, sensor or seed")
+        raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and start.origin.spp >= spp:
         return start
     if why_not_one_pass(scene) is None:
@@ -109,7 +109,7 @@ def check_memory(scene: Scene) -> None:
         height, width = scene.size
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB are free: use a smaller film or fewer lights"
+            f"{free / 1e9:.1f} GB are free: use --resolution or fewer lights"
         )
 
 
@@ -124,10 +124,10 @@ def _free_memory() -> int | None:
 
 
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Whether `basis` was made of `scene` as it is, through its sensor, under `seed`."""
+    """Whether `basis` was made of `scene` as it is, through its sensor and film, under `seed`."""
     method = basis.origin.method
     mine = _origin(scene, seed, method, basis.origin.halves, basis.origin.passes)
-    return basis.origin == mine
+    return basis.origin == mine and basis.size == scene.size
 
 
 def _origin(

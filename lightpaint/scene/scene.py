@@ -6,7 +6,7 @@ time, and no reference to one of its emitters may outlive it.
 
 import gc
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from lightpaint.errors import SceneError
 from lightpaint.images.exr import Floats
 from lightpaint.scene.emitters import RGB, EmissionKind, describe_form, emission_kind, read_emission
 from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, View
+from lightpaint.scene.resolution import reduced, reduction
 from lightpaint.scene.variant import use_variant
 
 
@@ -45,7 +46,8 @@ class Scene:
     view: the sensor it is seen through, and its film.
     spp: samples per pixel the scene itself asks for.
     has_null: whether rays may pass a surface as if it were not there.
-    identity: hash of the content of all XML files and assets, the parameters and the sensor.
+    identity: hash of the content of all XML files and assets, the parameters and the sensor;
+    the same for the scene on a reduced film.
     """
 
     path: Path
@@ -80,6 +82,14 @@ class Scene:
         raise SceneError(
             f"{self.path} has no light {name!r}: it has {', '.join(x.name for x in self.lights)}"
         )
+
+    def reduced(self, resolution: str) -> "Scene":
+        """This scene on a smaller film of the same field of view.
+
+        resolution: `1/4`, or `320x180`: a part of the film that cuts it into whole blocks of
+        pixels. Raises SceneError, with sizes that would do, for any other.
+        """
+        return replace(self, view=reduced(self.view, reduction(self.view, resolution)))
 
     def camera(self, loaded: Any) -> Any:
         """The sensor this scene is seen through, in what `load` returned."""
