@@ -57,8 +57,7 @@ def _parser() -> argparse.ArgumentParser:
 
     basis = _command(commands, "basis", "render the image of each light alone")
     _add_scene(basis)
-    _add_sampling(basis)
-    _add_resolution(basis)
+    _add_budget(basis)
     _add_cache(basis)
     _add_output(basis, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
 
@@ -92,8 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
-    _add_sampling(solve)
-    _add_resolution(solve)
+    _add_budget(solve)
     _add_cache(solve)
     _add_view(solve)
 
@@ -157,9 +155,39 @@ def _add_variant(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene's") -> None:
+    _add_spp(parser, default)
+    _add_seed(parser)
+
+
+def _add_budget(parser: argparse.ArgumentParser) -> None:
+    """What a basis may cost."""
+    group = parser.add_mutually_exclusive_group()
+    _add_spp(group, "the scene's")
+    group.add_argument(
+        "--time",
+        dest="time_s",
+        type=_seconds,
+        metavar="SECONDS",
+        help="instead: render the basis for so long, besides what earlier runs have kept; "
+        "compiling counts, the verification does not",
+    )
+    parser.add_argument(
+        "--quality",
+        choices=("preview", "final"),
+        help="preview: 64 samples per pixel on a film of some 30,000 pixels; final: 512 on the "
+        "whole film; --spp, --time and --resolution go before",
+    )
+    _add_resolution(parser)
+    _add_seed(parser)
+
+
+def _add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
     parser.add_argument(
         "--spp", type=_at_least(2), metavar="N", help=f"samples per pixel (default: {default})"
     )
+
+
+def _add_seed(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed",
         type=_at_least(0),
@@ -212,6 +240,16 @@ class _at_least:  # noqa: N801 (used as a function)
         if value < self.bound:
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number >= {self.bound}")
         return value
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds > 0")
+    return value
 
 
 def _weight(text: str) -> float:

@@ -440,7 +440,7 @@ def test_killed_at_any_moment_leaves_a_readable_basis(tmp_path: Path, delay_s: f
     code = f"""
 import lightpaint.scene.render, lightpaint as lp, sys
 from lightpaint.pipeline import obtain_basis
-sys.modules["lightpaint.basis.render"].KEEP_EVERY_S = 0
+sys.modules["lightpaint.basis.budget"].KEEP_EVERY_S = 0
 lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
 scene = lp.load_scene({str(CORNELL)!r})
 print("ready", flush=True)

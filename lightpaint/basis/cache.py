@@ -71,6 +71,13 @@ def keep(basis: Basis) -> bool:
     return True
 
 
+def is_kept(basis: Basis) -> bool:
+    """Whether `basis` is kept, with all its samples."""
+    origin = basis.origin
+    path = _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
+    return path.is_file() and _origin_of(path) == origin
+
+
 def _prune(path: Path) -> None:
     """Bring the folder back under LARGEST, and keep `path`."""
     for leftover in folder().glob(f".*{SUFFIX}.*"):

@@ -1,6 +1,9 @@
 """Images of one picture at two sizes, one a whole multiple of the other."""
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.images.exr import Floats
 
@@ -29,6 +32,6 @@ def block_mean(image: Floats, factor: int) -> Floats:
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64).astype(image.dtype))
 
 
-def enlarged(image: Floats, factor: int) -> Floats:
+def enlarged(image: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
     """Every pixel repeated factor x factor times."""
     return image.repeat(factor, axis=0).repeat(factor, axis=1)

@@ -49,8 +49,10 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     return relit
 
 
-def check_relightable(scene: Scene, path: Path) -> None:
+def check_relightable(scene: Scene, path: Path) -> list[Path]:
     """Raise what `relight` would raise for some lighting, before a render is paid for.
+
+    Returns the files that it would write at most.
 
     The probe is a colour that no light has, so that every light needs all it may need.
     """
@@ -58,7 +60,7 @@ def check_relightable(scene: Scene, path: Path) -> None:
         light.name: (0.5, 0.5, 0.5) if light.kind.is_scalar else (0.5, 0.25, 0.125)
         for light in scene.lights
     }
-    relit_files(scene, probe, path)
+    return list(relit_files(scene, probe, path))
 
 
 def check_same_lights(scene: Scene, lighting: Lighting) -> None:

@@ -35,7 +35,14 @@ def pass_seed(seed: int, stream: Stream, index: int) -> int:
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
 
 
-def plan_passes(pixels: int, spp: int, *, done: tuple[int, int] = (0, 0)) -> list[tuple[int, int]]:
+def largest_pass(pixels: int, *, shorter: int = 1) -> int:
+    """Samples per pixel of a whole pass. shorter: the part of SAMPLES_PER_PASS it may have."""
+    return max(1, SAMPLES_PER_PASS // shorter // pixels)
+
+
+def plan_passes(
+    pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1
+) -> list[tuple[int, int]]:
     """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
 
     spp: what both halves come to together, or one more to make them equal.
@@ -43,7 +50,7 @@ def plan_passes(pixels: int, spp: int, *, done: tuple[int, int] = (0, 0)) -> lis
     """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
-    largest = max(1, SAMPLES_PER_PASS // pixels)
+    largest = largest_pass(pixels, shorter=shorter)
     lists = []
     for half in range(2):
         left = max(0, -(-spp // 2) - done[half])

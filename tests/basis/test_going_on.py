@@ -80,8 +80,8 @@ def test_enough_is_enough(tmp_path: Path) -> None:
 def test_nothing_is_mixed(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path))
     basis = render_basis(scene, spp=4)
-    with pytest.raises(BasisError, match="another scene, sensor or seed"):
+    with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
         render_basis(scene, spp=8, seed=1, start=basis)
     changed = load_scene(write_room(tmp_path), parameters={"width": 20})
-    with pytest.raises(BasisError, match="another scene, sensor or seed"):
+    with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
         render_basis(changed, spp=8, start=basis)

@@ -119,8 +119,8 @@ def test_the_file_holds_the_image(make_basis: Any, tmp_path: Path):
 
 def test_another_size_is_refused(make_basis: Any):
     look = _look(make_basis)
-    other = make_basis(3, (12, 16))
-    with pytest.raises(SizeError, match="32x24 but the basis is 16x12"):
+    other = make_basis(3, (12, 17))
+    with pytest.raises(SizeError, match="32x24 but the basis is 17x12"):
         comparison_image(**{**look, "basis": other})
 
 
