@@ -52,20 +52,22 @@ def restoring(folder: Path, files: Iterable[Path]) -> Iterator[None]:
     If it raises or is interrupted, they are put back, and what it has made of them is deleted.
     Moving takes no space, so that they survive a full disk.
     """
-    files = [file.relative_to(folder) for file in files]
+    files = list(dict.fromkeys(file.relative_to(folder) for file in files))
     there = [file for file in files if (folder / file).is_file()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         aside = Path(tempfile.mkdtemp(prefix=ASIDE, dir=folder))
-        _move(there, folder, aside)
     except OSError as error:
         raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
     try:
+        _move(there, folder, aside)
         yield
     except BaseException:
+        moved = [file for file in there if (aside / file).is_file()]
         for file in files:
-            (folder / file).unlink(missing_ok=True)
-        _move(there, aside, folder)
+            if file in moved or file not in there:
+                (folder / file).unlink(missing_ok=True)
+        _move(moved, aside, folder)
         shutil.rmtree(aside, ignore_errors=True)
         with suppress(OSError):
             folder.rmdir()  # if nothing was in it before
@@ -76,9 +78,13 @@ def restoring(folder: Path, files: Iterable[Path]) -> Iterator[None]:
 
 
 def _move(files: Iterable[Path], source: Path, target: Path) -> None:
-    for file in files:
-        (target / file).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(source / file, target / file)
+    try:
+        for file in files:
+            (target / file).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source / file, target / file)
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(f"cannot move {source / file} to {target}: {reason}") from error
 
 
 def check_writable(folder: Path) -> None:
