@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import load_scene
-from lightpaint.basis.render import BLACK, WHITE
+from lightpaint.basis.separate import BLACK, WHITE
 from lightpaint.scene.scene import Scene
 
 GALLERY = Path(__file__).parent.parent / "scenes" / "gallery" / "scene.xml"
