@@ -59,13 +59,14 @@ def _parser() -> argparse.ArgumentParser:
     basis = _command(commands, "basis", "render the image of each light alone")
     _add_scene(basis)
     _add_lights(basis)
-    _add_sampling(basis)
+    _add_budget(basis)
     _add_cache(basis)
     _add_output(basis, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
 
     template = _command(commands, "template", "render the current look, to paint over")
     _add_scene(template)
     _add_sampling(template)
+    _add_resolution(template)
     _add_output(template, "F.exr", "file to write, a PNG beside it (default: template.exr)")
     template.add_argument(
         "--force", action="store_true", help="replace an existing file (default: refuse)"
@@ -93,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
     _add_lights(solve)
-    _add_sampling(solve)
+    _add_budget(solve)
     _add_cache(solve)
     _add_view(solve)
 
@@ -188,15 +189,54 @@ def _add_variant(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene's") -> None:
+    _add_spp(parser, default)
+    _add_seed(parser)
+
+
+def _add_budget(parser: argparse.ArgumentParser) -> None:
+    """What a basis may cost."""
+    group = parser.add_mutually_exclusive_group()
+    _add_spp(group, "the scene's")
+    group.add_argument(
+        "--time",
+        dest="time_s",
+        type=_seconds,
+        metavar="SECONDS",
+        help="instead: render the basis for so long, besides what earlier runs have kept; "
+        "compiling counts, the verification does not",
+    )
+    parser.add_argument(
+        "--quality",
+        choices=("preview", "final"),
+        help="preview: 64 samples per pixel on a film of some 30,000 pixels; final: 512 on the "
+        "whole film; --spp, --time and --resolution go before",
+    )
+    _add_resolution(parser)
+    _add_seed(parser)
+
+
+def _add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
     parser.add_argument(
         "--spp", type=_at_least(2), metavar="N", help=f"samples per pixel (default: {default})"
     )
+
+
+def _add_seed(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed",
         type=_at_least(0),
         default=0,
         metavar="S",
         help="random seed (default: %(default)s)",
+    )
+
+
+def _add_resolution(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--resolution",
+        metavar="1/N|WxH",
+        help="render on a film reduced by a whole factor, like 1/4 or 320x180; the verification "
+        "of solve keeps the whole film (default: the whole film)",
     )
 
 
@@ -248,6 +288,16 @@ class _at_least:  # noqa: N801 (used as a function)
         if value < self.bound:
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number >= {self.bound}")
         return value
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds > 0")
+    return value
 
 
 def _weight(text: str) -> float:

@@ -29,10 +29,11 @@ from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.scene.emitters import MULTIPLE
 from lightpaint.scene.lights import WHOLE_EMISSION, Light
+from lightpaint.scene.quality import with_quality
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.solve.lighting import read_lighting
-from lightpaint.target.target import read_target
+from lightpaint.target.target import Target, read_target
 
 
 def lights(options: Namespace, _given: list[str]) -> int:
@@ -97,8 +98,8 @@ def basis(options: Namespace, _given: list[str]) -> int:
     output = Path(options.output or Path(options.scene).stem + ".basis.exr")
     _check_suffix(output)
     check_writable(output.parent)
-    scene = _load(options)
-    made = _basis(scene, options)
+    scene, spp = _with_quality(_load(options), options)
+    made = _basis(scene, spp, options)
     write_basis(output, made)
     kept = " and what is kept" if made.is_fixed.any() else ""
     count = int((~made.is_fixed).sum())
@@ -118,6 +119,8 @@ def template(options: Namespace, _given: list[str]) -> int:
             )
     check_writable(output.parent)
     scene = _load(options, is_to_solve=False)
+    if options.resolution:
+        scene = scene.reduced(options.resolution)
     with console.progress() as progress:
         picture = render_template(
             scene, output, spp=options.spp, seed=options.seed, progress=progress
@@ -136,12 +139,12 @@ def solve(options: Namespace, given: list[str]) -> int:
     source = Path(options.source)
     if is_basis_file(source):
         _check_nothing_to_render(options)
-        scene, made = None, read_basis(source)
+        scene, made, spp = None, read_basis(source), None
         size = made.size
     else:
-        scene, made = _load(options, path=source), None
-        size = scene.size
-    targets = [target.fitted_to(size, resize=options.resize) for target in targets]
+        scene, spp = _with_quality(_load(options, path=source), options)
+        made, size = None, scene.size
+    targets = [_fitted(target, size, options) for target in targets]
     for folder in folders:
         check_writable(folder)
         if scene is not None:
@@ -150,7 +153,7 @@ def solve(options: Namespace, given: list[str]) -> int:
     for target, folder in zip(targets, folders, strict=True):
         _warn_of_pixels(target.not_finite, target.name)
         if made is None and scene is not None:
-            made = _basis(scene, options)
+            made = _basis(scene, spp, options)
         with console.progress() as progress:
             look = paint_with_light(
                 scene,
@@ -159,6 +162,8 @@ def solve(options: Namespace, given: list[str]) -> int:
                 basis=made,
                 unpainted=options.unpainted,
                 spp=options.spp,
+                time_s=options.time_s,
+                quality=options.quality,
                 seed=options.seed,
                 command=command_line(given),
                 progress=progress,
@@ -266,7 +271,29 @@ def _load(options: Namespace, *, path: Path | None = None, is_to_solve: bool = T
     return scene
 
 
-def _basis(scene: Scene, options: Namespace) -> Basis:
+def _with_quality(scene: Scene, options: Namespace) -> tuple[Scene, int | None]:
+    """The scene on the film that was asked for, and samples per pixel."""
+    return with_quality(
+        scene,
+        options.quality,
+        spp=options.spp,
+        time_s=options.time_s,
+        resolution=options.resolution,
+    )
+
+
+def _fitted(target: Target, size: tuple[int, int], options: Namespace) -> Target:
+    """`target` at the size of the basis. Says so where nobody has asked for another size."""
+    fitted = target.fitted_to(size, resize=options.resize)
+    if fitted.size != target.size and not (options.resize or options.resolution or options.quality):
+        console.say(
+            f"{target.name}: {target.size[1]}x{target.size[0]} pixels averaged to the basis's "
+            f"{size[1]}x{size[0]}"
+        )
+    return fitted
+
+
+def _basis(scene: Scene, spp: int | None, options: Namespace) -> Basis:
     """Render the basis, or say that it was there already."""
     if (needed := memory_needed(scene)) > 2e9:
         console.say(
@@ -276,17 +303,23 @@ def _basis(scene: Scene, options: Namespace) -> Basis:
     rendered = False
     with console.progress() as report:
 
-        def progress(label: str, done: int, total: int) -> None:
+        def progress(label: str, done: int, total: int, unit: str = "passes") -> None:
             nonlocal rendered
             rendered = True
-            report(label, done, total)
+            report(label, done, total, unit)
 
         made = obtain_basis(
             scene,
-            spp=options.spp,
+            spp=spp,
+            time_s=options.time_s,
             seed=options.seed,
             use_cache=options.cache,
             progress=progress,
+        )
+    if options.cache and not bases.is_kept(made):
+        console.say(
+            f"the basis could not be kept in {bases.folder()}, so the next run renders it again: "
+            "is the disk full, or the folder not yours?"
         )
     if not rendered:
         console.say(
@@ -360,6 +393,8 @@ def _check_nothing_to_render(options: Namespace) -> None:
     asked = {"-s": options.sensor, "-D": options.parameters, "-m": options.variant}
     asked |= {"--lights": options.lights, "--group": options.groups}
     asked |= {"--lights-file": options.lights_file, "--spp": options.spp}
+    asked |= {"--time": options.time_s, "--quality": options.quality}
+    asked |= {"--resolution": options.resolution}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"

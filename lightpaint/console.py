@@ -67,14 +67,15 @@ def progress() -> Iterator[Report]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         tasks = {}
 
-        def report(label: str, done: int, total: int) -> None:
+        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             if label not in tasks:
-                tasks[label] = bars.add_task(label, total=total)
+                what = label if unit == "passes" else f"{label} ({unit})"
+                tasks[label] = bars.add_task(what, total=total)
             bars.update(tasks[label], completed=done, total=total)
 
         yield report
 
 
-def _report_line(label: str, done: int, total: int) -> None:
+def _report_line(label: str, done: int, total: int, unit: str = "passes") -> None:
     if done == 0:
-        print(f"{label}: {total} passes", file=sys.stderr, flush=True)
+        print(f"{label}: {total} {unit}", file=sys.stderr, flush=True)

@@ -1,12 +1,16 @@
 """Writing files so that a reader never sees half of one."""
 
 import os
+import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lightpaint.errors import OutputError
+
+#: What the name of a folder begins with in which earlier results wait.
+ASIDE = ".earlier."
 
 
 @contextmanager
@@ -39,6 +43,48 @@ def write_bytes(path: Path, data: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write `text` to `path` as UTF-8, whole or not at all."""
     write_bytes(path, text.encode("utf-8"))
+
+
+@contextmanager
+def restoring(folder: Path, files: Iterable[Path]) -> Iterator[None]:
+    """Move `files`, all below `folder`, out of the way of those that the block writes.
+
+    If it raises or is interrupted, they are put back, and what it has made of them is deleted.
+    Moving takes no space, so that they survive a full disk.
+    """
+    files = list(dict.fromkeys(file.relative_to(folder) for file in files))
+    there = [file for file in files if (folder / file).is_file()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        aside = Path(tempfile.mkdtemp(prefix=ASIDE, dir=folder))
+    except OSError as error:
+        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+    try:
+        _move(there, folder, aside)
+        yield
+    except BaseException:
+        moved = [file for file in there if (aside / file).is_file()]
+        for file in files:
+            if file in moved or file not in there:
+                (folder / file).unlink(missing_ok=True)
+        _move(moved, aside, folder)
+        shutil.rmtree(aside, ignore_errors=True)
+        with suppress(OSError):
+            folder.rmdir()  # if nothing was in it before
+        raise
+    # With what a killed process could not put back: this result takes its place as well.
+    for old in folder.glob(f"{ASIDE}*"):
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _move(files: Iterable[Path], source: Path, target: Path) -> None:
+    try:
+        for file in files:
+            (target / file).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source / file, target / file)
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(f"cannot move {source / file} to {target}: {reason}") from error
 
 
 def check_writable(folder: Path) -> None:

@@ -10,7 +10,8 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.render import is_of, render_basis
 from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError
-from lightpaint.files import check_writable, write_text
+from lightpaint.files import check_writable, restoring, write_text
+from lightpaint.images.blocks import whole_factor
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.progress import Progress, silent
@@ -18,6 +19,7 @@ from lightpaint.relight.comparison import write_comparison
 from lightpaint.relight.relight import check_relightable, relight
 from lightpaint.relight.report import report_page
 from lightpaint.relight.verify import Verification, verify
+from lightpaint.scene.quality import Quality, with_quality
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.solve.lighting import Lighting, combine, write_lighting
@@ -28,6 +30,11 @@ from lightpaint.target.template import write_template
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
 VIEW_KEY = "lightpaint.view"
 
+#: Samples per pixel of a verification that has a large film for a small basis, at least.
+FEWEST = 4
+
+#: What every solve writes.
+ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html")
 
 #: What a solve and a relight write, and the next solve replaces.
 RESULTS = (
@@ -72,8 +79,11 @@ def paint_with_light(
     mask: str | Path | None = None,
     unpainted: float = 0.0,
     spp: int | None = None,
+    time_s: float | None = None,
+    quality: Quality | None = None,
     seed: int = 0,
     sensor: int | str | None = None,
+    resolution: str | None = None,
     parameters: Mapping[str, object] | None = None,
     lights: Iterable[str] | None = None,
     groups: Mapping[str, Iterable[str]] | None = None,
@@ -90,7 +100,12 @@ def paint_with_light(
     basis: one made before of the same scene; taken from the cache or rendered if not given.
     unpainted: weight of unpainted pixels against the current look.
     sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
+    resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
+    verification has the whole film.
     spp, seed: of the basis and, with other random numbers, of the verification.
+    time_s: instead of spp, seconds in which the basis is rendered.
+    quality: preset of spp and resolution, where these are not given. With a time or a preset
+    the verification has about as many samples as the basis, whatever the resolution.
 
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
     """
@@ -99,6 +114,9 @@ def paint_with_light(
         scene = load_scene(
             scene, sensor=sensor, parameters=parameters, lights=lights, groups=groups
         )
+    asked = spp
+    if scene is not None and basis is None:
+        scene, spp = with_quality(scene, quality, spp=spp, time_s=time_s, resolution=resolution)
     if isinstance(basis, str | Path):
         basis = read_basis(Path(basis))
     if scene is not None and basis is not None:
@@ -108,42 +126,42 @@ def paint_with_light(
     size = basis.size if basis is not None else scene.size if scene is not None else target.size
     target = target.fitted_to(size, resize=resize)
     check_writable(folder)
+    written = earlier_results(folder) + [folder / name for name in ALWAYS]
     if scene is not None:
-        check_relightable(scene, folder / "relit.xml")
+        written += [folder / "verified.exr", *check_relightable(scene, folder / "relit.xml")]
 
     if basis is None:
         if scene is None:
             raise LightpaintError("give a scene, a basis, or both")
-        basis = obtain_basis(scene, spp=spp, seed=seed, use_cache=use_cache, progress=progress)
+        basis = obtain_basis(
+            scene, spp=spp, time_s=time_s, seed=seed, use_cache=use_cache, progress=progress
+        )
     solution = solve(basis, target, unpainted=unpainted)
     predicted = combine(basis, solution.lighting)
-    clear_results(folder)
-    write_lighting(folder / "lighting.json", solution.lighting)
-    view = {
-        "sensor": basis.origin.sensor,
-        "spp": spp or (scene.spp if scene is not None else basis.origin.spp),
-    }
-    write_estimate(folder / "predicted.exr", predicted, {VIEW_KEY: json.dumps(view)})
-
+    as_basis = spp or basis.origin.spp if asked is None and (time_s or quality) else None
     relit, verification = None, None
-    if scene is not None:
-        relit = relight(scene, solution.lighting, folder / "relit.xml")
-        verification = verify(
-            predicted, relit, spp=scene.spp if spp is None else spp, seed=seed, progress=progress
-        )
-        write_estimate(folder / "verified.exr", verification.verified, {})
-    look = Look(target, basis, solution, predicted, relit, verification)
-    show_look(look, folder, command=command)
+    with restoring(folder, written):
+        write_lighting(folder / "lighting.json", solution.lighting)
+        checked_spp = asked or (scene.spp if scene is not None else basis.origin.spp)
+        if scene is not None:
+            relit = relight(scene, solution.lighting, folder / "relit.xml")
+            if as_basis is not None:
+                checked_spp = max(FEWEST, as_basis * predicted.size[1] ** 2 // relit.size[1] ** 2)
+        view = {"sensor": basis.origin.sensor, "spp": checked_spp}
+        write_estimate(folder / "predicted.exr", predicted, {VIEW_KEY: json.dumps(view)})
+        if relit is not None:
+            verification = verify(predicted, relit, spp=checked_spp, seed=seed, progress=progress)
+            write_estimate(folder / "verified.exr", verification.verified, {})
+        look = Look(target, basis, solution, predicted, relit, verification)
+        show_look(look, folder, command=command)
     return look
 
 
-def clear_results(folder: Path) -> None:
-    """Delete what an earlier solve left in `folder`: results of two never stand together."""
+def earlier_results(folder: Path) -> list[Path]:
+    """What an earlier solve left in `folder`: results of two never stand together."""
     if not (folder / "lighting.json").is_file():
-        return  # somebody else's files, whatever they are called
-    for pattern in RESULTS:
-        for file in folder.glob(pattern):
-            file.unlink()
+        return []  # somebody else's files, whatever they are called
+    return [file for pattern in RESULTS for file in folder.glob(pattern)]
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:
@@ -162,27 +180,42 @@ def check_same_view(scene: Scene, basis: Basis) -> None:
             f"the basis shows {what}: it was made of {origin.scene} through {origin.sensor}, not "
             f"of {scene.path} as it is through {sensor}; make it again"
         )
+    if whole_factor(scene.size, basis.size) is None:
+        raise BasisError(
+            f"the basis is {basis.size[1]}x{basis.size[0]} but {scene.path} renders "
+            f"{scene.size[1]}x{scene.size[0]}, which is no whole multiple: make it again"
+        )
 
 
 def obtain_basis(
     scene: Scene,
     *,
     spp: int | None = None,
+    time_s: float | None = None,
     seed: int = 0,
     use_cache: bool = True,
     progress: Progress = silent,
 ) -> Basis:
     """The basis of `scene`: what an earlier run kept, with the samples that are missing.
 
+    time_s: instead of spp, seconds of rendering to add to what was kept.
     use_cache: False neither looks for one nor keeps it.
     """
     if not use_cache:
-        return render_basis(scene, spp=spp, seed=seed, progress=progress)
-    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed)
+        return render_basis(scene, spp=spp, time_s=time_s, seed=seed, progress=progress)
+    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if start is not None and not is_of(scene, start, seed):
         start = None
-    basis = render_basis(scene, spp=spp, seed=seed, start=start, keep=cache.keep, progress=progress)
-    if start is None or basis.origin.spp > start.origin.spp:
+    basis = render_basis(
+        scene,
+        spp=spp,
+        time_s=time_s,
+        seed=seed,
+        start=start,
+        keep=cache.keep,
+        progress=progress,
+    )
+    if start is None or (basis is not start and basis.origin.spp >= start.origin.spp):
         cache.keep(basis)
     return basis
 
@@ -237,12 +270,15 @@ def relight_look(
     progress: Progress = silent,
 ) -> Scene:
     """Write relit.xml to `folder`, and its render as relit.exr and relit.png."""
-    relit = relight(scene, lighting, folder / "relit.xml")
-    image = render(
-        relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
-    )
-    write_estimate(folder / "relit.exr", image, {})
-    write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
+    path = folder / "relit.xml"
+    files = [*check_relightable(scene, path), folder / "relit.exr", folder / "relit.png"]
+    with restoring(folder, files):
+        relit = relight(scene, lighting, path)
+        image = render(
+            relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
+        )
+        write_estimate(folder / "relit.exr", image, {})
+        write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
     return relit
 
 

@@ -14,11 +14,14 @@ from typing import Any, Protocol
 class Progress(Protocol):
     """Called after each finished piece of work."""
 
-    def __call__(self, label: str, done: int, total: int) -> None:
-        """`done` of `total` pieces of the work named `label` are finished."""
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """`done` of `total` pieces of the work named `label` are finished.
+
+        unit: what is counted; given only where it is not passes.
+        """
 
 
-def silent(label: str, done: int, total: int) -> None:
+def silent(label: str, done: int, total: int, unit: str = "passes") -> None:
     """The progress report of whoever does not listen."""
 
 

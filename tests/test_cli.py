@@ -441,7 +441,7 @@ def test_killed_at_any_moment_leaves_a_readable_basis(tmp_path: Path, delay_s: f
     code = f"""
 import lightpaint.scene.render, lightpaint as lp, sys
 from lightpaint.pipeline import obtain_basis
-sys.modules["lightpaint.basis.render"].KEEP_EVERY_S = 0
+sys.modules["lightpaint.basis.budget"].KEEP_EVERY_S = 0
 lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
 scene = lp.load_scene({str(CORNELL)!r})
 print("ready", flush=True)
@@ -459,7 +459,7 @@ obtain_basis(scene, spp=100_000)
         process.kill()
     [path] = tmp_path.glob("*.basis.exr")
     basis = read_basis(path)
-    assert basis.origin.spp >= 16
+    assert basis.origin.spp >= 2
     # And the next run goes on from there, like one that was never interrupted.
     more = basis.origin.spp + 32
     code = code.replace("100_000", str(more))
@@ -569,3 +569,71 @@ def test_wrong_choices_are_refused_in_one_line(
     tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     assert words in refused(tmp_path, "lights", write_room(tmp_path), *arguments)
+
+
+def test_solved_small_and_verified_large(tmp_path: Path) -> None:
+    arguments = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64, "--seed", 8)
+    output = succeed(tmp_path, *arguments)
+    assert "agree within noise" in output
+    sizes = {}
+    for name in ("predicted", "verified"):
+        [part] = read_parts(tmp_path / "warm" / f"{name}.exr")
+        sizes[name] = part.size
+    assert sizes == {"predicted": (32, 32), "verified": (128, 128)}
+    assert "agree within noise" in succeed(tmp_path, "verify", "warm")
+    page = (tmp_path / "warm" / "report.html").read_text(encoding="utf-8")
+    assert "32 × 32 pixels, verified at 128 × 128" in page
+    # A saved basis of that size takes the painting of full size as well, and says so.
+    same = ("basis", CORNELL, "--resolution", "32x32", "--spp", 64, "--seed", 8, "-o", "s.exr")
+    assert "kept from an earlier run" in run(tmp_path, *same).stderr
+    done = run(tmp_path, "solve", "s.exr", WARM, "-o", "saved")
+    assert done.returncode == 0, done.stderr
+    assert "128x128 pixels averaged to the basis's 32x32" in done.stderr
+    answers = [
+        json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))["lights"]
+        for name in ("warm", "saved")
+    ]
+    assert answers[0] == answers[1]
+    # A basis of another resolution is another basis.
+    assert "basis: 2 passes" in run(tmp_path, "basis", CORNELL, "--spp", 2, "--seed", 8).stderr
+    # A template that was made small is painted small.
+    succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 4)
+    succeed(tmp_path, "solve", *arguments[1:2], "template.exr", *arguments[3:], "-o", "small")
+
+
+def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) -> None:
+    succeed(tmp_path, "solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64)
+    relit = tmp_path / "warm" / "relit.xml"
+    text = relit.read_text(encoding="utf-8").replace('max_depth" value="6"', 'max_depth" value="3"')
+    relit.write_text(text, encoding="utf-8")
+    done = run(tmp_path, "verify", "warm")
+    assert done.returncode == 1
+    assert "DISAGREE" in done.stdout
+
+
+def test_a_basis_for_a_time(tmp_path: Path) -> None:
+    def spp_of(output: str) -> int:
+        return int(output.split(" lights, ")[1].split()[0])
+
+    arguments = ("basis", CORNELL, "--time", "0.2", "--resolution", "1/4", "--seed", 9)
+    done = run(tmp_path, *arguments)
+    assert done.stderr == "basis: 1 seconds\n"
+    first = spp_of(done.stdout)
+    assert spp_of(succeed(tmp_path, *arguments)) > first
+    # The verification has as many samples as the basis: a sixteenth in each pixel.
+    solved = ("solve", CORNELL, WARM, *arguments[2:], "--quality", "final")
+    assert "agree within noise" in succeed(tmp_path, *solved)
+    [part] = read_parts(tmp_path / "warm" / "predicted.exr")
+    has = spp_of(succeed(tmp_path, "basis", CORNELL, *arguments[4:], "--spp", 2))
+    assert json.loads(part.attributes["lightpaint.view"])["spp"] == max(4, has // 16)
+
+
+def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_path: Path) -> None:
+    refuse = [tmp_path, "basis", CORNELL]
+    assert "not allowed with" in refused(*refuse, "--time", 3, "--spp", 4)
+    assert "not a number of seconds" in refused(*refuse, "--time", 0)
+    assert "invalid choice" in refused(*refuse, "--quality", "good")
+    assert "will do" in refused(*refuse, "--resolution", "1/3")
+    for option in (("--time", 3), ("--quality", "final"), ("--resolution", "1/2")):
+        told = refused(tmp_path, "solve", basis_file, WARM, *option)
+        assert f"{option[0]} cannot change a saved basis" in told

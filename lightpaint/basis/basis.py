@@ -74,6 +74,8 @@ class Origin:
     """Where a basis comes from: what makes two of them comparable, and one go on.
 
     halves: samples per pixel of each of the two halves; passes: how many passes made them.
+    each_light: where an interrupt left the lights of separate renders unequal, samples of half
+    A and B and passes of A and B of each; `halves` and `passes` are then what all have at least.
     """
 
     scene: str
@@ -84,6 +86,7 @@ class Origin:
     halves: tuple[int, int]
     passes: tuple[int, int]
     lightpaint: str = __version__
+    each_light: tuple[tuple[int, int, int, int], ...] = ()
 
     @property
     def spp(self) -> int:
@@ -123,6 +126,8 @@ class Basis:
             raise BasisError("the mask of seen emitters has another size than the images")
         if len(set(self.names)) != n:
             raise BasisError(f"light names repeat: {', '.join(self.names)}")
+        if len(self.origin.each_light) not in (0, n):
+            raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -184,10 +189,10 @@ def write_basis(path: Path, basis: Basis) -> None:
         channels = {"received": received, "asked": asked}
         # A table and no picture; the format wants one display window for all parts.
         parts.append(Part(_free_name(LEARNED, basis.names), channels, display=basis.size))
-    head = {
-        FORMAT_KEY: FORMAT,
-        ORIGIN_KEY: json.dumps(asdict(basis.origin), ensure_ascii=False),
-    }
+    origin = asdict(basis.origin)
+    if not basis.origin.each_light:
+        del origin["each_light"]  # as in files from before there was any
+    head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: json.dumps(origin, ensure_ascii=False)}
     parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
     write_parts(path, parts)
 
@@ -253,7 +258,10 @@ def is_basis_file(path: Path) -> bool:
 
 def _origin(data: dict[str, Any]) -> Origin:
     (a, b), (p, q) = (tuple(int(v) for v in data.pop(key)) for key in ("halves", "passes"))
-    return Origin(halves=(a, b), passes=(p, q), **data)
+    each = []
+    for samples_a, samples_b, passes_a, passes_b in data.pop("each_light", []):
+        each.append((int(samples_a), int(samples_b), int(passes_a), int(passes_b)))
+    return Origin(halves=(a, b), passes=(p, q), each_light=tuple(each), **data)
 
 
 def _light_fields(light: BasisLight) -> dict[str, Any]:

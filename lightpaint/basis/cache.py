@@ -1,6 +1,6 @@
 """Bases kept from earlier runs, so that a second painting of a scene is answered at once.
 
-One file per scene content, sensor and seed; more samples are added to it when asked for. The
+One file per scene content, sensor, size and seed; more samples are added to it when asked for. The
 folder is the user's cache folder, or what LIGHTPAINT_CACHE names, and may be deleted at any
 time.
 """
@@ -40,9 +40,9 @@ def folder() -> Path:
     return Path(named) if named else user_cache_path("lightpaint") / "bases"
 
 
-def find(scene_identity: str, sensor: str, seed: int) -> Basis | None:
+def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Basis | None:
     """The basis kept for that, or None. A damaged one is deleted and not spoken of."""
-    path = _path(scene_identity, sensor, seed)
+    path = _path(scene_identity, sensor, seed, size)
     if not path.is_file():
         return None
     try:
@@ -57,18 +57,25 @@ def find(scene_identity: str, sensor: str, seed: int) -> Basis | None:
 
 
 def keep(basis: Basis) -> bool:
-    """Keep `basis` in the place of what was kept for its scene, sensor and seed.
+    """Keep `basis` in the place of what was kept for its scene, sensor, size and seed.
 
     Returns whether that worked: a full disk is no reason to lose a render.
     """
     origin = basis.origin
-    path = _path(origin.scene_identity, origin.sensor, origin.seed)
+    path = _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
     try:
         write_basis(path, basis)
         _prune(path)
     except (OutputError, OSError):
         return False
     return True
+
+
+def is_kept(basis: Basis) -> bool:
+    """Whether `basis` is kept, with all its samples."""
+    origin = basis.origin
+    path = _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
+    return path.is_file() and _origin_of(path) == origin
 
 
 def _prune(path: Path) -> None:
@@ -100,8 +107,8 @@ def clear() -> int:
     return len(kept)
 
 
-def _path(scene_identity: str, sensor: str, seed: int) -> Path:
-    key = repr((FORMAT, scene_identity, sensor, seed))
+def _path(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Path:
+    key = repr((FORMAT, scene_identity, sensor, seed, size))
     return folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
 
 

@@ -1,33 +1,17 @@
 """Rendering the basis: all lights in one pass where that is possible, else one by one."""
 
 import gc
-import time
 from collections.abc import Callable
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from dataclasses import replace
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.budget import Budget, Keeper, passes
+from lightpaint.basis.separate import WHITE, LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
-from lightpaint.scene.emitters import RGB
-from lightpaint.scene.render import (
-    SAMPLES_PER_PASS,
-    Stream,
-    as_float32,
-    pass_seed,
-    plan_passes,
-    render_loaded,
-)
+from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
-
-WHITE: RGB = (1.0, 1.0, 1.0)
-BLACK: RGB = (0.0, 0.0, 0.0)
-
-#: Seconds of work that a crash may cost.
-KEEP_EVERY_S = 30.0
 
 #: Emitters that surround the scene.
 ENVIRONMENTS = ("constant", "envmap", "sunsky")
@@ -58,6 +42,7 @@ def render_basis(
     scene: Scene,
     *,
     spp: int | None = None,
+    time_s: float | None = None,
     seed: int = 0,
     start: Basis | None = None,
     keep: Callable[[Basis], bool] | None = None,
@@ -66,30 +51,35 @@ def render_basis(
     """Render the image of each light of `scene` alone, at unit emission.
 
     spp: samples per pixel (the scene's own number by default).
+    time_s: instead, seconds to render for, besides what `start` took; whole pairs of passes.
     seed: any number >= 0; other seeds give independent bases.
     start: an earlier basis of the same scene, sensor and seed: its samples count, and only
-    what is missing to `spp` is rendered.
+    what is missing to `spp` is rendered, or as many more as `time_s` allows.
     keep: called with what there is, now and then and when Ctrl-C ends the work early;
     returns whether it could be kept.
 
     Raises SceneError for more lights and pixels than fit, Interrupted for Ctrl-C.
     """
     height, width = scene.size
-    spp = scene.spp if spp is None else spp
+    if spp is not None and time_s is not None:
+        raise SceneError("give a number of samples or a time to render for, not both")
+    budget = Budget(scene.spp if spp is None else spp, time_s)
     if len(scene.lights) * height * width * 3 >= 2**32:
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
-            "use a smaller film or fewer lights"
+            "use --resolution or fewer lights"
         )
     check_memory(scene)
     if start is not None and not is_of(scene, start, seed):
-        raise BasisError("the basis to go on from was made of another scene, sensor or seed")
-    if start is not None and start.origin.spp >= spp:
+        raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
+    if start is not None and budget.met_by(start.origin.spp):
         return start
-    if why_not_one_pass(scene) is None:
-        goes_on = start is not None and start.origin.method == ONE_PASS
-        return _render_together(scene, spp, seed, start if goes_on else None, keep, progress)
-    return _render_separately(scene, spp, seed, progress)
+    method = ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
+    if start is not None and start.origin.method != method:
+        # Nothing to go on from, but nothing to be replaced by less either.
+        start, keep = None, None
+    render_all = _render_together if method == ONE_PASS else _render_one_by_one
+    return render_all(scene, budget, seed, start, Keeper(keep), progress)
 
 
 def memory_needed(scene: Scene) -> int:
@@ -108,7 +98,7 @@ def check_memory(scene: Scene) -> None:
         height, width = scene.size
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB are free: use a smaller film or fewer lights"
+            f"{free / 1e9:.1f} GB are free: use --resolution or fewer lights"
         )
 
 
@@ -123,10 +113,10 @@ def _free_memory() -> int | None:
 
 
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Whether `basis` was made of `scene` as it is, through its sensor, under `seed`."""
-    method = basis.origin.method
-    mine = _origin(scene, seed, method, basis.origin.halves, basis.origin.passes)
-    return basis.origin == mine
+    """Whether `basis` was made of `scene` as it is, through its sensor and film, under `seed`."""
+    of = basis.origin
+    mine = _origin(scene, seed, of.method, of.halves, of.passes)
+    return of == replace(mine, each_light=of.each_light) and basis.size == scene.size
 
 
 def _origin(
@@ -162,10 +152,10 @@ def _basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
 
 def _render_together(
     scene: Scene,
-    spp: int,
+    budget: Budget,
     seed: int,
     start: Basis | None,
-    keep: Callable[[Basis], bool] | None,
+    keeper: Keeper,
     progress: Progress,
 ) -> Basis:
     """All lights in one path-traced pass after another (see lightgroups.py)."""
@@ -177,7 +167,6 @@ def _render_together(
     height, width = scene.size
     names = [light.name for light in scene.lights]
     sums = HalfSums(len(names), scene.size) if start is None else HalfSums.of(start)
-    plan = plan_passes(height * width, spp, done=(sums.spp[0], sums.spp[1]), growing=True)
 
     def basis(*, is_last: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
@@ -197,11 +186,10 @@ def _render_together(
     guide = Guide(loaded, light_of, scene.eye(loaded), start.learned if start else None)
     # One stream of numbers for each half, far from all others.
     streams = [pass_seed(seed, Stream.NUMBERS, half) for half in range(2)]
-    kept_s, keep_every_s = time.monotonic(), KEEP_EVERY_S
-    progress("basis", 0, len(plan))
     try:
         with interruptible_between_pieces() as let_interrupts_through:
-            for k, (half, pass_spp) in enumerate(plan):
+            for half, pass_spp in passes(height * width, budget, sums.spp, progress):
+                let_interrupts_through()
                 sums.spp[half] += accumulate(
                     loaded,
                     scene.integrator,
@@ -215,19 +203,14 @@ def _render_together(
                 )
                 sums.passes[half] += 1
                 dr.sync_thread()
-                progress("basis", k + 1, len(plan))
-                now_s = time.monotonic()
-                if keep is not None and now_s - kept_s > keep_every_s and all(sums.spp):
-                    keep(basis())
-                    kept_s = time.monotonic()
-                    # Where writing takes long, it must not become the work itself.
-                    keep_every_s = max(KEEP_EVERY_S, 10 * (kept_s - now_s))
-                let_interrupts_through()
+                if all(sums.spp):
+                    keeper.now_and_then(basis)
     except KeyboardInterrupt:
-        if keep is None or not all(sums.spp) or not keep(basis(is_last=True)):
+        if keeper.keep is None or not all(sums.spp) or not keeper.keep(basis(is_last=True)):
             raise
+        of = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
-            f"{sum(sums.spp)} of {spp} samples per pixel are kept; the same command goes on"
+            f"{sum(sums.spp)}{of} samples per pixel are kept; the same command goes on"
         ) from None
     finally:
         del loaded, light_of
@@ -235,46 +218,25 @@ def _render_together(
     return basis(is_last=True)
 
 
-def _render_separately(scene: Scene, spp: int, seed: int, progress: Progress) -> Basis:
-    """One ordinary render per light: right for any integrator, n times the work."""
-    names = [light.name for light in scene.lights]
-    means, differences = [], []
-    for name in names:
-        emission = {other: WHITE if other == name else BLACK for other in names}
-        loaded = scene.load(emission)
-        estimate = render_loaded(
-            loaded,
-            scene,
-            spp=spp,
-            # Each light has samples of its own.
-            seed=pass_seed(seed, Stream.BASIS, names.index(name)),
-            stream=Stream.BASIS,
-            label=f"basis: {name}",
-            progress=progress,
-        )
-        del loaded
-        gc.collect()
-        means.append(estimate.image)
-        differences.append(estimate.half_difference)
-    height, width = scene.size
-    plan = plan_passes(height * width, spp)
-    half = sum(size for _, size in plan) // 2
-    origin = _origin(scene, seed, SEPARATE, (half, half), (len(plan) // 2, len(plan) // 2))
-    images, half_differences = np.stack(means), np.stack(differences)
-    return Basis(_basis_lights(scene), images, half_differences, _emitters_seen(scene), origin)
+def _render_one_by_one(
+    scene: Scene,
+    budget: Budget,
+    seed: int,
+    start: Basis | None,
+    keeper: Keeper,
+    progress: Progress,
+) -> Basis:
+    """One light after the other, by the scene's own integrator (see separate.py)."""
+    sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
+    seen = emitters_seen(scene) if start is None else start.emitters_seen
+    nothing = _origin(scene, seed, SEPARATE, (0, 0), (0, 0))
 
+    def basis() -> Basis:
+        images, half_differences = sums.mean_and_half_difference()
+        origin = replace(nothing, **sums.counts())
+        return Basis(_basis_lights(scene), images, half_differences, seen, origin)
 
-def _emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
-    """Where light reaches the camera without a single bounce."""
-    import mitsuba as mi
-
-    if scene.integrator.hide_emitters:
-        return np.zeros(scene.size, dtype=bool)
-    loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
-    direct = mi.load_dict({"type": "path", "max_depth": 1})
-    image = as_float32(
-        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=16))
+    render_separately(
+        scene, budget, seed=seed, sums=sums, basis=basis, keeper=keeper, progress=progress
     )
-    del loaded
-    gc.collect()
-    return np.asarray(image.max(axis=-1) > 0)
+    return basis()

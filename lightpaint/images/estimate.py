@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.errors import ImageError
+from lightpaint.images.blocks import block_mean
 from lightpaint.images.exr import Floats, Part, read_parts, rgb_channels, write_parts
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
@@ -41,6 +42,10 @@ class Estimate:
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return self.image.shape[0], self.image.shape[1]
+
+    def reduced(self, factor: int) -> "Estimate":
+        """Of the same picture with a pixel for each block of factor x factor."""
+        return Estimate(block_mean(self.image, factor), block_mean(self.half_difference, factor))
 
     def variance(self, *, radius: int = 2) -> Floats:
         """Variance of each pixel of `image`, (h, w, 3), pooled over its neighbours.

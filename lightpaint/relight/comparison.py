@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.basis.basis import Basis
 from lightpaint.files import write_bytes
+from lightpaint.images.blocks import block_mean, enlarged
 from lightpaint.images.display import encode_display, png_bytes, to_8_bit
 from lightpaint.images.exr import Floats
 from lightpaint.relight.pictures import (
@@ -55,7 +56,8 @@ def comparison_image(
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
-    predicted, verified: (h, w, 3) linear. Three pictures where `verified` is None. The
+    predicted, verified: (h, w, 3) linear, the latter possibly larger by a whole factor; what
+    is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target; pixels that do not
     count are grey, dim and hatched. Raises SizeError if target and basis differ in size.
     """
@@ -77,7 +79,9 @@ def comparison_image(
         ),
     ]
     if verified is not None:
-        rmse = float(np.sqrt(np.square(predicted.astype(np.float64) - verified).mean()))
+        factor = verified.shape[0] // predicted.shape[0]
+        gap = predicted.astype(np.float64) - block_mean(verified, factor)
+        rmse = float(np.sqrt(np.square(gap).mean()))
         tiles.append(
             Tile(
                 f"verified{at}",
@@ -108,8 +112,11 @@ def write_comparison(
 
 
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
-    """Tiles of one size in a row on neutral grey, captions below. Returns (H, W, 3)."""
-    height, width = tiles[0].picture.shape[:2]
+    """Tiles in a row on neutral grey, captions below. Returns (H, W, 3).
+
+    The size of the largest tile is a whole multiple of the others'.
+    """
+    height, width = max(tile.picture.shape[:2] for tile in tiles)
     zoom = max(1, -(-NARROWEST // width))
     height, width = height * zoom, width * zoom
     text = min(max(width // 24, 12), 28)
@@ -118,7 +125,7 @@ def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     sheet = Image.new("RGB", size, SURROUND)
     for k, tile in enumerate(tiles):
         x = gap + k * (width + gap)
-        picture = to_8_bit(tile.picture).repeat(zoom, axis=0).repeat(zoom, axis=1)
+        picture = enlarged(to_8_bit(tile.picture), width // tile.picture.shape[1])
         sheet.paste(Image.fromarray(picture), (x, gap))
         _caption(ImageDraw.Draw(sheet), tile, (x, gap + height + text // 2), width, text)
         if tile.limit is not None:

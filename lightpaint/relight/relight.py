@@ -55,8 +55,10 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     return relit
 
 
-def check_relightable(scene: Scene, path: Path) -> None:
+def check_relightable(scene: Scene, path: Path) -> list[Path]:
     """Raise what `relight` would raise for some lighting, before a render is paid for.
+
+    Returns the files that it would write at most.
 
     The probe is a colour that no light has, so that every light needs all it may need.
     """
@@ -65,7 +67,7 @@ def check_relightable(scene: Scene, path: Path) -> None:
         for light in scene.lights
         if not light.is_fixed
     }
-    relit_files(scene, probe, path)
+    return list(relit_files(scene, probe, path))
 
 
 def scene_of(scene: Scene, lighting: Lighting) -> Scene:

@@ -63,7 +63,7 @@ def report_page(
         lights=lights_table(basis, solution),
         fit=fit_table(solution),
         verification=verification_table(verification),
-        render=render_table(basis, target, solution),
+        render=render_table(basis, target, solution, verification),
         command=escape(command or "(made from Python, without a command line)"),
         versions=escape(versions(basis)),
     )

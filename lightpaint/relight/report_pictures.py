@@ -72,7 +72,8 @@ def thumbnail(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> tuple[Floa
 
 def wipe(looks: list[Picture]) -> str:
     """Two of the looks over each other, with a movable border between them."""
-    height, width = looks[0].pixels.shape[:2]
+    # The verification may be larger than the rest, which the page then enlarges.
+    height, width = max(look.pixels.shape[:2] for look in looks)
     # The prediction first: it is the answer, and less noisy than the render that checks it.
     a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("target", "predicted"))
 

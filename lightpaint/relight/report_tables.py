@@ -110,7 +110,9 @@ def verification_table(verification: Verification | None) -> str:
     )
 
 
-def render_table(basis: Basis, target: Target, solution: Solution) -> str:
+def render_table(
+    basis: Basis, target: Target, solution: Solution, verification: Verification | None
+) -> str:
     """Where the basis comes from, and which pixels and lights took no part."""
     origin, q = basis.origin, solution.quality
     height, width = basis.size
@@ -120,7 +122,7 @@ def render_table(basis: Basis, target: Target, solution: Solution) -> str:
     facts = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
-        ("Image", f"{width} × {height} pixels"),
+        ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {origin.spp} samples per pixel, seed {origin.seed}"),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
     ]
@@ -132,6 +134,13 @@ def render_table(basis: Basis, target: Target, solution: Solution) -> str:
     if target.not_finite:
         facts.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
     return _facts(facts)
+
+
+def _full_size(basis: Basis, verification: Verification | None) -> str:
+    if verification is None or verification.verified.size == basis.size:
+        return ""
+    height, width = verification.verified.size
+    return f", verified at {width} × {height}"
 
 
 def versions(basis: Basis) -> str:

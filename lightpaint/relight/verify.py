@@ -5,11 +5,12 @@ from different samples. They differ by noise; if they differ by more, something 
 and the difference in units of the noise (z) tells.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.errors import SizeError
+from lightpaint.images.blocks import whole_factor
 from lightpaint.images.color import delta_e
 from lightpaint.images.display import choose_exposure
 from lightpaint.images.estimate import Estimate
@@ -32,7 +33,8 @@ PRECISION = 1e-5
 class Verification:
     """How far prediction and verification are apart.
 
-    verified: the independent render.
+    verified: the independent render. Where the prediction is smaller by a whole factor, all
+    else is about its block means, at the size (h, w) of the prediction.
     z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
     z_rms: root mean square of the differences of 8x8 blocks in their own standard errors.
     About 1 if there is only noise; a little more where the noise is rare bright samples.
@@ -75,10 +77,11 @@ def verify(
 ) -> Verification:
     """Render the relit scene with samples no basis ever uses, and compare.
 
-    spp: samples per pixel (the scene's own number by default).
+    predicted: of the size of `relit`, or smaller by a whole factor.
+    spp: samples per pixel of `relit` (the scene's own number by default).
     stream: random numbers to draw; a repeated verification takes others than the first.
     """
-    if relit.size != predicted.size:
+    if whole_factor(relit.size, predicted.size) is None:
         raise SizeError(
             f"the prediction is {predicted.size[1]}x{predicted.size[0]} but {relit.path} renders "
             f"{relit.size[1]}x{relit.size[0]}: they belong to different scenes or sensors"
@@ -95,7 +98,18 @@ def verify(
 
 
 def compare(predicted: Estimate, verified: Estimate) -> Verification:
-    """Judge the difference of two independent estimates of one picture."""
+    """Judge the difference of two independent estimates of one picture.
+
+    verified: of the size of `predicted`, or larger by a whole factor. Raises SizeError else.
+    """
+    factor = whole_factor(verified.size, predicted.size)
+    if factor is None:
+        raise SizeError(f"sizes of {predicted.size} and {verified.size} cannot be compared")
+    judged = _judge(predicted, verified.reduced(factor))
+    return replace(judged, verified=verified)
+
+
+def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     difference = predicted.image.astype(np.float64) - verified.image
     squares = np.square(predicted.half_difference, dtype=np.float64)
     squares += np.square(verified.half_difference, dtype=np.float64)

@@ -20,7 +20,7 @@ from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
 class Integrator:
     """The part of the scene's integrator that decides which light paths there are.
 
-    plugin: of the outermost integrator; the rest is of the one that renders light, inside.
+    plugin: of the integrator that renders light, inside those that wrap it (`aov`, `moment`).
     samples: what `direct` draws per surface point of emitters and of the BSDF.
     """
 
@@ -248,7 +248,7 @@ class ParsedScene:
         shading = int(props.get("shading_samples", 1))
         samples = (props.get("emitter_samples", shading), props.get("bsdf_samples", shading))
         return Integrator(
-            outermost,
+            props.plugin_name(),
             int(props.get("max_depth", -1)),
             int(props.get("rr_depth", 5)),
             bool(props.get("hide_emitters", False)),

@@ -35,25 +35,35 @@ def pass_seed(seed: int, stream: Stream, index: int) -> int:
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
 
 
+def largest_pass(pixels: int, *, shorter: int = 1) -> int:
+    """Samples per pixel of a whole pass. shorter: the part of SAMPLES_PER_PASS it may have."""
+    return max(1, SAMPLES_PER_PASS // shorter // pixels)
+
+
 def plan_passes(
-    pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), growing: bool = False
+    pixels: int,
+    spp: int,
+    *,
+    done: tuple[int, int] = (0, 0),
+    shorter: int = 1,
+    growing: bool = False,
 ) -> list[tuple[int, int]]:
     """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
 
     spp: what both halves come to together, or one more to make them equal.
     done: samples per pixel that each half has already.
-    growing: begin with small passes, each at most as large as what its half has by then:
-    for those who learn from the passes before.
+    growing: begin with small passes, each at most three times what its half has by then: for
+    those who learn from the passes before.
     """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
-    largest = max(1, SAMPLES_PER_PASS // pixels)
+    largest = largest_pass(pixels, shorter=shorter)
     lists = []
     # An interrupt may have left the second half behind: its turn is next.
     for half in (0, 1) if done[0] <= done[1] else (1, 0):
         sizes, have, goal = [], done[half], -(-spp // 2)
         while have < goal:
-            bound = min(largest, max(have, -(-largest // 8))) if growing else largest
+            bound = min(largest, max(3 * have, -(-largest // 8))) if growing else largest
             sizes.append(min(bound, goal - have))
             have += sizes[-1]
         lists.append([(half, size) for size in sizes])

@@ -27,6 +27,7 @@ from lightpaint.scene.emitters import (
 from lightpaint.scene.lights import Emitter, Light, choose_lights, lights_of
 from lightpaint.scene.lights_file import LightsFile, lights_file_beside, read_lights_file
 from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, View
+from lightpaint.scene.resolution import reduced, reduction
 from lightpaint.scene.variant import use_variant
 
 
@@ -38,7 +39,8 @@ class Scene:
     spp: samples per pixel the scene itself asks for.
     has_null: whether rays may pass a surface as if it were not there.
     emitters: all of them; lights: what is adjusted, and last what is kept, if anything is.
-    content: hash of all XML files and assets, the parameters and the sensor.
+    content: hash of all XML files and assets, the parameters and the sensor; the same on a
+    reduced film.
     lights_file: the lights file that went into `lights`, if one did.
     """
 
@@ -112,6 +114,14 @@ class Scene:
         raise SceneError(
             f"{self.path} has no light {name!r}: it has {', '.join(x.name for x in self.lights)}"
         )
+
+    def reduced(self, resolution: str) -> "Scene":
+        """This scene on a smaller film of the same field of view.
+
+        resolution: `1/4`, or `320x180`: a part of the film that cuts it into whole blocks of
+        pixels. Raises SceneError, with sizes that would do, for any other.
+        """
+        return replace(self, view=reduced(self.view, reduction(self.view, resolution)))
 
     def camera(self, loaded: Any) -> Any:
         """The sensor this scene is seen through, in what `load` returned."""

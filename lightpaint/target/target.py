@@ -8,6 +8,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from lightpaint.errors import ImageError, SizeError, TargetError
+from lightpaint.images.blocks import block_mean, whole_factor
 from lightpaint.images.exr import Floats, Part, read_parts
 
 #: Channel that holds importance in a file whose RGB is not premultiplied.
@@ -46,9 +47,9 @@ class Target:
                 f"target {self.name}: importance must be finite and not negative; it is between "
                 f"{np.min(self.importance):g} and {np.max(self.importance):g}"
             )
-        if self.not_finite == self.importance.size:
-            raise TargetError(f"target {self.name} holds NaN or Inf in every pixel")
         if not self.importance.any():
+            if self.not_finite == self.importance.size:
+                raise TargetError(f"target {self.name} holds NaN or Inf in every pixel")
             raise TargetError(
                 f"target {self.name} has importance 0 everywhere, so nothing in it counts: "
                 "paint with some alpha, or give a mask that is not black"
@@ -77,11 +78,28 @@ class Target:
         image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
         return replace(self, image=image, importance=importance)
 
+    def reduced(self, factor: int) -> "Target":
+        """One pixel for each block of factor x factor: their mean, weighted by importance.
+
+        The importance of a block is the mean of its pixels'. For images that are constant in
+        each block, the squared residual is then the same as before but for a constant.
+        """
+        if factor == 1:
+            return self
+        importance = block_mean(self.importance, factor)
+        weighted = block_mean(self.image * self.importance[..., None].astype(np.float64), factor)
+        image = weighted / np.where(importance > 0, importance, 1)[..., None]
+        return replace(self, image=image.astype(np.float32), importance=importance)
+
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """This target at `size` (height, width) of the basis.
 
-        Raises SizeError if it has another size and may not be resampled.
+        A whole multiple of that is reduced: so is one that was painted at full size, for a
+        basis on a reduced film. Raises SizeError if it has another size and may not be
+        resampled.
         """
+        if factor := whole_factor(self.size, size):
+            return self.reduced(factor)
         if self.size != size and not resize:
             raise SizeError(
                 f"target {self.name} is {self.size[1]}x{self.size[0]} but the basis is "

@@ -44,7 +44,7 @@ def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:
 
 def test_who_learns_begins_with_small_passes() -> None:
     plan = plan_passes(24 * 20, 40, growing=True)
-    assert [size for half, size in plan if half == 0] == [1, 1, 2, 4, 4, 4, 4]
+    assert [size for half, size in plan if half == 0] == [1, 3, 4, 4, 4, 4]
     for done in range(1, len(plan)):
         have = [sum(size for half, size in plan[:done] if half == which) for which in range(2)]
         rest = plan_passes(24 * 20, 40, done=(have[0], have[1]), growing=True)
@@ -91,8 +91,8 @@ def test_enough_is_enough(tmp_path: Path) -> None:
 def test_nothing_is_mixed(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path))
     basis = render_basis(scene, spp=4)
-    with pytest.raises(BasisError, match="another scene, sensor or seed"):
+    with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
         render_basis(scene, spp=8, seed=1, start=basis)
     changed = load_scene(write_room(tmp_path), parameters={"width": 20})
-    with pytest.raises(BasisError, match="another scene, sensor or seed"):
+    with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
         render_basis(changed, spp=8, start=basis)

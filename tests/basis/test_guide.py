@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from renderer import write_room
 
 from lightpaint.basis.basis import read_basis, write_basis
-from lightpaint.basis.render import _render_separately, render_basis
+from lightpaint.basis.budget import Budget, Keeper
+from lightpaint.basis.render import _render_one_by_one, render_basis
 from lightpaint.progress import silent
 from lightpaint.scene.scene import load_scene
 from lightpaint.scene.variant import use_variant
@@ -68,7 +69,7 @@ def test_guided_planes_are_those_of_separate_renders_within_noise(tmp_path: Path
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
     scene = load_scene(write_room(tmp_path, lights=lights))
     basis = render_basis(scene, spp=512)
-    separate = _render_separately(scene, 256, 1, silent)
+    separate = _render_one_by_one(scene, Budget(256), 1, None, Keeper(None), silent)
     for k, name in enumerate(basis.names):
         gap = basis.images[k] - separate.images[k]
         noise = np.square(basis.half_differences[k], dtype=np.float64)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from renderer import CORNELL, LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
+from lightpaint.basis.budget import Budget, Keeper
 from lightpaint.basis.render import (
-    BLACK,
     ONE_PASS,
     SEPARATE,
-    WHITE,
-    _render_separately,
+    _render_one_by_one,
     memory_needed,
     render_basis,
     why_not_one_pass,
 )
+from lightpaint.basis.separate import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.progress import silent
 from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes
@@ -72,7 +72,7 @@ def test_plane_of_an_only_light_is_exactly_its_render(tmp_path: Path, name: str)
 def test_each_plane_is_that_light_alone_within_noise(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path))
     basis = render_basis(scene, spp=256, seed=0)
-    separate = _render_separately(scene, 256, 0, silent)
+    separate = _render_one_by_one(scene, Budget(256), 0, None, Keeper(None), silent)
     images, differences = separate.images, separate.half_differences
     seen = separate.emitters_seen
     for k, name in enumerate(basis.names):
@@ -234,6 +234,28 @@ def test_other_samplers(tmp_path: Path, sampler: str) -> None:
     planes = one_pass(scene, seed=3, spp=16)
     rendered = mitsuba_render(scene, {x.name: WHITE for x in scene.lights}, seed=3, spp=16)
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+@pytest.mark.parametrize(
+    "wrapper",
+    [
+        '<integrator type="aov"><string name="aovs" value="dd:depth,nn:sh_normal"/>{}</integrator>',
+        '<integrator type="moment">{}</integrator>',
+        '<integrator type="moment"><integrator type="aov"><string name="aovs" value="dd:depth"/>'
+        "{}</integrator></integrator>",
+    ],
+)
+def test_a_wrapped_path_is_one_pass(tmp_path: Path, wrapper: str) -> None:
+    scene = load_scene(write_room(tmp_path, integrator=wrapper.format(INTEGRATORS["path"])))
+    assert why_not_one_pass(scene) is None
+    planes = one_pass(scene, seed=11, spp=16)
+    rendered = mitsuba_render(scene, {x.name: WHITE for x in scene.lights}, seed=11, spp=16)
+    assert rendered.max() > 0
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+    inside = load_scene(
+        write_room(tmp_path, integrator=wrapper.format("<integrator type='volpath'/>"))
+    )
+    assert "volpath" in str(why_not_one_pass(inside))
 
 
 def test_wrapped_integrators_hide_what_the_inner_one_hides(tmp_path: Path) -> None:

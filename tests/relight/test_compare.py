@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.errors import SizeError
 from lightpaint.images.color import delta_e
 from lightpaint.images.estimate import Estimate
 from lightpaint.relight.verify import LIMIT, compare
@@ -210,3 +211,21 @@ def test_colour_difference_is_taken_as_it_is_shown(brightness: float, exposure: 
     assert found.delta_e_mean == pytest.approx(differences.mean(), rel=1e-12)
     assert found.delta_e_95 == pytest.approx(differences.max(), rel=1e-12)
     assert differences.max() > 1
+
+
+def test_a_larger_verification_is_judged_by_its_block_means():
+    rng = np.random.default_rng(3)
+    small = _truth((24, 20))
+    large = np.kron(small, np.ones((4, 4, 1))) * rng.uniform(0.5, 1.5, (96, 80, 1))
+    large *= np.kron(small / Estimate(large, large).reduced(4).image, np.ones((4, 4, 1)))
+    predicted = _estimate(small, _gaussian, rng)
+    verified = _estimate(large, _gaussian, rng)
+    judged = compare(predicted, verified)
+    assert judged.agrees
+    assert judged.verified is verified
+    assert judged.z.shape == (24, 20, 3)
+    reduced = compare(predicted, verified.reduced(4))
+    assert (judged.difference, judged.rmse) == (reduced.difference, reduced.rmse)
+    assert not compare(predicted, _estimate(1.2 * large, _gaussian, rng)).agrees
+    with pytest.raises(SizeError, match="cannot be compared"):
+        compare(predicted, _estimate(_truth((48, 60)), _gaussian, rng))

@@ -117,10 +117,20 @@ def test_the_file_holds_the_image(make_basis: Any, tmp_path: Path):
         np.testing.assert_array_equal(np.asarray(file), comparison_image(**look))
 
 
+def test_a_larger_verification_is_shown_whole_beside_enlarged_pixels(make_basis: Any):
+    look = _look(make_basis)
+    same = {**look, "verified": look["predicted"]}
+    larger = {**look, "verified": np.kron(look["predicted"], np.ones((16, 16, 1), np.float32))}
+    # 32 pixels are shown 256 wide either way, and here the verification is 512.
+    assert comparison_image(**same).shape[1] < comparison_image(**larger).shape[1]
+    half = {**look, "verified": np.kron(look["predicted"], np.ones((8, 8, 1), np.float32))}
+    np.testing.assert_array_equal(comparison_image(**same), comparison_image(**half))
+
+
 def test_another_size_is_refused(make_basis: Any):
     look = _look(make_basis)
-    other = make_basis(3, (12, 16))
-    with pytest.raises(SizeError, match="32x24 but the basis is 16x12"):
+    other = make_basis(3, (12, 17))
+    with pytest.raises(SizeError, match="32x24 but the basis is 17x12"):
         comparison_image(**{**look, "basis": other})
 
 

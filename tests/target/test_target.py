@@ -61,9 +61,42 @@ def test_its_own_size_changes_nothing():
 
 def test_another_size_only_if_allowed():
     target = _random(6, 8)
-    with pytest.raises(SizeError, match=r"painted is 8x6 but the basis is 4x3.*--resize"):
-        target.fitted_to((3, 4), resize=False)
-    assert target.fitted_to((3, 4), resize=True).size == (3, 4)
+    with pytest.raises(SizeError, match=r"painted is 8x6 but the basis is 12x9.*--resize"):
+        target.fitted_to((9, 12), resize=False)
+    assert target.fitted_to((9, 12), resize=True).size == (9, 12)
+
+
+@pytest.mark.parametrize("resize", [True, False])
+def test_a_whole_multiple_is_reduced_to_weighted_means(resize: bool):
+    target = _random(6, 8)
+    reduced = target.fitted_to((3, 4), resize=resize)
+    for y, x in np.ndindex(3, 4):
+        block = np.s_[2 * y : 2 * y + 2, 2 * x : 2 * x + 2]
+        weight = target.importance[block].astype(np.float64)
+        if weight.any():
+            mean = (weight[..., None] * target.image[block]).sum(axis=(0, 1)) / weight.sum()
+            np.testing.assert_allclose(reduced.image[y, x], mean, rtol=PRECISION)
+        np.testing.assert_allclose(reduced.importance[y, x], weight.mean(), rtol=PRECISION)
+
+
+def test_the_reduced_problem_is_the_same_problem():
+    """For images that are constant in blocks, residuals differ by a constant alone."""
+    target, rng = _random(8, 12), np.random.default_rng(4)
+    reduced = target.fitted_to((2, 3), resize=False)
+    gaps = []
+    for _ in range(3):
+        small = rng.random((2, 3, 3))
+        large = np.kron(small, np.ones((4, 4, 1)))
+        whole = (target.importance[..., None] * (large - target.image) ** 2).sum()
+        part = (reduced.importance[..., None] * (small - reduced.image) ** 2).sum()
+        gaps.append(whole - 16 * part)
+    np.testing.assert_allclose(gaps, gaps[0], rtol=1e-4)
+
+
+def test_a_multiple_in_one_direction_or_two_different_ones_is_refused():
+    for size in ((6, 4), (3, 8), (2, 4)):
+        with pytest.raises(SizeError):
+            _random(6, 8).fitted_to(size, resize=False)
 
 
 @pytest.mark.parametrize("size", [(3, 4), (12, 16), (5, 11), (1, 1), (7, 3)])

@@ -1,0 +1,107 @@
+"""How long a basis is rendered, a number of samples or a time, and keeping it meanwhile."""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import SceneError
+from lightpaint.progress import Progress
+from lightpaint.scene.render import largest_pass, plan_passes
+
+#: Seconds of work that a crash may cost.
+KEEP_EVERY_S = 30.0
+
+#: Where the clock decides, and where nothing is known of the integrator, passes are shorter by
+#: this factor: they are the steps in which time is spent, and what Ctrl-C has to wait for.
+SHORTER = 4
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a basis may cost: `spp` samples per pixel in all, or `time_s` seconds from now.
+
+    A time is wall time from the first pass on. Compiling kernels counts, keeping what is done,
+    and loading the scene where that is done for every light.
+    """
+
+    spp: int
+    time_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.time_s is not None and not 0 < self.time_s < math.inf:
+            raise SceneError(f"{self.time_s} seconds are no time to render: ask for more than 0")
+
+    def met_by(self, spp: int) -> bool:
+        """Whether that many samples per pixel are enough. A time always asks for more."""
+        return self.time_s is None and spp >= self.spp
+
+
+class Clock:
+    """Tells how much of a time is spent, and reports it in whole seconds."""
+
+    def __init__(self, time_s: float, progress: Progress) -> None:
+        self.time_s, self.progress = time_s, progress
+        self.start_s = time.monotonic()
+        self.reported = -1
+        self.report()
+
+    @property
+    def left_s(self) -> float:
+        return self.time_s - (time.monotonic() - self.start_s)
+
+    def report(self) -> None:
+        total = math.ceil(self.time_s)
+        spent = min(max(0, int(self.time_s - self.left_s)), total)
+        if spent != self.reported:
+            self.progress("basis", spent, total, "seconds")
+            self.reported = spent
+
+
+def passes(
+    pixels: int, budget: Budget, done: Sequence[int], progress: Progress
+) -> Iterator[tuple[int, int]]:
+    """(half 0 or 1, samples per pixel) of one pass after another until `budget` is spent.
+
+    done: samples per pixel of each half so far; the caller brings it up to date before the
+    next pass. A time ends with the first pair of passes after it, the halves then equal.
+    """
+    if budget.time_s is None:
+        plan = plan_passes(pixels, budget.spp, done=(done[0], done[1]), growing=True)
+        progress("basis", 0, len(plan))
+        for k, one in enumerate(plan):
+            yield one
+            progress("basis", k + 1, len(plan))
+        return
+    clock = Clock(budget.time_s, progress)
+    while clock.left_s > 0:
+        for one in next_pair(pixels, (done[0], done[1]), growing=True):
+            yield one
+            clock.report()
+
+
+def next_pair(
+    pixels: int, done: tuple[int, int], pairs: int = 1, *, growing: bool = False
+) -> list[tuple[int, int]]:
+    """The passes that bring both halves `pairs` short passes beyond the fuller one of them."""
+    spp = max(done) + pairs * largest_pass(pixels, shorter=SHORTER)
+    return plan_passes(pixels, 2 * spp, done=done, shorter=SHORTER, growing=growing)
+
+
+class Keeper:
+    """Hands a basis on to be kept, now and then and when Ctrl-C ends the work."""
+
+    def __init__(self, keep: Callable[[Basis], bool] | None) -> None:
+        self.keep = keep
+        self.kept_s, self.every_s = time.monotonic(), KEEP_EVERY_S
+
+    def now_and_then(self, make: Callable[[], Basis]) -> None:
+        """Keep what `make` makes, if the last time is long enough ago."""
+        now_s = time.monotonic()
+        if self.keep is None or now_s - self.kept_s <= self.every_s:
+            return
+        self.keep(make())
+        self.kept_s = time.monotonic()
+        # Where writing takes long, it must not become the work itself.
+        self.every_s = max(KEEP_EVERY_S, 10 * (self.kept_s - now_s))
