@@ -21,22 +21,28 @@ SPP = {"one pass": 20_000, "separate renders": 2000}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
-import signal, sys
+import os, signal, sys, time
 import lightpaint.basis.budget as budget, lightpaint.scene.render as render
 from lightpaint.cli import main
 # What a shell starts in the background ignores Ctrl-C, and so would this.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**17
+if "SLOWLY" in os.environ:
+    # However fast the machine is, there is a middle to be stopped in.
+    keep = budget.Keeper.now_and_then
+    budget.Keeper.now_and_then = lambda *a: (time.sleep(0.1), keep(*a))
 sys.exit(main(sys.argv[1:]))
 """
 
 
-def start(folder: Path, room: Path, spp: int, cache: str) -> "subprocess.Popen[str]":
+def start(
+    folder: Path, room: Path, spp: int, cache: str, **environment: str
+) -> "subprocess.Popen[str]":
     arguments = ["basis", room, "--spp", spp, "-o", f"{cache}.exr"]
     return subprocess.Popen(
         [sys.executable, "-c", MAIN, *map(str, arguments)],
         cwd=folder,
-        env={**os.environ, "LIGHTPAINT_CACHE": str(folder / cache)},
+        env={**os.environ, "LIGHTPAINT_CACHE": str(folder / cache), **environment},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -62,7 +68,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     room, spp = write_room(tmp_path, lights=lights, integrator=INTEGRATORS[method]), SPP[method]
     done = 0
     for number in signals:
-        with start(tmp_path, room, spp, "stopped") as process:
+        with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
             assert process.stderr is not None
             while not process.stderr.readline().startswith("basis"):
                 pass

@@ -68,7 +68,7 @@ def passes(
     next pass. A time ends with the first pair of passes after it, the halves then equal.
     """
     if budget.time_s is None:
-        plan = plan_passes(pixels, budget.spp, done=(done[0], done[1]), growing=True)
+        plan = plan_passes(pixels, budget.spp, done=(done[0], done[1]))
         progress("basis", 0, len(plan))
         for k, one in enumerate(plan):
             yield one
@@ -76,17 +76,15 @@ def passes(
         return
     clock = Clock(budget.time_s, progress)
     while clock.left_s > 0:
-        for one in next_pair(pixels, (done[0], done[1]), growing=True):
+        for one in next_pair(pixels, (done[0], done[1])):
             yield one
             clock.report()
 
 
-def next_pair(
-    pixels: int, done: tuple[int, int], pairs: int = 1, *, growing: bool = False
-) -> list[tuple[int, int]]:
+def next_pair(pixels: int, done: tuple[int, int], pairs: int = 1) -> list[tuple[int, int]]:
     """The passes that bring both halves `pairs` short passes beyond the fuller one of them."""
     spp = max(done) + pairs * largest_pass(pixels, shorter=SHORTER)
-    return plan_passes(pixels, 2 * spp, done=done, shorter=SHORTER, growing=growing)
+    return plan_passes(pixels, 2 * spp, done=done, shorter=SHORTER)
 
 
 class Keeper:

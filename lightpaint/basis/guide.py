@@ -26,9 +26,9 @@ from lightpaint.images.exr import Floats
 #: Share of the samples that is spread evenly over the emitters of a cell.
 EVEN_SHARE = 0.1
 #: Samples after which there is little left to learn.
-ENOUGH = 2**24
+ENOUGH = 2**23
 #: Samples' worth of trust in the mean over all cells, against what a cell has seen itself.
-PRIOR_SAMPLES = 1.0
+PRIOR_SAMPLES = 0.5
 #: Distance from the camera over the width of a cell, at most; at least half of that.
 CELLS_PER_DISTANCE = 24.0
 #: Bounds for the size of the table: entries in all, and cells.
@@ -137,8 +137,7 @@ class Guide:
         contribution: RGB, not divided by the probability of the emitter.
         """
         entry = cell * self.count + emitter
-        asked &= self._learns
-        lit &= asked
+        asked, lit = asked & self._learns, lit & self._learns
         dr.scatter_add(self.asked, mi.UInt32(1), entry, asked)
         gray = dr.mean(contribution)
         dr.scatter_add(self.received, mi.Float64(gray), entry, lit & dr.isfinite(gray))

@@ -31,6 +31,8 @@ from lightpaint.basis.guide import Guide
 from lightpaint.basis.sequence import APERTURE, FILM, TIME, SobolPairs
 from lightpaint.images.exr import Floats
 from lightpaint.scene.parsed import Integrator
+from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.scene import Scene
 
 
 class HalfSums:
@@ -86,6 +88,52 @@ class HalfSums:
         return np.array(self.seen).reshape(self.shape[1:3]) > 0
 
 
+class Tracer:
+    """A loaded scene, all lights at unit emission, that adds passes to `HalfSums`.
+
+    Close it before another scene is loaded. seed: of all random numbers.
+    learned: what an earlier one had learned of the same scene, if there was one.
+    """
+
+    def __init__(self, scene: Scene, seed: int, learned: Floats | None) -> None:
+        self.scene = scene
+        self.loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})
+        self.light_of = lights_by_instance(self.loaded, scene.plane_of)
+        self.guide = Guide(self.loaded, self.light_of, scene.eye(self.loaded), learned)
+        # One stream of numbers for each half and for the rehearsal, far from all others.
+        self.streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
+
+    def rehearse(self, spp: int) -> None:
+        """A pass that counts for what it learns alone: it is the noisiest, knowing nothing."""
+        nowhere = HalfSums(len(self.scene.lights), self.scene.size)
+        self._trace(nowhere.planes[0], nowhere.seen, spp, Guided(self.streams[2], 0, self.guide))
+
+    def add_pass(self, sums: HalfSums, half: int, spp: int) -> None:
+        """Add `spp` samples per pixel to one of the halves of `sums`."""
+        numbers = Guided(self.streams[half], sums.spp[half], self.guide)
+        self._trace(sums.planes[half], sums.seen, spp, numbers)
+        sums.spp[half] += spp
+        sums.passes[half] += 1
+
+    def close(self) -> None:
+        """Let go of the scene and all that refers to it."""
+        del self.loaded, self.light_of, self.guide
+
+    def _trace(self, planes: Any, seen: Any, spp: int, numbers: "Guided") -> None:
+        accumulate(
+            self.loaded,
+            self.scene.integrator,
+            camera=self.scene.camera(self.loaded),
+            light_of=self.light_of,
+            planes=planes,
+            seen=seen,
+            spp=spp,
+            guided=numbers,
+        )
+        # A running kernel cannot be interrupted, and what is not waited for is still running.
+        dr.sync_thread()
+
+
 def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
     """UInt32 array that maps the Dr.Jit instance id of an emitter to the plane of its light.
 
@@ -120,8 +168,8 @@ def accumulate(
     light_of: Any,
     planes: Any,
     seen: Any,
-    seed: int,
     spp: int,
+    seed: int = 0,
     guided: Guided | None = None,
 ) -> int:
     """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.

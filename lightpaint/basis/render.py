@@ -6,15 +6,18 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.basis.budget import Budget, Keeper, passes
-from lightpaint.basis.separate import WHITE, LightSums, emitters_seen, render_separately
+from lightpaint.basis.separate import LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
-from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed
+from lightpaint.scene.render import SAMPLES_PER_PASS
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 
 #: Emitters that surround the scene.
 ENVIRONMENTS = ("constant", "envmap", "sunsky")
+
+#: Camera samples that choices of emitters are learned from before any counts.
+REHEARSAL = 2**18
 
 ONE_PASS = "one pass"
 SEPARATE = "separate renders"
@@ -159,52 +162,34 @@ def _render_together(
     progress: Progress,
 ) -> Basis:
     """All lights in one path-traced pass after another (see lightgroups.py)."""
-    import drjit as dr
-
-    from lightpaint.basis.guide import Guide
-    from lightpaint.basis.lightgroups import Guided, HalfSums, accumulate, lights_by_instance
+    from lightpaint.basis.lightgroups import HalfSums, Tracer
 
     height, width = scene.size
-    names = [light.name for light in scene.lights]
-    sums = HalfSums(len(names), scene.size) if start is None else HalfSums.of(start)
+    sums = HalfSums(len(scene.lights), scene.size) if start is None else HalfSums.of(start)
+    tracer = Tracer(scene, seed, start.learned if start is not None else None)
 
     def basis(*, is_last: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
         halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
-        origin = _origin(scene, seed, ONE_PASS, halves, passes)
         return Basis(
             _basis_lights(scene),
             images,
             half_differences,
             sums.emitters_seen(),
-            origin,
-            guide.learned(),
+            _origin(scene, seed, ONE_PASS, halves, passes),
+            tracer.guide.learned(),
         )
 
-    loaded = scene.load(dict.fromkeys(names, WHITE))
-    light_of = lights_by_instance(loaded, scene.plane_of)
-    guide = Guide(loaded, light_of, scene.eye(loaded), start.learned if start else None)
-    # One stream of numbers for each half, far from all others.
-    streams = [pass_seed(seed, Stream.NUMBERS, half) for half in range(2)]
     try:
         with interruptible_between_pieces() as let_interrupts_through:
-            for half, pass_spp in passes(height * width, budget, sums.spp, progress):
+            for half, spp in passes(height * width, budget, sums.spp, progress):
+                if start is None and not any(sums.spp):
+                    tracer.rehearse(max(1, REHEARSAL // (height * width)))
                 let_interrupts_through()
-                sums.spp[half] += accumulate(
-                    loaded,
-                    scene.integrator,
-                    camera=scene.camera(loaded),
-                    light_of=light_of,
-                    planes=sums.planes[half],
-                    seen=sums.seen,
-                    seed=pass_seed(seed, Stream.BASIS, 2 * sums.passes[half] + half),
-                    spp=pass_spp,
-                    guided=Guided(streams[half], sums.spp[half], guide),
-                )
-                sums.passes[half] += 1
-                dr.sync_thread()
+                tracer.add_pass(sums, half, spp)
                 if all(sums.spp):
                     keeper.now_and_then(basis)
+        return basis(is_last=True)
     except KeyboardInterrupt:
         if keeper.keep is None or not all(sums.spp) or not keeper.keep(basis(is_last=True)):
             raise
@@ -213,9 +198,8 @@ def _render_together(
             f"{sum(sums.spp)}{of} samples per pixel are kept; the same command goes on"
         ) from None
     finally:
-        del loaded, light_of
+        tracer.close()
         gc.collect()
-    return basis(is_last=True)
 
 
 def _render_one_by_one(

@@ -41,19 +41,12 @@ def largest_pass(pixels: int, *, shorter: int = 1) -> int:
 
 
 def plan_passes(
-    pixels: int,
-    spp: int,
-    *,
-    done: tuple[int, int] = (0, 0),
-    shorter: int = 1,
-    growing: bool = False,
+    pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1
 ) -> list[tuple[int, int]]:
     """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
 
     spp: what both halves come to together, or one more to make them equal.
     done: samples per pixel that each half has already.
-    growing: begin with small passes, each at most three times what its half has by then: for
-    those who learn from the passes before.
     """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
@@ -61,11 +54,8 @@ def plan_passes(
     lists = []
     # An interrupt may have left the second half behind: its turn is next.
     for half in (0, 1) if done[0] <= done[1] else (1, 0):
-        sizes, have, goal = [], done[half], -(-spp // 2)
-        while have < goal:
-            bound = min(largest, max(3 * have, -(-largest // 8))) if growing else largest
-            sizes.append(min(bound, goal - have))
-            have += sizes[-1]
+        left = max(0, -(-spp // 2) - done[half])
+        sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
         lists.append([(half, size) for size in sizes])
     return [one for pair in zip_longest(*lists) for one in pair if one is not None]
 

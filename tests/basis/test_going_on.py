@@ -42,15 +42,6 @@ def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:
     assert plan_passes(24 * 20, 40, done=(20, 20)) == []
 
 
-def test_who_learns_begins_with_small_passes() -> None:
-    plan = plan_passes(24 * 20, 40, growing=True)
-    assert [size for half, size in plan if half == 0] == [1, 3, 4, 4, 4, 4]
-    for done in range(1, len(plan)):
-        have = [sum(size for half, size in plan[:done] if half == which) for which in range(2)]
-        rest = plan_passes(24 * 20, 40, done=(have[0], have[1]), growing=True)
-        assert rest == plan[done:]
-
-
 @pytest.mark.parametrize("through_a_file", [True, False])
 def test_in_two_goes_as_in_one(tmp_path: Path, through_a_file: bool) -> None:
     scene = load_scene(write_room(tmp_path))
@@ -74,7 +65,7 @@ def test_an_interrupt_keeps_what_is_done(tmp_path: Path, after: int) -> None:
         if done == after:
             os.kill(os.getpid(), signal.SIGINT)
 
-    plan = plan_passes(24 * 20, 40, growing=True)
+    plan = plan_passes(24 * 20, 40)
     done = sum(size for _, size in plan[:after])
     with pytest.raises(Interrupted, match=f"{done} of 40"):
         render_basis(scene, spp=40, keep=keep, progress=press_ctrl_c)

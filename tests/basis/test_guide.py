@@ -63,7 +63,15 @@ def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     np.testing.assert_allclose(found, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
 
 
-def test_guided_planes_are_those_of_separate_renders_within_noise(tmp_path: Path) -> None:
+@pytest.mark.parametrize("enough", [2**12, 2**24])
+def test_guided_planes_are_those_of_separate_renders_within_noise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, enough: int
+) -> None:
+    """While it learns, and after."""
+    use_variant()
+    import lightpaint.basis.guide
+
+    monkeypatch.setattr(lightpaint.basis.guide, "ENOUGH", enough)
     from renderer import LIGHTS
 
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
