@@ -142,6 +142,9 @@ def report(
     gains = []
     for k, name in enumerate(alone):
         ratio = ours[names.index(name)] / theirs[k]
+        if ratio == 0:
+            print(f"{name:16s} {'too faint to tell':>27s}")
+            continue
         gains.append(speed / ratio)
         print(f"{name:16s} {ratio:26.2f}x {gains[-1]:13.1f}x lower")
     print(f"{'geometric mean':43s} {np.exp(np.mean(np.log(gains))):14.1f}x lower\n")

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-#: Width and height of the hall in metres; it grows in length with the lights.
-WIDTH, HEIGHT = 9.0, 4.5
-#: Metres between two rows of lights, of four each: down-light, washer, bulb, washer.
-ROW = 1.8
+#: Metres. Rows of four lights each, down-light, washer, bulb, washer, hang along its length.
+WIDTH, HEIGHT, LENGTH = 9.0, 4.5, 30.0
+#: Metres between two pairs of columns.
+BAY = 3.6
 
 DIFFUSE = '<bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf>'
 
@@ -17,15 +17,18 @@ def write_hall(folder: Path, lights: int, *, width: int, height: int) -> Path:
     Spots point down, washers are small areas along the walls, bulbs hang between; columns
     and partitions hide most of them from most places, as in a building.
     """
-    length = ROW * (lights / 4 + 1)
     path = folder / f"hall_{lights}.xml"
-    body = [*_room(length), *(_light(k) for k in range(lights)), *_things(length)]
+    body = [
+        *_room(LENGTH),
+        *(_light(k, 4 * LENGTH / lights) for k in range(lights)),
+        *_things(LENGTH),
+    ]
     path.write_text(
         f"""<scene version="3.0.0">
     <integrator type="path"><integer name="max_depth" value="6"/></integrator>
     <sensor type="perspective">
         <float name="fov" value="65"/>
-        <transform name="to_world"><lookat origin="1.2, 2.6, -1.5" target="-0.3, 1.4, {length / 3}"
+        <transform name="to_world"><lookat origin="1.2, 2.6, -1.5" target="-0.3, 1.4, {LENGTH / 3}"
         up="0, 1, 0"/></transform>
         <film type="hdrfilm"><integer name="width" value="{width}"/>
         <integer name="height" value="{height}"/></film>
@@ -38,9 +41,9 @@ def write_hall(folder: Path, lights: int, *, width: int, height: int) -> Path:
     return path
 
 
-def _light(k: int) -> str:
+def _light(k: int, spacing: float) -> str:
     row, place = divmod(k, 4)
-    z = ROW * (row + 0.5)
+    z = spacing * (row + 0.5)
     name = f'id="light_{k}"'
     if place == 0:
         return f"""<emitter type="spot" {name}><float name="cutoff_angle" value="28"/>
@@ -73,8 +76,8 @@ def _room(length: float) -> Iterator[str]:
 
 
 def _things(length: float) -> Iterator[str]:
-    for k in range(int(length / (2 * ROW))):
-        z = 2 * ROW * (k + 1)
+    for k in range(int(length / BAY) - 1):
+        z = BAY * (k + 1)
         for x in (-0.7, 3.2):
             yield f"""<shape type="cube"><transform name="to_world">
             <scale x="0.2" y="{HEIGHT / 2}" z="0.2"/><translate x="{x}" y="{HEIGHT / 2}" z="{z}"/>

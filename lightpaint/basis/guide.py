@@ -25,8 +25,8 @@ from lightpaint.images.exr import Floats
 
 #: Share of the samples that is spread evenly over the emitters of a cell.
 EVEN_SHARE = 0.1
-#: Samples after which there is little left to learn.
-ENOUGH = 2**23
+#: Questions after which there is little left to learn: in all, and for each emitter.
+ENOUGH, ENOUGH_EACH = 2**23, 2**17
 #: Samples' worth of trust in the mean over all cells, against what a cell has seen itself.
 PRIOR_SAMPLES = 0.5
 #: Distance from the camera over the width of a cell, at most; at least half of that.
@@ -86,7 +86,7 @@ class Guide:
         cumulative[known] = np.cumsum(found, axis=1)
         cumulative[:, -1] = 1
         self._cumulative = mi.Float(cumulative.ravel())
-        self._learning = bool(asked.sum() < ENOUGH)
+        self._learning = bool(asked.sum() < max(ENOUGH, ENOUGH_EACH * self.count))
         self._learns = dr.opaque(mi.Bool, self._learning)
         dr.eval(self._cumulative)
 

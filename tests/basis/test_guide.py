@@ -72,6 +72,7 @@ def test_guided_planes_are_those_of_separate_renders_within_noise(
     import lightpaint.basis.guide
 
     monkeypatch.setattr(lightpaint.basis.guide, "ENOUGH", enough)
+    monkeypatch.setattr(lightpaint.basis.guide, "ENOUGH_EACH", 0)
     from renderer import LIGHTS
 
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
