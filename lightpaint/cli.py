@@ -7,6 +7,7 @@ a disagreement; 2: something the user can mend, said in one line; 130: interrupt
 import argparse
 import io
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -25,7 +26,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         # What a command needs is imported when it runs: --help answers at once.
         from lightpaint import commands
+        from lightpaint.scene.variant import SlowBackendWarning
 
+        # The commands say it in their own words.
+        warnings.simplefilter("ignore", SlowBackendWarning)
         return int(getattr(commands, options.command)(options, given))
     except LightpaintError as error:
         print(f"lightpaint {options.command}: {error}", file=sys.stderr)

@@ -210,12 +210,13 @@ def cache(options: Namespace, _given: list[str]) -> int:
     if options.action == "clear":
         console.write(f"{bases.clear()} deleted from {bases.folder()}")
         return 0
-    table = console.table("scene", "sensor", "spp", "seed", "MB", "file")
+    table = console.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
     for entry in reversed(bases.entries()):
-        known = entry.origin
-        about = (
-            (known.scene, known.sensor, str(known.spp), str(known.seed)) if known else ("?",) * 4
-        )
+        known, about = entry.origin, ["?"] * 6
+        if known is not None and entry.image_size is not None:
+            height, width = entry.image_size
+            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
+            about += [str(known.spp), str(known.seed)]
         table.add_row(*map(escape, about), f"{entry.size / 1e6:.0f}", escape(entry.path.name))
     console.print_table(table)
     console.write(f"kept in {bases.folder()}")
@@ -262,6 +263,7 @@ def _load(options: Namespace, *, path: Path | None = None, is_to_solve: bool = T
         obstacles = [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]
         if obstacles:
             console.say(f"left as it is: {'; '.join(obstacles)}")
+    # Python gets the same as a warning.
     if note := use_variant().note:
         console.say(note)
     elif is_to_solve and (reason := why_not_one_pass(scene)):

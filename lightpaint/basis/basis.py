@@ -18,7 +18,7 @@ from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import (
     Floats,
     Part,
-    read_attributes,
+    read_headers,
     read_parts,
     rgb_channels,
     write_parts,
@@ -243,10 +243,12 @@ def read_basis(path: Path) -> Basis:
     return basis
 
 
-def read_origin(path: Path) -> Origin:
-    """Where the basis at `path` comes from, without reading its images."""
+def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
+    """Origin, (height, width) and number of lights of the basis at `path`, without its pixels."""
     try:
-        return _origin(json.loads(read_attributes(path)[ORIGIN_KEY]))
+        headers, size = read_headers(path)
+        lights = sum(LIGHT_KEY in header for header in headers)
+        return _origin(json.loads(headers[0][ORIGIN_KEY])), size, lights
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BasisError(f"{path} is no basis this version can read: {error}") from error
 

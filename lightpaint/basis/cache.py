@@ -27,11 +27,17 @@ LEFTOVER_S = 3600.0
 
 @dataclass(frozen=True)
 class Entry:
-    """One cached basis. size: in bytes. origin: None if the file cannot be read."""
+    """One cached basis.
+
+    size: in bytes. image_size: (height, width), lights: how many. origin and these are None
+    if the file cannot be read.
+    """
 
     path: Path
     size: int
     origin: Origin | None
+    image_size: tuple[int, int] | None = None
+    lights: int | None = None
 
 
 def folder() -> Path:
@@ -75,7 +81,7 @@ def is_kept(basis: Basis) -> bool:
     """Whether `basis` is kept, with all its samples."""
     origin = basis.origin
     path = _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
-    return path.is_file() and _origin_of(path) == origin
+    return path.is_file() and _entry(path).origin == origin
 
 
 def _prune(path: Path) -> None:
@@ -96,7 +102,7 @@ def _prune(path: Path) -> None:
 def entries() -> list[Entry]:
     """What is kept, the longest unused first."""
     files = sorted(folder().glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime)
-    return [Entry(path, path.stat().st_size, _origin_of(path)) for path in files]
+    return [_entry(path) for path in files]
 
 
 def clear() -> int:
@@ -112,8 +118,10 @@ def _path(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) ->
     return folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
 
 
-def _origin_of(path: Path) -> Origin | None:
+def _entry(path: Path) -> Entry:
+    size = path.stat().st_size
     try:
-        return read_origin(path)
+        origin, image_size, lights = read_origin(path)
     except LightpaintError:
-        return None
+        return Entry(path, size, None)
+    return Entry(path, size, origin, image_size, lights)

@@ -5,8 +5,8 @@ elsewhere, a window behind a wall. Space is divided into cells, and each cell re
 its surface points received from every emitter, shadows included. The next pass draws an
 emitter with a probability that follows it, relative to what the light of that emitter does
 in the whole picture, so that a faint light gets its rays where it matters as well as a
-bright one. A remainder is drawn evenly: no emitter is left out anywhere, and the mean of
-every image is the same whatever has been learned.
+bright one. A remainder is drawn evenly: no emitter is left out anywhere, so that the mean of
+every image does not depend on what has been learned.
 
 Import it once a variant is set and not a scalar one: its arrays do not exist before.
 """
@@ -54,6 +54,8 @@ class Guide:
         index_of = np.zeros(instances.max() + 1, np.uint32)
         index_of[instances] = np.arange(self.count)
         self._index_of = mi.UInt32(index_of)
+        # What the scene says is never to be sampled is dark, if it is a point.
+        self._sampled = np.array([emitter.sampling_weight() > 0 for emitter in scene.emitters()])
         shape = (2, self.cells, self.count)
         if learned is None or learned.shape != shape or not _is_sane(learned):
             learned = np.zeros(shape, np.float32)
@@ -77,14 +79,16 @@ class Guide:
         received, asked = self.learned()
         # Most cells of the table are nowhere: there the choice is even.
         known = asked.any(axis=1)
-        cumulative = np.tile(
-            np.arange(1, self.count + 1, dtype=np.float32) / self.count, (self.cells, 1)
-        )
+        even = np.cumsum(self._sampled, dtype=np.float32) / self._sampled.sum()
+        cumulative = np.tile(even, (self.cells, 1))
         found = _probabilities(
-            received[known].astype(np.float64), asked[known].astype(np.float64), self._lights
+            received[known].astype(np.float64),
+            asked[known].astype(np.float64),
+            self._lights,
+            self._sampled,
         )
         cumulative[known] = np.cumsum(found, axis=1)
-        cumulative[:, -1] = 1
+        cumulative[:, np.flatnonzero(self._sampled)[-1] :] = 1
         self._cumulative = mi.Float(cumulative.ravel())
         self._learning = bool(asked.sum() < max(ENOUGH, ENOUGH_EACH * self.count))
         self._learns = dr.opaque(mi.Bool, self._learning)
@@ -159,17 +163,18 @@ def _probabilities(
     received: npt.NDArray[np.float64],
     asked: npt.NDArray[np.float64],
     lights: npt.NDArray[np.int_],
+    sampled: npt.NDArray[np.bool_],
 ) -> npt.NDArray[np.float64]:
     """(cells, emitters) probabilities, from what was received and how often it was asked.
 
-    lights: the light of each emitter.
+    lights: the light of each emitter; sampled: whether it may be chosen at all.
     """
-    count = len(lights)
+    even = sampled / sampled.sum()
     everywhere = received.sum(axis=0) / np.maximum(asked.sum(axis=0), 1)
     mean = (received + PRIOR_SAMPLES * everywhere) / (asked + PRIOR_SAMPLES)
     visits = asked.sum(axis=1, keepdims=True)
     whole = np.bincount(lights, (mean * visits).sum(axis=0))[lights]
-    wanted = mean / np.where(whole > 0, whole, 1)
+    wanted = sampled * mean / np.where(whole > 0, whole, 1)
     total = wanted.sum(axis=1, keepdims=True)
-    wanted = np.where(total > 0, wanted / np.where(total > 0, total, 1), 1 / count)
-    return (1 - EVEN_SHARE) * wanted + EVEN_SHARE / count
+    wanted = np.where(total > 0, wanted / np.where(total > 0, total, 1), even)
+    return np.asarray((1 - EVEN_SHARE) * wanted + EVEN_SHARE * even)

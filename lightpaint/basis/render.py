@@ -191,7 +191,11 @@ def _render_together(
                     keeper.now_and_then(basis)
         return basis(is_last=True)
     except KeyboardInterrupt:
-        if keeper.keep is None or not all(sums.spp) or not keeper.keep(basis(is_last=True)):
+        if keeper.keep is None:
+            raise
+        if not all(sums.spp):
+            raise Interrupted("too early for anything to be kept") from None
+        if not keeper.keep(basis(is_last=True)):
             raise
         of = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(

@@ -39,9 +39,10 @@ class SobolPairs:
         y = mi.UInt32(x)
         for shift, low_halves in _BLOCKS:
             y ^= (y & mi.UInt32(low_halves)) << shift
-        x ^= seed * mi.UInt32(0x2C1B3C6D)
-        y ^= seed * mi.UInt32(0x297A2D39)
-        return mi.Point2f(_unit(x), _unit(y))
+        # Two words unrelated to the seed of the scrambling, whose lower bits they would undo.
+        shift_x = hashed(seed ^ 0x68BC21EB)
+        shift_y = hashed(shift_x ^ 0x02E5BE93)
+        return mi.Point2f(_unit(x ^ shift_x), _unit(y ^ shift_y))
 
     def at_vertex(self, depth, which):
         """Pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""

@@ -93,15 +93,16 @@ class Part:
         return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32, copy=False)
 
 
-def read_attributes(path: Path) -> dict[str, str]:
-    """Text attributes of the first part of an EXR file, without its pixels."""
+def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
+    """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
     with _silenced():
         try:
-            header = OpenEXR.File(str(path), header_only=True).parts[0].header
+            headers = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
+            size, _ = _windows(headers[0])
         except Exception as error:
             reason = _first_line(error)
             raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
-        return {k: v for k, v in header.items() if isinstance(v, str)}
+        return [{k: v for k, v in h.items() if isinstance(v, str)} for h in headers], size
 
 
 def _check_is_exr(path: Path) -> None:

@@ -205,7 +205,8 @@ def _members_of_groups(
                 if other != group:
                     raise SceneError(
                         f"light {name!r} is in two groups, {other!r} and {group!r}: "
-                        "an emitter has one weight"
+                        "an emitter has one weight; leave one of the groups out, or give it other "
+                        "members (groups of the lights file count too)"
                     )
     for group in groups:
         if group in names and group_of.get(group) is None:

@@ -11,6 +11,7 @@ import os
 import platform
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +27,10 @@ INSTALL_LLVM = (
     "pip install karellen-llvm-core (Linux x86-64), or install LLVM 17 or newer and set "
     "DRJIT_LIBLLVM_PATH to its libLLVM"
 )
+
+
+class SlowBackendWarning(UserWarning):
+    """Renders will take many times longer than they need to."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,7 @@ def _choose(mi: Any, llvm: Llvm | None) -> Backend:
         problem = f"no usable LLVM {OLDEST_LLVM} or newer"
     backend = _set(mi, PLAIN_VARIANT, None)
     note = f"{problem}: rendering with {PLAIN_VARIANT}, many times slower; {INSTALL_LLVM}"
+    warnings.warn(note, SlowBackendWarning, stacklevel=4)
     return Backend(backend.variant, note=note)
 
 

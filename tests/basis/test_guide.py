@@ -29,7 +29,8 @@ def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) ->
     use_variant()
     from lightpaint.basis.guide import _probabilities
 
-    return _probabilities(received, asked, np.asarray(lights))
+    sampled = np.ones(len(lights), dtype=bool)
+    return _probabilities(received, asked, np.asarray(lights), sampled)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 5))
@@ -128,3 +129,20 @@ def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
     gone_on = render_basis(scene, spp=64, start=replace(basis, learned=spoilt))
     assert np.isfinite(gone_on.images).all()
     assert gone_on.images.max() > 0
+
+
+def test_a_kept_emitter_that_is_never_sampled_is_as_dark_as_in_mitsuba(tmp_path: Path) -> None:
+    from renderer import LIGHTS, mitsuba_render
+
+    never = '<float name="sampling_weight" value="0"/></emitter>'
+    bulb, panel = (LIGHTS[name].replace("</emitter>", never) for name in ("bulb", "panel"))
+    path = write_room(tmp_path, lights=bulb + panel + LIGHTS["sky"])
+    scene = load_scene(path, lights=["sky"])
+    basis = render_basis(scene, spp=512)
+    rendered = mitsuba_render(scene, {"sky": (0.0, 0.0, 0.0)}, seed=1, spp=512)
+    kept = basis.image("rest")
+    noise = 2 * np.square(basis.half_differences[basis.names.index("rest")]).sum(dtype=np.float64)
+    # Noise: five standard errors of the difference of the sums. The panel is there by chance
+    # hits alone, the bulb not at all.
+    assert abs((kept - rendered).sum(dtype=np.float64)) <= 5 * np.sqrt(noise)
+    assert rendered.sum() > 0

@@ -147,14 +147,14 @@ def test_reading_without_a_terminal(tmp_path: Path, closed: str):
     code = """
 import os, sys
 from pathlib import Path
-from lightpaint.images.exr import read_attributes, read_parts
+from lightpaint.images.exr import read_headers, read_parts
 
 def standard():
     return [os.readlink(f"/proc/self/fd/{k}") if os.path.exists(f"/proc/self/fd/{k}") else None
             for k in (0, 1, 2)]
 
 before = standard()
-read_attributes(Path("a.exr"))
+read_headers(Path("a.exr"))
 pixels = read_parts(Path("a.exr"))[0].rgb()
 Path("said").write_text(f"{pixels.shape} {standard() == before}")
 """
