@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lightpaint.errors import ColorError
 from lightpaint.images.color import (
+    _colour,
     cct_and_duv,
     delta_e,
     hex_to_rgb,
@@ -111,7 +112,7 @@ def test_white_is_d65():
     found = cct_and_duv(np.ones(3))
     assert found is not None
     assert found[0] == pytest.approx(6504, abs=1)
-    np.testing.assert_allclose(kelvin_to_rgb(*found), 1, atol=1e-4)
+    np.testing.assert_allclose(kelvin_to_rgb(*found), 1, atol=1e-9)
 
 
 @given(MIREDS)
@@ -121,17 +122,16 @@ def test_temperature_and_back(mireds: float):
     assert luminance(rgb) == pytest.approx(1, abs=1e-12)
     found = cct_and_duv(rgb * 17)
     assert found is not None
-    # The table of the locus is interpolated; a tenth of a mired is far below what is seen.
-    assert 1e6 / found[0] == pytest.approx(mireds, abs=0.1)
-    assert found[1] == pytest.approx(0, abs=1e-5)
+    assert 1e6 / found[0] == pytest.approx(mireds, rel=1e-9)  # float64
+    assert found[1] == pytest.approx(0, abs=1e-12)
 
 
-@given(st.floats(100, 400), st.floats(-0.01, 0.01))
+@given(st.floats(100, 330), st.floats(-0.01, 0.01))  # all within Rec.709
 def test_temperature_off_the_locus_and_back(mireds: float, duv: float):
     found = cct_and_duv(kelvin_to_rgb(1e6 / mireds, duv))
     assert found is not None
-    assert 1e6 / found[0] == pytest.approx(mireds, abs=0.1)
-    assert found[1] == pytest.approx(duv, abs=1e-5)
+    assert 1e6 / found[0] == pytest.approx(mireds, rel=1e-9)
+    assert found[1] == pytest.approx(duv, abs=1e-12)
 
 
 def test_duv_is_positive_towards_green():
@@ -196,3 +196,28 @@ def test_what_is_no_colour(rgb: Any):
         rgb_to_hex(np.array(rgb))
     with pytest.raises(ColorError, match="three finite"):
         cct_and_duv(np.array(rgb))
+
+
+@given(st.floats(25, 1000), st.floats(-0.05, 0.05))
+def test_temperatures_are_those_of_colour_science(mireds: float, duv: float):
+    colour = _colour()
+    uv = colour.temperature.CCT_to_uv_Ohno2013([1e6 / mireds, duv])
+    x, y, z = colour.xy_to_XYZ(colour.UCS_uv_to_xy(uv))
+    expected = np.linalg.solve(RGB_TO_XYZ, np.array([x, y, z]))
+    rgb = kelvin_to_rgb(1e6 / mireds, duv)
+    # The library finds the right angle by a step of 0.01 K, which is good to four digits.
+    clipped = np.maximum(expected, 0)
+    clipped /= luminance(clipped)
+    np.testing.assert_allclose(rgb, clipped, atol=1e-4 * clipped.max())
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D50", "D55", "D65", "D75", "E", "FL1", "FL11"])
+def test_temperature_of_illuminants_of_colour_science(name: str):
+    colour = _colour()
+    x, y = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name]
+    uv = colour.UCS_to_uv(colour.XYZ_to_UCS(colour.xy_to_XYZ([x, y])))
+    expected = colour.temperature.uv_to_CCT_Ohno2013(uv)
+    found = cct_and_duv(_of_chromaticity(x, y))
+    assert found is not None
+    assert found[0] == pytest.approx(expected[0], rel=1e-5)
+    assert found[1] == pytest.approx(expected[1], abs=1e-6)
