@@ -94,8 +94,10 @@ def cct_and_duv(rgb: Floats) -> tuple[float, float] | None:
     beyond 1000 and 100,000 K. Raises ColorError unless it is three finite numbers.
     """
     rgb = _three(rgb)
-    xyz = _rgb_to_xyz() @ rgb
-    if not (rgb.any() and xyz.sum() > 0):
+    if rgb.max() <= 0:
+        return None
+    xyz = _rgb_to_xyz() @ (rgb / rgb.max())
+    if xyz.min() <= 0:
         return None
     x, y, z = xyz
     uv = np.array([4 * x, 6 * y]) / (x + 15 * y + 3 * z)

@@ -54,8 +54,8 @@ class Photometry:
     @property
     def amounts(self) -> tuple[str, str]:
         """Luminous quantity and luminous flux for people to read, each "" if there is none."""
-        luminous = "" if self.luminous is None else f"{self.luminous:.3g} {self.luminous_unit}"
-        return luminous, "" if self.flux_lm is None else f"{self.flux_lm:.3g} lm"
+        luminous = "" if self.luminous is None else f"{_spoken(self.luminous)} {self.luminous_unit}"
+        return luminous, "" if self.flux_lm is None else f"{_spoken(self.flux_lm)} lm"
 
     def fields(self) -> dict[str, Any]:
         """For JSON (docs/formats.md); what there is not is left out."""
@@ -127,6 +127,11 @@ def spot_flux(cutoff: float, beam_width: float) -> float:
     half = (c - b) / 2
     sinc = math.sin(half) / half if half > 1e-8 else 1.0
     return 2 * math.pi * (1 - math.cos((c + b) / 2) * sinc)
+
+
+def _spoken(value: float) -> str:
+    # 1,480 and not 1.48e+03, but no hundred digits either.
+    return f"{value:,.0f}" if 1000 <= value < 1e7 else f"{value:.3g}"
 
 
 def _times(a: RGB, b: RGB) -> RGB:

@@ -50,7 +50,7 @@ def amounts_heading(solution: Solution) -> str:
     """What stands in the column of fluxes: lumen where the scene has a scale, else no unit."""
     if solution.lighting.cd_per_unit is None:
         return "flux<br>(relative)"
-    return "luminous<br>and flux"
+    return "output"
 
 
 def _emission_cells(light: BasisLight, setting: LightSetting, seen: Photometry) -> str:
@@ -58,7 +58,7 @@ def _emission_cells(light: BasisLight, setting: LightSetting, seen: Photometry) 
     if light.is_fixed:
         return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td><td></td>'
     return (
-        f"<td>{_swatch(setting.emission, seen)}</td>"
+        f'<td class="colour">{_swatch(setting.emission, seen)}</td>'
         f'<td class="rgb">{_rgb(light.emission)}</td>'
         f'<td class="rgb">{_rgb(setting.emission)}</td>'
         f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'

@@ -1,5 +1,6 @@
 """What "one unit" of each kind of light means, and how its present emission is read."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -166,8 +167,9 @@ def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float 
     is_cone = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-4 * squares[0, 0])
     if texture is None or not is_cone or np.ptp(texture) > 1e-6:
         return None
-    cutoff, beam = (float(np.radians(parameters[k])) for k in ("cutoff_angle", "beam_width"))
-    return float(texture.mean()) * spot_flux(cutoff, beam)
+    angles = (np.array(parameters[key]).ravel()[0] for key in ("cutoff_angle", "beam_width"))
+    cutoff, beam_width = (math.radians(float(angle)) for angle in angles)
+    return float(texture.mean()) * spot_flux(cutoff, beam_width)
 
 
 def describe_form(emitter: Any, plugin: str) -> str:
