@@ -58,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     lights = _command(commands, "lights", "list the lights of a scene")
     _add_scene(lights)
     _add_lights(lights)
+    _add_unit(lights)
     lights.add_argument("--json", action="store_true", help="as JSON, for other programs")
 
     basis = _command(commands, "basis", "render the image of each light alone")
@@ -97,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
+    _add_unit(solve)
     _add_lights(solve)
     _add_budget(solve)
     _add_cache(solve)
@@ -253,6 +255,17 @@ def _add_cache(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_unit(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--unit",
+        dest="cd_per_unit",
+        type=_scale,
+        metavar="CD/M2",
+        help="cd/m² that a radiance of 1 in the scene stands for, to have lumen, candela and lux "
+        "(default: numbers in proportion, without a unit)",
+    )
+
+
 def _add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
 
@@ -301,6 +314,16 @@ def _seconds(text: str) -> float:
         value = 0.0
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds > 0")
+    return value
+
+
+def _scale(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of cd/m² > 0")
     return value
 
 

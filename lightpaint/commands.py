@@ -15,6 +15,7 @@ from lightpaint.basis.render import memory_needed, why_not_one_pass
 from lightpaint.doctor import examine
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_writable
+from lightpaint.images.photometry import Photometry, photometry
 from lightpaint.pipeline import (
     Look,
     command_line,
@@ -28,7 +29,7 @@ from lightpaint.relight.relight import check_relightable, scene_of
 from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.scene.emitters import MULTIPLE
-from lightpaint.scene.lights import WHOLE_EMISSION, Light
+from lightpaint.scene.lights import WHOLE_EMISSION, Emitter, Light
 from lightpaint.scene.quality import with_quality
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
@@ -40,18 +41,34 @@ def lights(options: Namespace, _given: list[str]) -> int:
     """`lightpaint lights SCENE`"""
     scene = _load(options)
     if options.json:
-        listed = [_described(light) for light in scene.lights]
-        console.write(json.dumps({"scene": str(scene.path), "lights": listed}, indent=2))
+        listed = [_described(light, options.cd_per_unit) for light in scene.lights]
+        scale = {} if options.cd_per_unit is None else {"cd_per_unit": options.cd_per_unit}
+        data = {"scene": str(scene.path), **scale, "lights": listed}
+        console.write(json.dumps(data, indent=2))
         return 0
-    table = console.table("light", "plugin", "emission R G B", "unit", "size or place", "sampling")
+    headings = ("light", "plugin", "emission R G B", "unit", "size or place", "sampling", "colour")
+    # Lumen and candela only where somebody has said what a number stands for.
+    amounts = () if options.cd_per_unit is None else ("luminous", "flux")
+    table = console.table(*headings, *amounts)
     for light in scene.lights:
         single = light.member_names == (light.name,) and not light.is_fixed
         if not single:
             what = "kept as it is" if light.is_fixed else console.numbers(light.emission)
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
-            table.add_row(escape(light.name), light.plugin, what, unit, count, "")
+            whole = _photometry(light, options.cd_per_unit)
+            table.add_row(
+                escape(light.name),
+                light.plugin,
+                what,
+                unit,
+                count,
+                "",
+                "" if light.is_fixed else whole.color,
+                *whole.amounts[: len(amounts)],
+            )
         for member in light.members:
+            its = _photometry(member, options.cd_per_unit)
             table.add_row(
                 escape(member.name if single else f"  {member.name}"),
                 member.plugin,
@@ -59,12 +76,25 @@ def lights(options: Namespace, _given: list[str]) -> int:
                 member.kind.unit if member.kind is not None else MULTIPLE,
                 member.form,
                 f"{member.sampling_weight:g}",
+                its.color,
+                *its.amounts[: len(amounts)],
             )
     console.print_table(table)
     return 0
 
 
-def _described(light: Light) -> dict[str, Any]:
+def _photometry(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
+    """As the scene has it."""
+    unit, flux = MULTIPLE, None
+    if isinstance(light, Light):
+        unit, flux = light.unit, light.unit_flux
+    elif light.kind is not None:
+        unit = light.kind.unit
+        flux = None if light.unit_flux is None else (light.unit_flux,) * 3
+    return photometry(light.emission, unit=unit, unit_flux=flux, cd_per_unit=cd_per_unit)
+
+
+def _described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
     """A light, and the emitters in it, for other programs."""
     members = [
         {
@@ -75,6 +105,7 @@ def _described(light: Light) -> dict[str, Any]:
             "emission": list(member.emission),
             "form": member.form,
             "sampling_weight": member.sampling_weight,
+            "photometry": _photometry(member, cd_per_unit).fields(),
         }
         for member in light.members
     ]
@@ -86,6 +117,7 @@ def _described(light: Light) -> dict[str, Any]:
         "emission": list(light.emission),
         "form": light.form,
         "is_fixed": light.is_fixed,
+        "photometry": _photometry(light, cd_per_unit).fields(),
         "members": members,
     }
     if len(members) == 1:
@@ -161,6 +193,7 @@ def solve(options: Namespace, given: list[str]) -> int:
                 folder,
                 basis=made,
                 unpainted=options.unpainted,
+                cd_per_unit=options.cd_per_unit,
                 spp=options.spp,
                 time_s=options.time_s,
                 quality=options.quality,
@@ -341,11 +374,14 @@ def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
 
 def _show(look: Look, folder: Path) -> None:
     shares = energy_shares(look.basis, look.lighting)
-    table = console.table("light", "plugin", "emission now", "solved R G B", "unit", "share")
+    headings = ("light", "plugin", "emission now", "solved R G B", "unit", "share", "colour")
+    amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
+    table = console.table(*headings, *amounts)
     for light, now, share in zip(look.lighting.lights, look.basis.lights, shares, strict=True):
         solved = "off" if not any(light.emission) else console.numbers(light.emission)
         if light.name in look.solution.quality.unreached and any(light.emission):
             solved += " (kept)"
+        seen = look.lighting.photometry(light)
         table.add_row(
             escape(light.name),
             light.plugin,
@@ -353,6 +389,8 @@ def _show(look: Look, folder: Path) -> None:
             "kept" if light.is_fixed else solved,
             "" if light.is_fixed else light.unit,
             f"{100 * share:.1f} %",
+            "" if light.is_fixed else seen.color,
+            *seen.amounts[: len(amounts)],
         )
     console.print_table(table)
     console.write(verdict(look.solution, look.predicted, look.verification))

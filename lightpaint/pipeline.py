@@ -3,12 +3,12 @@
 import json
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
-from lightpaint.basis.render import is_of, render_basis
+from lightpaint.basis.render import basis_lights, is_of, render_basis
 from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError
 from lightpaint.files import check_writable, restoring, write_text
 from lightpaint.images.blocks import whole_factor
@@ -88,6 +88,7 @@ def paint_with_light(
     lights: Iterable[str] | None = None,
     groups: Mapping[str, Iterable[str]] | None = None,
     resize: bool = False,
+    cd_per_unit: float | None = None,
     use_cache: bool = True,
     command: str = "",
     progress: Progress = silent,
@@ -106,6 +107,8 @@ def paint_with_light(
     time_s: instead of spp, seconds in which the basis is rendered.
     quality: preset of spp and resolution, where these are not given. With a time or a preset
     the verification has about as many samples as the basis, whatever the resolution.
+
+    cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
 
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
     """
@@ -137,6 +140,7 @@ def paint_with_light(
             scene, spp=spp, time_s=time_s, seed=seed, use_cache=use_cache, progress=progress
         )
     solution = solve(basis, target, unpainted=unpainted)
+    solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=cd_per_unit))
     predicted = combine(basis, solution.lighting)
     as_basis = spp or basis.origin.spp if asked is None and (time_s or quality) else None
     relit, verification = None, None
@@ -206,6 +210,9 @@ def obtain_basis(
     start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if start is not None and not is_of(scene, start, seed):
         start = None
+    if start is not None:
+        # One kept by an earlier version may know less of the same lights.
+        start = replace(start, lights=basis_lights(scene))
     basis = render_basis(
         scene,
         spp=spp,

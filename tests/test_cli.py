@@ -216,6 +216,23 @@ def test_lights_as_table_and_json(tmp_path: Path) -> None:
     np.testing.assert_allclose(data["lights"][0]["emission"], [7, 6.8, 6.4], rtol=1e-6)
 
 
+def test_lights_in_candela_and_lumen_where_the_scene_has_a_unit(tmp_path: Path) -> None:
+    plain = succeed(tmp_path, "lights", CORNELL)
+    assert "K" in plain
+    assert "lm" not in plain
+    assert "cd/m²" in succeed(tmp_path, "lights", CORNELL, "--unit", 100)
+    data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json", "--unit", 100))
+    assert data["cd_per_unit"] == 100
+    lamp = next(light for light in data["lights"] if light["name"] == "lamp")
+    found, y = lamp["photometry"], np.dot(lamp["emission"], [0.2126, 0.7152, 0.0722])
+    assert found["luminous_unit"] == "cd"
+    assert found["luminous"] == pytest.approx(100 * y)
+    assert found["flux_lm"] == pytest.approx(4 * np.pi * 100 * y, rel=1e-6)
+    assert lamp["members"][0]["photometry"] == found
+    for wrong in ("0", "-1", "bright", "inf"):
+        assert "cd/m²" in refused(tmp_path, "lights", CORNELL, f"--unit={wrong}")
+
+
 def test_template_is_the_current_look(tmp_path: Path) -> None:
     succeed(tmp_path, "template", CORNELL, "-o", "t.exr", "--spp", 4)
     [part] = read_parts(tmp_path / "t.exr")

@@ -45,6 +45,7 @@ class BasisLight:
     is_scalar: whether it can only be scaled as a whole, and has one weight for all channels.
     is_fixed: whether it is what stays as it is: its weight is 1, whatever is painted.
     members: names of the emitters it consists of; itself if none are given.
+    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
     """
 
     name: str
@@ -56,6 +57,7 @@ class BasisLight:
     is_scalar: bool = False
     is_fixed: bool = False
     members: tuple[str, ...] = ()
+    unit_flux: RGB | None = None
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -65,6 +67,11 @@ class BasisLight:
         if not all(math.isfinite(v) and v >= 0 for v in self.emission):
             raise BasisError(
                 f"light {self.name!r} has the emission {list(self.emission)}: "
+                "need three numbers >= 0"
+            )
+        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+            raise BasisError(
+                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: "
                 "need three numbers >= 0"
             )
 
@@ -273,6 +280,8 @@ def _light_fields(light: BasisLight) -> dict[str, Any]:
         del data["members"]
     if not light.is_fixed:
         del data["is_fixed"]
+    if light.unit_flux is None:
+        del data["unit_flux"]
     return data
 
 
@@ -281,7 +290,11 @@ def _light(data: dict[str, Any]) -> BasisLight:
     members = data.pop("members", [])
     if not isinstance(members, list):
         raise TypeError(f"members is a list of names, not {members!r}")
-    return BasisLight(emission=(r, g, b), members=tuple(map(str, members)), **data)
+    flux = data.pop("unit_flux", None)
+    if flux is not None:
+        red, green, blue = map(float, flux)
+        flux = (red, green, blue)
+    return BasisLight(emission=(r, g, b), members=tuple(map(str, members)), unit_flux=flux, **data)
 
 
 def _free_name(name: str, taken: tuple[str, ...]) -> str:

@@ -16,6 +16,7 @@ from lightpaint.images.exr import Floats
 from lightpaint.relight.pictures import exposure_of, spoken_stops, target_picture
 from lightpaint.relight.report_pictures import Picture, maps, wipe
 from lightpaint.relight.report_tables import (
+    amounts_heading,
     fit_table,
     lights_table,
     render_table,
@@ -61,6 +62,7 @@ def report_page(
         exposure=_exposure(stops, predicted.image),
         maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
         lights=lights_table(basis, solution),
+        amounts=amounts_heading(solution),
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, verification),

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import RGB, Basis, BasisLight
-from lightpaint.images.color import luminance
-from lightpaint.images.display import encode_display, to_8_bit
+from lightpaint.images.color import luminance, rgb_to_hex
+from lightpaint.images.display import to_8_bit
+from lightpaint.images.photometry import Photometry
 from lightpaint.relight.report_pictures import data_uri, thumbnail
 from lightpaint.relight.verdict import energy_shares, relative_residual
 from lightpaint.relight.verify import LIMIT, Verification
@@ -37,7 +38,7 @@ def lights_table(basis: Basis, solution: Solution) -> str:
             f'title="{what}"></td>'
             f'<th scope="row">{name}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
-            f"{_emission_cells(light, setting)}"
+            f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
             f"<td>{change(light, setting, solution.quality.unreached)}</td>"
             f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
             f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
@@ -45,15 +46,23 @@ def lights_table(basis: Basis, solution: Solution) -> str:
     return "".join(rows)
 
 
-def _emission_cells(light: BasisLight, setting: LightSetting) -> str:
-    """Colour, emission before and after, and their unit."""
+def amounts_heading(solution: Solution) -> str:
+    """What stands in the column of fluxes: lumen where the scene has a scale, else no unit."""
+    if solution.lighting.cd_per_unit is None:
+        return "flux<br>(relative)"
+    return "output"
+
+
+def _emission_cells(light: BasisLight, setting: LightSetting, seen: Photometry) -> str:
+    """Colour, emission before and after, their unit, and what an eye makes of it."""
     if light.is_fixed:
-        return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td>'
+        return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td><td></td>'
     return (
-        f"<td>{_swatch(setting.emission)}</td>"
+        f'<td class="colour">{_swatch(setting.emission, seen)}</td>'
         f'<td class="rgb">{_rgb(light.emission)}</td>'
         f'<td class="rgb">{_rgb(setting.emission)}</td>'
         f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
+        f'<td class="rgb">{_amounts(seen)}</td>'
     )
 
 
@@ -158,18 +167,27 @@ def versions(basis: Basis) -> str:
 
 def hex_color(emission: RGB) -> str | None:
     """Colour of a light as #rrggbb, its brightest channel at full; None if it is off."""
-    brightest = max(emission)
-    if brightest <= 0:
-        return None
-    r, g, b = to_8_bit(encode_display(np.array(emission) / brightest))
-    return f"#{r:02x}{g:02x}{b:02x}"
+    return rgb_to_hex(np.array(emission)) if any(emission) else None
 
 
-def _swatch(emission: RGB) -> str:
-    color = hex_color(emission)
-    if color is None:
+def _swatch(emission: RGB, seen: Photometry) -> str:
+    """The colour of a light; of one whose own is not known, that of its factor."""
+    color = seen.hex or hex_color(emission)
+    if color is None or not any(emission):
         return '<span class="swatch none"></span><small>off</small>'
-    return f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
+    kelvin = "" if seen.kelvin is None else f"{seen.kelvin:.0f} K"
+    away = "" if seen.duv is None else f"Duv {seen.duv:+.3f}".replace("-", "−")
+    return (
+        f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
+        f"{f'<small>{kelvin}</small><small>{away}</small>' if kelvin else ''}"
+    )
+
+
+def _amounts(seen: Photometry) -> str:
+    """Luminous quantity and flux; without a scale, the flux in proportion."""
+    if seen.luminous is not None or seen.flux_lm is not None:
+        return "<br>".join(filter(None, seen.amounts))
+    return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
 
 
 def _rgb(emission: RGB) -> str:

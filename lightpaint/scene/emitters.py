@@ -1,5 +1,6 @@
 """What "one unit" of each kind of light means, and how its present emission is read."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.errors import SceneError
+from lightpaint.images.photometry import lambertian_flux, point_flux, spot_flux
 
 RGB = tuple[float, float, float]
 
@@ -138,6 +140,36 @@ def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> Non
             f"light {name!r} cannot be rendered by {integrator} in {mi.variant()}: Mitsuba says "
             f"{reason!r}; give it a colour, <rgb .../>"
         ) from None
+
+
+def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float | None:
+    """Watts that a loaded emitter of one colour radiates at an emission of 1, by its form.
+
+    In W where a unit of the scene is a metre. None for what has no flux of its own (a sky, a
+    sun) and for what is not of one colour in all directions.
+    """
+    import mitsuba as mi
+
+    if kind is None or kind.scaling is not Scaling.COLOUR:
+        return None
+    if plugin == "area":
+        return lambertian_flux(float(np.array(emitter.get_shape().surface_area()).ravel()[0]))
+    if plugin == "point":
+        return point_flux()
+    if plugin != "spot":
+        return None
+    parameters = mi.traverse(emitter)
+    axes = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)[:3, :3]
+    squares = axes.T @ axes
+    texture = np.array(parameters["texture.value"]) if "texture.value" in parameters else None
+    # A cone that is sheared or stretched is no cone, and a picture has no closed form. Both
+    # thresholds are Mitsuba's float32.
+    is_cone = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-4 * squares[0, 0])
+    if texture is None or not is_cone or np.ptp(texture) > 1e-6:
+        return None
+    angles = (np.array(parameters[key]).ravel()[0] for key in ("cutoff_angle", "beam_width"))
+    cutoff, beam_width = (math.radians(float(angle)) for angle in angles)
+    return float(texture.mean()) * spot_flux(cutoff, beam_width)
 
 
 def describe_form(emitter: Any, plugin: str) -> str:

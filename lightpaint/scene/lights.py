@@ -27,6 +27,7 @@ class Emitter:
     emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
     file, offset: where its element's `<` stands: index into Scene.files, byte offset.
     obstacle: why it cannot be solved for, in words behind its name; "" if it can.
+    unit_flux: watts per channel at an emission of 1; None where there is no such number.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Emitter:
     file: int
     offset: int
     obstacle: str = ""
+    unit_flux: float | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,20 @@ class Light:
         if len(self.members) == 1:
             return self.members[0].form
         return f"{len(self.members)} emitters: {', '.join(self.member_names)}"
+
+    @property
+    def unit_flux(self) -> RGB | None:
+        """Watts per channel at an emission of 1, of all members together.
+
+        None where one of them has no flux that is known.
+        """
+        total = [0.0, 0.0, 0.0]
+        for member in self.members:
+            if member.unit_flux is None:
+                return None
+            for k, emission in enumerate(self.emission_of(member, (1.0, 1.0, 1.0))):
+                total[k] += emission * member.unit_flux
+        return total[0], total[1], total[2]
 
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
         """What `member` emits, in its own unit, where this light has `emission`."""

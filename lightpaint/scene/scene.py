@@ -21,6 +21,7 @@ from lightpaint.scene.emitters import (
     check_rendered,
     describe_form,
     emission_kind,
+    flux_of_unit,
     read_emission,
     why_not_adjusted,
 )
@@ -313,6 +314,7 @@ def _find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
                 file=node.file_index,
                 offset=node.offset - 1,
                 obstacle=why_not_adjusted(plugin, kind, emission),
+                unit_flux=flux_of_unit(emitter, plugin, kind),
             )
         )
     return tuple(sorted(found, key=lambda emitter: emitter.node))

@@ -13,6 +13,7 @@ from lightpaint.basis.basis import RGB, Basis, BasisLight, mix
 from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate
+from lightpaint.images.photometry import Photometry, photometry
 from lightpaint.solve.normal_equations import Doubles
 from lightpaint.version import __version__
 
@@ -27,6 +28,7 @@ class LightSetting:
     weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
     is_fixed: whether it is what stays as it is in the scene, with weight 1.
     members: names of the emitters it consists of; itself if none are given.
+    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
     """
 
     name: str
@@ -37,6 +39,7 @@ class LightSetting:
     weight: RGB
     is_fixed: bool = False
     members: tuple[str, ...] = ()
+    unit_flux: RGB | None = None
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -50,6 +53,11 @@ class LightSetting:
                 raise LightingError(
                     f"light {self.name!r} is kept as it is, so its {what} is 1 1 1, not {list(rgb)}"
                 )
+        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+            raise LightingError(
+                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: "
+                "need three numbers >= 0"
+            )
 
 
 @dataclass(frozen=True)
@@ -72,12 +80,17 @@ class Quality:
 
 @dataclass(frozen=True)
 class Lighting:
-    """Emissions for named lights. quality: of the solve they come from, if they do."""
+    """Emissions for named lights.
+
+    quality: of the solve they come from, if they do.
+    cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+    """
 
     lights: tuple[LightSetting, ...]
     target: str = ""
     scene_identity: str = ""
     quality: Quality | None = None
+    cd_per_unit: float | None = None
 
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]
@@ -86,6 +99,9 @@ class Lighting:
         members = [name for light in self.lights for name in light.members]
         if len(set(members)) != len(members):
             raise LightingError(f"an emitter is in two lights: {', '.join(sorted(members))}")
+        scale = self.cd_per_unit
+        if scale is not None and not 0 < scale < math.inf:
+            raise LightingError(f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0")
 
     @property
     def members(self) -> Mapping[str, tuple[str, ...]]:
@@ -101,6 +117,15 @@ class Lighting:
     def emission(self) -> Mapping[str, RGB]:
         """RGB emission by name of light."""
         return {light.name: light.emission for light in self.lights}
+
+    def photometry(self, light: LightSetting) -> Photometry:
+        """Colour, temperature and flux of one of its lights."""
+        return photometry(
+            light.emission,
+            unit=light.unit,
+            unit_flux=light.unit_flux,
+            cd_per_unit=self.cd_per_unit,
+        )
 
     def with_emission(self, name: str, emission: RGB) -> "Lighting":
         """This lighting with another RGB emission for one light, and no claim to be optimal.
@@ -165,6 +190,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
         "lightpaint": __version__,
         "target": lighting.target,
         "scene_identity": lighting.scene_identity,
+        **({} if lighting.cd_per_unit is None else {"cd_per_unit": lighting.cd_per_unit}),
         "lights": {
             light.name: {
                 "plugin": light.plugin,
@@ -173,6 +199,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
                 "emission": list(light.emission),
                 "weight": list(light.weight),
                 **_ties(light),
+                **_photometry(lighting, light),
             }
             for light in lighting.lights
         },
@@ -207,6 +234,7 @@ def read_lighting(path: str | Path) -> Lighting:
             target=_read_text(data, "target"),
             scene_identity=_read_text(data, "scene_identity"),
             quality=_read_quality(data["solve"]) if "solve" in data else None,
+            cd_per_unit=_read_scale(data["cd_per_unit"]) if "cd_per_unit" in data else None,
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise LightingError(f"{path} is no complete lighting: {error!r}") from None
@@ -233,6 +261,7 @@ def _setting(light: BasisLight, weight: RGB) -> LightSetting:
         weight=weight,
         is_fixed=light.is_fixed,
         members=light.members,
+        unit_flux=light.unit_flux,
     )
 
 
@@ -244,6 +273,12 @@ def _ties(light: LightSetting) -> dict[str, Any]:
     if light.members != (light.name,):
         ties["members"] = list(light.members)
     return ties
+
+
+def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
+    """What follows from the emission, for people and programs; only `unit_flux` is read back."""
+    known: dict[str, Any] = {} if light.unit_flux is None else {"unit_flux": list(light.unit_flux)}
+    return known if light.is_fixed else {**known, "photometry": lighting.photometry(light).fields()}
 
 
 def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
@@ -261,6 +296,7 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
         _read_rgb(data["weight"]),
         is_fixed,
         tuple(members),
+        _read_rgb(data["unit_flux"]) if "unit_flux" in data else None,
     )
 
 
@@ -289,6 +325,12 @@ def _read_text(data: dict[str, Any], key: str) -> str:
     if not isinstance(text, str):
         raise TypeError(f"{key} is a text, not {text!r}")
     return text
+
+
+def _read_scale(value: Any) -> float:
+    if type(value) not in (int, float):
+        raise TypeError(f"cd_per_unit is a number, not {value!r}")
+    return float(value)
 
 
 def _read_rgb(values: Any) -> RGB:

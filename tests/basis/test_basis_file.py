@@ -131,6 +131,10 @@ BAD_LIGHTS: list[Any] = [
     *[{k: v for k, v in GOOD_LIGHT.items() if k != gone} for gone in GOOD_LIGHT if gone != "form"],
     GOOD_LIGHT | {"colour": "red"},
     *[GOOD_LIGHT | {"emission": bad} for bad in ([1, 2], 5, None, [1, 2, "x"], [1, 2, 10**400])],
+    *[
+        GOOD_LIGHT | {"unit_flux": bad}
+        for bad in ([1, 2], 5, [1, 2, "x"], [1, 2, -1], [1, 2, None])
+    ],
     GOOD_LIGHT | {"name": "back/rim.left"},
     [],
     "key",
@@ -215,3 +219,11 @@ def test_names_of_basis_files():
     assert is_basis_file(Path("a.basis.exr"))
     assert is_basis_file(Path("A.EXR"))
     assert not is_basis_file(Path("scene.xml"))
+
+
+def test_flux_goes_along_where_it_is_known(tmp_path: Path, make_basis: Any):
+    made = make_basis(2)
+    known = replace(made.lights[0], unit_flux=(1.5, 1.5, 1.5))
+    basis = replace(made, lights=(known, made.lights[1]))
+    write_basis(tmp_path / "f.basis.exr", basis)
+    assert read_basis(tmp_path / "f.basis.exr").lights == basis.lights

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.render import WHITE, render_basis
+from lightpaint.basis.render import render_basis
+from lightpaint.basis.separate import WHITE
 from lightpaint.errors import SceneError
 from lightpaint.images.exr import write_rgb
 from lightpaint.relight.relight import relight

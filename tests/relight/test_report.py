@@ -3,6 +3,7 @@
 import base64
 import io
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
@@ -383,3 +384,20 @@ def test_the_verdict_tells_of_the_verification(make_basis: Any):
         f"({z.difference:.1f} standard errors apart, limit 5)."
     )
     assert "DISAGREE" in verdict(bad["solution"], bad["predicted"], bad["verification"])
+
+
+@pytest.mark.parametrize(
+    ("scale", "shown"), [(None, ["flux(relative)", "6504 K"]), (100.0, ["200 cd/m²", "600 lm"])]
+)
+def test_colour_and_flux_of_a_light(make_basis: Any, scale: float | None, shown: list[str]):
+    result = _result(make_basis)
+    solution = result["solution"]
+    light = replace(
+        solution.lighting.lights[0], emission=(2, 2, 2), weight=(2, 2, 2), unit_flux=(3, 3, 3)
+    )
+    lights = (light, *solution.lighting.lights[1:])
+    lighting = replace(solution.lighting, lights=lights, cd_per_unit=scale)
+    text = report_page(**result | {"solution": replace(solution, lighting=lighting)})
+    plain = text.replace("<br>", "")
+    assert all(words in plain for words in [*shown, "#ffffff"])
+    assert (" lm" in plain) == (scale is not None)

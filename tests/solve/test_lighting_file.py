@@ -252,3 +252,34 @@ def test_ties_that_are_wrong(tmp_path: Path, change: dict[str, Any], words: str)
     path.write_text(json.dumps(data), encoding="utf-8")
     with pytest.raises(LightingError, match=words):
         read_lighting(path)
+
+
+def test_photometry_goes_along_and_what_follows_is_not_read_back(tmp_path: Path):
+    lamp = LightSetting(
+        "lamp", "area", "radiance", "W/(m² sr)", (1, 1, 1), (1, 1, 1), unit_flux=(2, 2, 2)
+    )
+    off = LightSetting("off", "directional", "irradiance", "W/m²", (0, 0, 0), (0, 0, 0))
+    lighting = Lighting((lamp, off), cd_per_unit=100)
+    path = tmp_path / "lighting.json"
+    write_lighting(path, lighting)
+    assert read_lighting(path) == lighting
+    data = json.loads(path.read_text(encoding="utf-8"))
+    found = data["lights"]["lamp"]["photometry"]
+    assert found["hex"] == "#ffffff"
+    assert found["cct_k"] == pytest.approx(6504, abs=1)
+    assert found["luminous"] == pytest.approx(100)
+    assert found["flux_lm"] == pytest.approx(200)
+    assert data["lights"]["off"]["photometry"] == {"y": 0, "luminous": 0, "luminous_unit": "lx"}
+    data["lights"]["lamp"]["photometry"] = "whatever"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    assert read_lighting(path) == lighting
+
+
+@pytest.mark.parametrize("scale", [0, -1, "1", True])
+def test_a_scale_that_is_none(tmp_path: Path, scale: object):
+    path = tmp_path / "lighting.json"
+    write_lighting(path, Lighting(()))
+    data = json.loads(path.read_text(encoding="utf-8")) | {"cd_per_unit": scale}
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(LightingError, match=r"cd/m²|cd_per_unit"):
+        read_lighting(path)
