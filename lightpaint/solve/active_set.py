@@ -6,9 +6,10 @@ import numpy as np
 
 from lightpaint.solve.quadratic import EPSILON, Bools, Doubles, Quadratic
 
-#: Added to the unit diagonal of M, so that no set of lights, coincident ones included, is
-#: singular. A step then is that of the proximal-point method: repeated, it loses nothing.
-RIDGE = 1e-13
+#: Times √n, added to the unit diagonal of M, so that no set of lights, coincident ones
+#: included, is singular. A step then is that of the proximal-point method: repeated, it loses
+#: nothing.
+RIDGE = 8 * EPSILON
 
 
 @dataclass
@@ -89,7 +90,7 @@ def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> D
         return move
     matrix = np.zeros((f + k, f + k))
     matrix[:f, :f] = q.M[free[:, None], free]
-    matrix.flat[: f * (f + k) : f + k + 1] += RIDGE
+    matrix.flat[: f * (f + k) : f + k + 1] += RIDGE * np.sqrt(f)
     rest = np.zeros(f + k)
     rest[:f] = -gradient[free]
     if k:

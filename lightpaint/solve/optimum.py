@@ -14,12 +14,10 @@ from lightpaint.solve.threads import one_thread
 
 __all__ = ["Cap", "Method", "Optimum", "minimise"]
 
-#: The paper's iteration alone, or with Newton's on the limits it finds.
+#: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]
 
-#: Sweeps before the first polish: they find most of what is held at its bounds.
-FIRST_SWEEPS = 2
-#: Sweeps between polishes, if one did not do.
+#: Sweeps before a polish is tried again, if one did not do.
 SWEEPS_BETWEEN = 50
 
 
@@ -71,7 +69,7 @@ def minimise(
     result.
 
     If M is singular, as with two lights at one place, many x are optimal. Directions in which
-    nothing changes are then left as sweeps from `start` leave them; unknowns with M_ii = 0 keep
+    nothing changes are then left about as they are at `start`: a Newton step does not move along them; unknowns with M_ii = 0 keep
     their start. Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """
     q = scaled(np.asarray(M, np.float64), np.asarray(b, np.float64), lower, upper, tuple(caps))
@@ -99,10 +97,10 @@ def minimise(
 def _polished(
     q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int
 ) -> tuple[Doubles, int, int]:
-    """(x, sweeps, steps): a few sweeps find what is held, the polish does the rest."""
+    """(x, sweeps, steps): the polish from the start; sweeps before each further try."""
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
-    count = FIRST_SWEEPS
+    count = 0
     while residual > tolerance and sweeps < max_sweeps:
         gradient = q.gradient(x)
         for _ in range(min(count, max_sweeps - sweeps)):

@@ -47,18 +47,17 @@ class TiledEquations:
         self.side = side_for(n, height, width) if side is None else side
         self._rows, self._columns = -(-height // self.side), -(-width // self.side)
         self._leaves = 1 << max(self._rows * self._columns - 1, 0).bit_length()
-        # A node is (3, n + 1, n + 1): the target goes along as one more image. Node 1 is the root.
-        self._nodes = np.zeros((2 * self._leaves, 3, n + 1, n + 1))
-        self.update((slice(0, height), slice(0, width)))
+        # Node 1 is the root. What a stroke of colour leaves as it is, M, is kept apart from what
+        # it changes, b and ‖Ψ‖².
+        self._M = np.zeros((2 * self._leaves, 3, n, n))
+        self._b = np.zeros((2 * self._leaves, 3, n + 1))
+        self._update((slice(0, height), slice(0, width)), with_M=True)
 
     @property
     def equations(self) -> NormalEquations:
         """M, b and ‖Ψ‖² as they are now."""
-        root = self._nodes[1]
-        n = root.shape[1] - 1
-        return NormalEquations(
-            root[:, :n, :n].copy(), root[:, :n, n].copy(), root[:, n, n].copy()
-        )
+        b = self._b[1]
+        return NormalEquations(self._M[1].copy(), b[:, :-1].copy(), b[:, -1].copy())
 
     def update(
         self,
@@ -79,44 +78,55 @@ class TiledEquations:
             self._importance[region] = given
         if target is not None:
             self._target[region] = target
+        self._update(region, with_M=importance is not None)
+
+    def _update(self, region: tuple[slice, slice], *, with_M: bool) -> None:
         rows = _tiles(region[0], self._importance.shape[0], self.side)
         columns = _tiles(region[1], self._importance.shape[1], self.side)
-        dirty = {self._leaves + r * self._columns + c for r in rows for c in columns}
+        dirty = np.array(
+            sorted(self._leaves + r * self._columns + c for r in rows for c in columns), int
+        )
         with one_thread():
-            for node in sorted(dirty):
-                self._sum(node)
-        while dirty and min(dirty) > 1:
-            dirty = {node // 2 for node in dirty}
-            for node in dirty:
-                np.add(self._nodes[2 * node], self._nodes[2 * node + 1], out=self._nodes[node])
+            for node in dirty.tolist():
+                self._sum(node, with_M)
+        while dirty.size and dirty[0] > 1:
+            dirty = np.unique(dirty // 2)
+            for sums in (self._M, self._b) if with_M else (self._b,):
+                for node in dirty.tolist():
+                    np.add(sums[2 * node], sums[2 * node + 1], out=sums[node])
 
-    def _sum(self, node: int) -> None:
-        """Σ D f g over one tile, of all pairs of images and target."""
+    def _sum(self, node: int, with_M: bool) -> None:
+        """Σ D f g over one tile: of images and target, and of all pairs of images."""
         row, column = divmod(node - self._leaves, self._columns)
         top, left = row * self.side, column * self.side
         where = slice(top, top + self.side), slice(left, left + self.side)
         weights = self._importance[where].ravel()
         counted = np.flatnonzero(weights)
         if counted.size == 0:
-            self._nodes[node] = 0
+            self._M[node], self._b[node] = 0, 0
             return
         n = len(self._images)
-        root = np.sqrt(weights[counted].astype(np.float64))
+        D = weights[counted].astype(np.float64)
         lit = self._images[(slice(None), *where)].reshape(n, -1, 3)
         painted = self._target[where].reshape(-1, 3)
         if counted.size < weights.size:
             # Pixels without weight are not read: they may hold anything.
             lit, painted = lit[:, counted], painted[counted]
-        block = np.empty((3, n + 1, counted.size))
-        np.multiply(lit.transpose(2, 0, 1), root, out=block[:, :n])
-        np.multiply(painted.T, root, out=block[:, n])
+        colours = painted.T.astype(np.float64)
+        weighted = colours * D
+        root = np.sqrt(D)
         for c in range(3):
-            np.matmul(block[c], block[c].T, out=self._nodes[node, c])
+            block = lit[..., c].astype(np.float64)
+            self._b[node, c, :n] = block @ weighted[c]
+            self._b[node, c, n] = colours[c] @ weighted[c]
+            if with_M:
+                block *= root
+                np.matmul(block, block.T, out=self._M[node, c])
 
 
 def side_for(n: int, height: int, width: int) -> int:
     """Pixels along the side of a tile: `SIDE`, or as many more as keep all sums within `ROOM`."""
-    node_bytes = 3 * (n + 1) ** 2 * 8
+    node_bytes = 3 * (n * n + n + 1) * 8
     side = SIDE
     # There are at most four nodes for each tile, inner ones and unused leaves included.
     while 4 * node_bytes * -(-height // side) * -(-width // side) > ROOM and side < max(
