@@ -7,6 +7,7 @@
     ├── BasisError       a basis file, or one that does not fit what it is used with
     ├── TargetError      a painting or mask that cannot be solved for
     │   └── SizeError    … because its size differs from the basis
+    ├── ConstraintError  what is asked of a light, and cannot be understood or had
     ├── LightingError    a lighting.json
     └── OutputError      a place that cannot be written
 
@@ -17,6 +18,7 @@ line prints it and exits with 2.
 __all__ = [
     "BackendError",
     "BasisError",
+    "ConstraintError",
     "ImageError",
     "LightingError",
     "LightpaintError",
@@ -53,6 +55,10 @@ class TargetError(LightpaintError):
 
 class SizeError(TargetError):
     """A painting or mask whose size is not that of the basis."""
+
+
+class ConstraintError(LightpaintError):
+    """Something asked of a light that means nothing, contradicts itself, or cannot be had."""
 
 
 class LightingError(LightpaintError):
