@@ -4,6 +4,7 @@
     ├── BackendError     Mitsuba or LLVM cannot run here
     ├── SceneError       the scene XML, a sensor, a light
     ├── ImageError       an image file that cannot be read as what it should be
+    ├── ColorError       a colour that means nothing: hexadecimal digits, a temperature
     ├── BasisError       a basis file, or one that does not fit what it is used with
     ├── TargetError      a painting or mask that cannot be solved for
     │   └── SizeError    … because its size differs from the basis
@@ -19,6 +20,7 @@ __all__ = [
     "BackendError",
     "BasisError",
     "ConstraintError",
+    "ColorError",
     "ImageError",
     "LightingError",
     "LightpaintError",
@@ -43,6 +45,10 @@ class SceneError(LightpaintError):
 
 class ImageError(LightpaintError):
     """An image file that is missing, damaged, or of a kind that is not supported."""
+
+
+class ColorError(LightpaintError):
+    """A colour, or a colour temperature, that there is none of."""
 
 
 class BasisError(LightpaintError):

@@ -4,10 +4,15 @@ Everything here takes linear Rec.709 (D65) with a last axis of 3. colour-science
 when first needed: it takes longer than most solves.
 """
 
+import math
+import re
+import warnings
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from lightpaint.errors import ColorError
+from lightpaint.images.display import decode_display, encode_display, to_8_bit
 from lightpaint.images.exr import Floats
 
 if TYPE_CHECKING:
@@ -15,6 +20,12 @@ if TYPE_CHECKING:
 
 #: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+#: Correlated colour temperatures that there is a locus for, in kelvin.
+KELVIN_RANGE = (1000.0, 100_000.0)
+
+#: |Duv| beyond which a colour has no correlated colour temperature (CIE 15:2018, 9.5).
+LARGEST_DUV = 0.05
 
 
 def luminance(rgb: Floats) -> Floats:
@@ -37,9 +48,89 @@ def delta_e(a: Floats, b: Floats) -> Floats:
     return np.asarray(colour.delta_E(lab(a), lab(b), method="CIE 2000"))
 
 
-def _colour() -> "ModuleType":
-    import warnings
+def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Floats:
+    """Linear Rec.709 of luminance 1, (3,), of a correlated colour temperature.
 
+    The locus is Planck's at all temperatures; `duv` is the distance from it in CIE 1960 (u, v),
+    positive towards green (Ohno 2013). D65 is 6504 K with a Duv of 0.0032.
+    Rec.709 does not contain all of them: below 1901 K a black body's blue is negative. Lights
+    cannot emit that, so negative components are set to 0 before the luminance is.
+    Raises ColorError outside of 1000 to 100,000 K and of a Duv of ±0.05.
+    """
+    lowest, highest = KELVIN_RANGE
+    if not lowest <= kelvin <= highest:
+        raise ColorError(f"a colour temperature of {kelvin:g} K: need {lowest:g} to {highest:g} K")
+    if not abs(duv) <= LARGEST_DUV:
+        raise ColorError(f"a Duv of {duv:g}: need -{LARGEST_DUV:g} to {LARGEST_DUV:g}")
+    colour = _colour()
+    uv = colour.temperature.CCT_to_uv_Ohno2013([kelvin, duv])
+    xyz = colour.xy_to_XYZ(colour.UCS_uv_to_xy(uv))
+    rgb = np.maximum(np.linalg.solve(_rgb_to_xyz(), xyz), 0)
+    return np.asarray(rgb / luminance(rgb))
+
+
+def cct_and_duv(rgb: Floats) -> tuple[float, float] | None:
+    """Correlated colour temperature in kelvin and Duv of a colour (3,), by Ohno 2013.
+
+    None where it has none: for black, for a colour more than 0.05 from Planck's locus, and
+    beyond 1000 and 100,000 K. Raises ColorError unless it is three finite numbers.
+    """
+    rgb = _three(rgb)
+    xyz = _rgb_to_xyz() @ rgb
+    if not (rgb.any() and xyz.sum() > 0):
+        return None
+    colour = _colour()
+    uv = colour.UCS_to_uv(colour.XYZ_to_UCS(xyz / xyz.sum()))
+    lowest, highest = KELVIN_RANGE
+    with warnings.catch_warnings():
+        # It warns of what lies at the ends of its table, which is wider than what is accepted.
+        warnings.simplefilter("ignore")
+        found = colour.temperature.uv_to_CCT_Ohno2013(uv, start=0.9 * lowest, end=1.2 * highest)
+    kelvin, duv = map(float, found)
+    # The ends of the range come back as they went in, but for the interpolation of the table.
+    if not (lowest - 0.1 <= kelvin <= highest + 10 and abs(duv) <= LARGEST_DUV + 1e-5):
+        return None
+    return kelvin, duv
+
+
+def hex_to_rgb(text: str) -> Floats:
+    """Linear Rec.709 in [0, 1], (3,), of a display colour like `#ffaa66` or `#fa6`.
+
+    Raises ColorError for any other text.
+    """
+    found = re.fullmatch(r"#?([0-9a-fA-F]{6}|[0-9a-fA-F]{3})", text.strip())
+    if found is None:
+        raise ColorError(f"{text!r} is no colour: need six hexadecimal digits, like #ffaa66")
+    digits = found[1] if len(found[1]) == 6 else "".join(digit * 2 for digit in found[1])
+    return decode_display(np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)]) / 255)
+
+
+def rgb_to_hex(rgb: Floats) -> str:
+    """The display colour of a light, like `#ffaa66`: its brightest channel at full.
+
+    rgb: (3,) linear Rec.709. Black is `#000000`; negative components are shown as 0.
+    Raises ColorError unless it is three finite numbers.
+    """
+    rgb = _three(rgb)
+    brightest = float(rgb.max())
+    shown = rgb / brightest if brightest > 0 else np.zeros(3)
+    r, g, b = to_8_bit(encode_display(shown))
+    return f"#{r:02x}{g:02x}{b:02x}"
+
+
+def _three(rgb: Floats) -> Floats:
+    values = np.asarray(rgb, dtype=np.float64)
+    if values.shape != (3,) or not all(map(math.isfinite, values)):
+        raise ColorError(f"{rgb!r} is no colour: need three finite numbers")
+    return values
+
+
+def _rgb_to_xyz() -> Floats:
+    """Linear Rec.709 to XYZ, (3, 3), from the chromaticities and without rounding."""
+    return np.asarray(_colour().RGB_COLOURSPACES["ITU-R BT.709"].matrix_RGB_to_XYZ)
+
+
+def _colour() -> "ModuleType":
     with warnings.catch_warnings():
         # It warns about plotting libraries that nothing here needs.
         warnings.simplefilter("ignore")

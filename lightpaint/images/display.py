@@ -34,6 +34,12 @@ def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:
     return np.asarray(np.where(linear <= 0.0031308, 12.92 * linear, curve))
 
 
+def decode_display(image_display: Floats) -> Floats:
+    """Linear Rec.709 in [0, 1] of sRGB-encoded values in [0, 1]: undoes `encode_display`."""
+    curve = ((image_display + 0.055) / 1.055) ** 2.4
+    return np.asarray(np.where(image_display <= 0.04045, image_display / 12.92, curve))
+
+
 def to_8_bit(image_display: Floats) -> npt.NDArray[np.uint8]:
     """Display values in [0, 1] as 8-bit integers."""
     return np.asarray(np.round(image_display * 255), dtype=np.uint8)
