@@ -19,8 +19,8 @@ line prints it and exits with 2.
 __all__ = [
     "BackendError",
     "BasisError",
-    "ConstraintError",
     "ColorError",
+    "ConstraintError",
     "ImageError",
     "LightingError",
     "LightpaintError",

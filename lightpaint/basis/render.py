@@ -136,7 +136,8 @@ def _origin(
     )
 
 
-def _basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
+def basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
+    """What a basis of `scene` will know of its lights."""
     return tuple(
         BasisLight(
             x.name,
@@ -172,7 +173,7 @@ def _render_together(
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
         halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
         return Basis(
-            _basis_lights(scene),
+            basis_lights(scene),
             images,
             half_differences,
             sums.emitters_seen(),
@@ -218,7 +219,7 @@ def _render_one_by_one(
     def basis() -> Basis:
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
-        return Basis(_basis_lights(scene), images, half_differences, seen, origin)
+        return Basis(basis_lights(scene), images, half_differences, seen, origin)
 
     render_separately(
         scene, budget, seed=seed, sums=sums, basis=basis, keeper=keeper, progress=progress

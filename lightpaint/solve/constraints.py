@@ -7,7 +7,7 @@ the unknowns of the solve. docs/formats.md lists them.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,6 @@ from lightpaint.images.color import hex_to_rgb, kelvin_to_rgb, luminance
 
 #: What may be asked of one light.
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")
-
-#: What may be asked of the solve as a whole.
-SOLVE_KEYS = ("light", "tie", "prefer", "sparse")
 
 #: Of these a light can have one: each says which colours it has.
 COLOURS = ("color", "kelvin", "primaries")
@@ -78,7 +75,9 @@ class LightConstraint:
         lock = _lock(asked["lock"], f"{where}.lock") if "lock" in asked else None
         if "off" in asked and asked["off"] is not True:
             raise ConstraintError(f"{where}.off is {asked['off']!r}: expected true or false")
-        least, most = _limits(asked["limits"], f"{where}.limits") if "limits" in asked else (None,) * 2
+        least, most = (
+            _limits(asked["limits"], f"{where}.limits") if "limits" in asked else (None,) * 2
+        )
         primaries = _primaries(asked, where)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
@@ -113,8 +112,8 @@ class Tie:
 class Constraints:
     """What is asked of the lights, besides to come close to the painting.
 
-    lights: name or pattern, and what is asked of it. Names say more than patterns, and what
-    stands later replaces what it contradicts.
+    lights: name or pattern, what is asked of it, and what errors call it. What stands later
+    replaces what it contradicts; `of` puts patterns before names.
     prefer_current: strength of the pull towards the present lighting. At 1 a light that
     changes costs as much as if the whole picture it makes, painted or not, were missed.
     sparse: how many lights may be on at most.
@@ -154,6 +153,7 @@ class Constraints:
             # Looked at now, so that no mistake waits for the light to be met.
             LightConstraint.of(asked, where=f"{lead}light.{name}")
             lights.append((name, dict(asked), f"{lead}light.{name}"))
+        lights.sort(key=lambda entry: not is_pattern(entry[0]))
         return cls(
             tuple(lights),
             _ties(tie, f"{lead}tie"),
@@ -163,16 +163,12 @@ class Constraints:
 
     def and_then(self, others: "Constraints") -> "Constraints":
         """These and `others`, which replace what they contradict."""
-        # A name of these must not outdo a pattern of the others, so both keep their rank.
         return Constraints(
-            self._ranked() + others._ranked(),
+            self.lights + others.lights,
             self.ties + others.ties,
             others.prefer_current or self.prefer_current,
             self.sparse if others.sparse is None else others.sparse,
         )
-
-    def _ranked(self) -> tuple[tuple[str, Mapping[str, Any], str], ...]:
-        return tuple(sorted(self.lights, key=lambda entry: not is_pattern(entry[0])))
 
 
 def is_pattern(name: str) -> bool:
@@ -183,9 +179,9 @@ def is_pattern(name: str) -> bool:
 def overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of `below` that `above` does not contradict, and all of `above`."""
     gone = set(above)
-    for key in above:
-        gone |= set(_CONTRADICTS.get(key, ()))
-    if gone & {"kelvin"} and "duv" not in above:
+    for key, value in above.items():
+        gone |= set(_CONTRADICTS.get(key, ())) if value is not False else set()
+    if gone & {"color", "kelvin"}:
         gone.add("duv")
     return {**{k: v for k, v in below.items() if k not in gone}, **above}
 
@@ -209,14 +205,18 @@ def _check_contradictions(asked: Mapping[str, Any], where: str) -> None:
     for first in LIGHT_KEYS:
         for second in _CONTRADICTS.get(first, ()):
             # A fixed colour and a level to lock it at go together.
-            if first in asked and second in asked and not (
-                "lock" in (first, second) and {first, second} & set(COLOURS)
+            if (
+                first in asked
+                and second in asked
+                and not ("lock" in (first, second) and {first, second} & set(COLOURS))
             ):
                 raise ConstraintError(
                     f"{where} has both {first!r} and {second!r}, which contradict each other: "
                     "leave one out"
                 )
-    if "duv" in asked and not ("kelvin" in asked or str(asked.get("color", "")).endswith("K")):
+    if "duv" in asked and not (
+        "kelvin" in asked or str(asked.get("color", "")).upper().endswith("K")
+    ):
         raise ConstraintError(f"{where} has 'duv' without a 'kelvin' that it is the distance from")
 
 
@@ -228,7 +228,7 @@ def _lock(value: Any, where: str) -> Lock:
         words = value.split()
         if len(words) not in (1, 2):
             raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")
-        colors = [word for word in words if word.startswith("#") or word.endswith("K")]
+        colors = [word for word in words if word.startswith("#") or word.upper().endswith("K")]
         levels = [word for word in words if word not in colors]
         if len(colors) > 1 or len(levels) > 1:
             raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ class LightSetting:
     weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
     is_fixed: whether it is what stays as it is in the scene, with weight 1.
     members: names of the emitters it consists of; itself if none are given.
+    constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
+    whether that held it back from what the painting asks for.
     """
 
     name: str
@@ -37,6 +39,8 @@ class LightSetting:
     weight: RGB
     is_fixed: bool = False
     members: tuple[str, ...] = ()
+    constraint: str = ""
+    is_active: bool = False
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -110,17 +114,31 @@ class Lighting:
         if name not in self.emission:
             raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
         lights = tuple(
-            replace(light, emission=emission, weight=emission) if light.name == name else light
+            replace(light, emission=emission, weight=emission, constraint="", is_active=False)
+            if light.name == name
+            else light
             for light in self.lights
         )
         return replace(self, lights=lights, quality=None)
 
     @classmethod
-    def of_weights(cls, basis: Basis, weights: Doubles, **about: Any) -> "Lighting":
-        """From weights (n, 3) in the order of `basis`."""
+    def of_weights(
+        cls,
+        basis: Basis,
+        weights: Doubles,
+        *,
+        asked: Sequence[tuple[str, bool]] | None = None,
+        **about: Any,
+    ) -> "Lighting":
+        """From weights (n, 3) in the order of `basis`.
+
+        asked: of each light its `constraint` and whether that `is_active`.
+        """
         settings = tuple(
-            _setting(light, _rgb(weight))
-            for light, weight in zip(basis.lights, weights, strict=True)
+            _setting(light, _rgb(weight), constraint, is_active)
+            for light, weight, (constraint, is_active) in zip(
+                basis.lights, weights, asked or [("", False)] * len(basis.lights), strict=True
+            )
         )
         return cls(settings, scene_identity=basis.origin.scene_identity, **about)
 
@@ -222,7 +240,7 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _setting(light: BasisLight, weight: RGB) -> LightSetting:
+def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
         light.name,
@@ -233,6 +251,8 @@ def _setting(light: BasisLight, weight: RGB) -> LightSetting:
         weight=weight,
         is_fixed=light.is_fixed,
         members=light.members,
+        constraint=constraint,
+        is_active=is_active,
     )
 
 
@@ -243,6 +263,8 @@ def _ties(light: LightSetting) -> dict[str, Any]:
         ties["is_fixed"] = True
     if light.members != (light.name,):
         ties["members"] = list(light.members)
+    if light.constraint:
+        ties |= {"constraint": light.constraint, "is_active": light.is_active}
     return ties
 
 
@@ -261,6 +283,8 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
         _read_rgb(data["weight"]),
         is_fixed,
         tuple(members),
+        _read_text(data, "constraint"),
+        bool(data.get("is_active", False)),
     )
 
 
