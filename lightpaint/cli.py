@@ -169,8 +169,9 @@ def _add_lights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lights-file",
         metavar="F.toml",
-        help="lights, groups and constraints (default: <scene>.lights.toml where there is one; "
-        "with a saved basis none, and its constraints alone apply); --lights replaces its list, --group adds to its groups or replaces the one of that name",
+        help="lights, groups and constraints (default: <scene>.lights.toml where there is one); "
+        "--lights replaces its list, --group adds to its groups or replaces the one of that "
+        "name; with a saved basis only its constraints apply",
     )
     parser.add_argument(
         "--no-lights-file",

@@ -386,6 +386,9 @@ def _show(look: Look, folder: Path) -> None:
     console.write(verdict(look.solution, look.predicted, look.verification))
     console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
+    if quality.curve:
+        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
+        console.write(f"missed of the painting, by number of lights: {listed}")
     if quality.unreached:
         console.say(
             f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "

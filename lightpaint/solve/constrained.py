@@ -1,14 +1,16 @@
 """The solve under constraints: the reduced problem, solved, and what held which light."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
-from lightpaint.solve.optimum import Cap, Optimum, minimise
-from lightpaint.solve.reduction import Reduction, Unknown, channel_groups
+from lightpaint.solve.optimum import Optimum, minimise
+from lightpaint.solve.reduced_problem import problems
+from lightpaint.solve.reduction import Reduction, Unknown
+from lightpaint.solve.selection import best_knobs, only
 from lightpaint.solve.solver import UNREACHED, SolverResult
 
 #: Pull of what reaches nothing in one channel towards its start, beside its other channels.
@@ -16,19 +18,6 @@ FAINT = 1e-8
 
 #: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
 PULL = 1e-7
-
-
-@dataclass(frozen=True)
-class ReducedProblem:
-    """½ xᵀM x − bᵀx in the unknowns `its` of a reduction, of the channels it couples."""
-
-    channels: list[int]
-    its: list[int]
-    M: Doubles
-    b: Doubles
-    lower: Doubles
-    upper: Doubles
-    caps: tuple[Cap, ...]
 
 
 def solve_constrained(
@@ -67,33 +56,22 @@ def solve_constrained(
     )
 
 
-def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
-    """One problem for every set of channels that the unknowns couple.
+def solve_sparse(
+    equations: NormalEquations, reduction: Reduction, start: Doubles, count: int
+) -> tuple[Reduction, list[tuple[int, Doubles]]]:
+    """Which knobs to use if only `count` may be on.
 
-    With w = C x + w₀ it is M' = Σ_c C_cᵀ M_c C_c and b' = Σ_c C_cᵀ (b_c − M_c w₀_c).
+    Returns the reduction to these, and (number of knobs, weights (n, 3)) for some numbers.
     """
-    made = []
-    for channels in channel_groups(reduction):
-        its = [k for k, x in enumerate(reduction.unknowns) if _touches(x, channels)]
-        M, b = np.zeros((len(its), len(its))), np.zeros(len(its))
-        for c in channels:
-            here = [k for k, i in enumerate(its) if _touches(reduction.unknowns[i], [c])]
-            C = np.zeros((len(reduction.held), len(here)))
-            for k, i in enumerate(here):
-                for light, rgb in reduction.unknowns[its[i]].columns:
-                    C[light, k] = rgb[c]
-            M[np.ix_(here, here)] += C.T @ equations.M[c] @ C
-            b[here] += C.T @ (equations.b[c] - equations.M[c] @ reduction.held[:, c])
-        place = {i: k for k, i in enumerate(its)}
-        caps = tuple(
-            replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
-            for cap in reduction.caps
-            if cap.unknowns[0] in place
-        )
-        lower = np.array([reduction.unknowns[i].lower for i in its])
-        upper = np.array([reduction.unknowns[i].upper for i in its])
-        made.append(ReducedProblem(channels, its, M, b, lower, upper, caps))
-    return made
+    if not reduction.knobs:
+        return reduction, []
+    path = best_knobs(problems(equations, reduction), reduction, count)
+    curve = []
+    for chosen in path:
+        solved = solve_constrained(equations, only(reduction, chosen), start)
+        curve.append((len(chosen), solved.weights))
+    best = max((chosen for chosen in path if len(chosen) <= count), key=len)
+    return only(reduction, best), curve
 
 
 def weights_of(reduction: Reduction, x: Doubles) -> Doubles:
@@ -164,7 +142,7 @@ def _with_faint_pull(
     equations: NormalEquations, lit: npt.NDArray[np.bool_], start: Doubles
 ) -> NormalEquations:
     """A light that reaches something in one channel only is to keep its start in the others."""
-    partly = lit.any(axis=1)[:, None] & ~lit
+    partly = np.asarray(lit.any(axis=1, keepdims=True)) & ~lit
     if not partly.any():
         return equations
     M, b = equations.M.copy(), equations.b.copy()
@@ -187,13 +165,12 @@ def _nearest(reduction: Reduction, its: tuple[int, ...], start: Doubles) -> Doub
     upper = np.array([x.upper for x in unknowns])
     lights = sorted({light for x in unknowns for light, _ in x.columns})
     if not caps and len(lights) == 1 and len(its) == 3 and _is_free(unknowns):
-        return np.clip(start[lights[0]], lower, upper)
+        return np.asarray(np.clip(start[lights[0]], lower, upper))
     # (unknowns, lights · 3)
-    C = np.zeros((len(its), len(lights), 3))
+    C = np.zeros((len(its), 3 * len(lights)))
     for k, x in enumerate(unknowns):
         for light, rgb in x.columns:
-            C[k, lights.index(light)] = rgb
-    C = C.reshape(len(its), -1)
+            C[k, 3 * lights.index(light) :][:3] = rgb
     found: Optimum = minimise(
         C @ C.T, C @ start[lights].ravel(), lower=lower, upper=upper, caps=caps
     )
@@ -202,10 +179,6 @@ def _nearest(reduction: Reduction, its: tuple[int, ...], start: Doubles) -> Doub
 
 def _is_free(unknowns: list[Unknown]) -> bool:
     return all((x.columns[0][1] == axis).all() for x, axis in zip(unknowns, np.eye(3), strict=True))
-
-
-def _touches(unknown: Unknown, channels: list[int]) -> bool:
-    return any(rgb[c] for _, rgb in unknown.columns for c in channels)
 
 
 def _reached_knobs(reduction: Reduction, lit: npt.NDArray[np.bool_]) -> tuple[bool, ...]:

@@ -87,8 +87,8 @@ class LightConstraint:
                 )
             if len(primaries) > 1:
                 raise ConstraintError(
-                    f"{where} has both lock and {_first(asked, COLOURS)!r}, which leaves the mix of "
-                    "its colours open: lock it at a colour"
+                    f"{where} has both lock and {_first(asked, COLOURS)!r}, which leaves the mix "
+                    "of its colours open: lock it at a colour"
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
         label = ", ".join(_described(key, asked[key]) for key in LIGHT_KEYS if key in asked)

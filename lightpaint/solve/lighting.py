@@ -64,6 +64,8 @@ class Quality:
     objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
     unreached: lights that no weighted pixel sees, which keep what the solve started from:
     their present emission.
+    curve: where only some lights may be on, numbers of lights and the relative residual,
+    √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
     """
 
     kkt_residual: RGB
@@ -72,6 +74,7 @@ class Quality:
     sweeps: tuple[int, int, int]
     converged: bool
     unreached: tuple[str, ...] = ()
+    curve: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -203,6 +206,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             "sweeps": list(q.sweeps),
             "converged": q.converged,
             "unreached": list(q.unreached),
+            **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
         }
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
@@ -300,6 +304,7 @@ def _read_quality(data: dict[str, Any]) -> Quality:
         (r, g, b),
         converged,
         tuple(str(name) for name in unreached),
+        tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
     )
 
 

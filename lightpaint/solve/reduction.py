@@ -99,28 +99,32 @@ def _add_light(
 ) -> None:
     one = asked or LightConstraint()
     if light.is_scalar or (one.primaries is not None and len(one.primaries) == 1):
-        if light.is_scalar and one.primaries is not None:
-            raise ConstraintError(
-                f"{one.where} asks for a colour, and {light.name!r} can only be dimmed as a "
-                "whole: use lock, limits, tie or off"
-            )
-        direction = np.ones(3) if one.primaries is None else np.array(one.primaries[0])
-        _check_grey(one, light)
-        lower, upper = _dimmer_limits(one, direction, light)
-        _check_room(one, light, lower, upper)
-        reduction.add([Unknown(((k, direction),), lower, upper)], None)
+        reduction.add([_dimmer(k, light, one)], None)
         return
     colours = np.eye(3) if one.primaries is None else np.array(one.primaries)
     lower, upper, least, most = _mix_limits(one, light, len(colours))
     unknowns = [
-        Unknown(((k, colour),), float(low), float(high))
-        for colour, low, high in zip(colours, lower, upper, strict=True)
+        Unknown(((k, colours[j]),), float(lower[j]), float(upper[j])) for j in range(len(colours))
     ]
-    coefficients = luminance(colours)
+    coefficients = np.asarray(luminance(colours), np.float64)
     is_limited = least > 0 or np.isfinite(most)
     _check_room(one, light, max(least, float(coefficients @ lower)), most)
     _check_room(one, light, least, min(most, float(coefficients @ upper)))
     reduction.add(unknowns, (coefficients, least, most) if is_limited else None)
+
+
+def _dimmer(k: int, light: BasisLight, one: LightConstraint) -> Unknown:
+    """The unknown of a light of one colour."""
+    if light.is_scalar and one.primaries is not None:
+        raise ConstraintError(
+            f"{one.where} asks for a colour, and {light.name!r} can only be dimmed as a whole: "
+            "use lock, limits, tie or off"
+        )
+    direction = np.ones(3) if one.primaries is None else np.array(one.primaries[0])
+    _check_grey(one, light)
+    lower, upper = _dimmer_limits(one, direction, light)
+    _check_room(one, light, lower, upper)
+    return Unknown(((k, direction),), lower, upper)
 
 
 def _add_tie(
@@ -137,8 +141,8 @@ def _add_tie(
         light, one = lights[k], asked[k] or LightConstraint()
         if one.off or one.lock is not None or (one.primaries and len(one.primaries) > 1):
             raise ConstraintError(
-                f"{one.where} asks for {one.label}, and {light.name!r} is on the dimmer of {names}: "
-                "a tied light can only have limits and a color; leave it out of the tie"
+                f"{one.where} asks for {one.label}, and {light.name!r} is on the dimmer of {names}"
+                ": a tied light can only have limits and a color; leave it out of the tie"
             )
         present = np.array(light.emission)
         if not present.any():
@@ -185,8 +189,10 @@ def _locked(light: BasisLight, lock: Lock, where: str) -> Doubles:
     color = present / now if lock.color is None and now > 0 else np.array(lock.color or (1, 1, 1))
     if level is None and lock.color is None:
         return present
-    assert level is None or not isinstance(level.amount, tuple)
-    amount = now if level is None else level.amount * (now if level.is_share else 1)
+    amount = now
+    if level is not None:
+        assert not isinstance(level.amount, tuple)
+        amount = level.amount * (now if level.is_share else 1.0)
     return np.asarray(color * amount)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.exr import Floats
-from lightpaint.solve.constrained import preferring, pulled, solve_constrained
+from lightpaint.solve.constrained import preferring, pulled, solve_constrained, solve_sparse
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, Quality
 from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
@@ -59,8 +59,9 @@ def solve(
     equations = NormalEquations.of(basis, image, importance)
     weights = basis.present_weights if start is None else start.weights_for(basis)
     asked = None
+    tried: list[tuple[int, Doubles]] = []
     if constraints:
-        result, asked = _solve_asked(equations, basis, constraints, weights)
+        result, asked, tried = _solve_asked(equations, basis, constraints, weights)
     else:
         result = _solve_free(equations, basis, weights)
     weights = result.weights
@@ -75,6 +76,9 @@ def solve(
         sweeps=result.sweeps,
         converged=result.converged,
         unreached=unreached,
+        curve=tuple(
+            (count, float(np.sqrt(equations.objective(w).sum() / norm.sum()))) for count, w in tried
+        ),
     )
     lighting = Lighting.of_weights(basis, weights, asked=asked, target=target.name, quality=quality)
     return Solution(lighting, image, importance)
@@ -95,17 +99,22 @@ def _solve_free(equations: NormalEquations, basis: Basis, start: Doubles) -> Sol
 
 def _solve_asked(
     equations: NormalEquations, basis: Basis, constraints: Constraints, start: Doubles
-) -> tuple[SolverResult, list[tuple[str, bool]]]:
-    """Under constraints; with it, of each light, what is asked and whether that holds it."""
+) -> tuple[SolverResult, list[tuple[str, bool]], list[tuple[int, Doubles]]]:
+    """Under constraints; with it, of each light, what is asked and whether that holds it.
+
+    Last, where only some lights may be on: numbers of lights and weights of the best such.
+    """
     reduction = reduce_to(constraints, basis.lights)
     if constraints.prefer_current:
         present = basis.present_weights
         equations = preferring(equations, basis, present, constraints.prefer_current)
+    tried: list[tuple[int, Doubles]] = []
+    if constraints.sparse is not None:
+        reduction, tried = solve_sparse(equations, reduction, start, constraints.sparse)
     result = solve_constrained(equations, reduction, start)
     active = pulled(equations, basis, result.weights)
-    return result, [
-        (label, bool(label) and a) for label, a in zip(reduction.labels, active, strict=True)
-    ]
+    labels = zip(reduction.labels, active, strict=True)
+    return result, [(label, bool(label) and holds) for label, holds in labels], tried
 
 
 def _rgb(values: Floats) -> tuple[float, float, float]:
