@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import nnls
 
 from lightpaint.solve.normal_equations import NormalEquations
-from lightpaint.solve.solver import SolverResult, kkt_residual, solve_normal_equations
+from lightpaint.solve.quadratic import kkt_residual
+from lightpaint.solve.solver import SolverResult, solve_normal_equations
 
 # The solver stops at a KKT residual of 1e-10, which leaves an error of the weights of at most
 # that times the condition of the Gram matrix: 10 to 100 here, a few hundred at worst, so that
@@ -124,7 +125,7 @@ def test_no_sweep_raises_the_objective(kind: str):
     start = np.random.default_rng(0).random((13, 3))
     trace = [equations.objective(start)]
     for k in range(1, 40):
-        result = solve_normal_equations(equations, start, max_sweeps=k)
+        result = solve_normal_equations(equations, start, method="gauss-seidel", max_sweeps=k)
         trace.append(equations.objective(result.weights))
     # Round-off of the objective, of size ‖Ψ‖² in float64.
     rise = np.diff(trace, axis=0) / equations.target_norm2
@@ -166,7 +167,7 @@ def test_channels_are_solved_apart():
 
 def test_running_out_of_sweeps_is_a_result():
     columns, values = _problem(13, "correlated", 5)
-    result = _solve(columns, values, max_sweeps=1)
+    result = _solve(columns, values, method="gauss-seidel", max_sweeps=1)
     assert not result.converged
     assert result.sweeps == (1, 1, 1)
     assert (result.kkt_residual > result.tolerance).all()
@@ -215,13 +216,16 @@ def test_a_light_of_one_colour_keeps_the_others_and_counts_as_reached():
 
 
 def test_kkt_residual_by_hand():
-    b = np.array([2.0, -1.0])
     on, off = np.array([0.0, 0.0]), np.array([3.0, 0.0])
-    assert kkt_residual(on, off, b) == 0
+    bounds = (2.0, 0.0, np.inf)
+    assert kkt_residual(on, off, *bounds) == 0
     # A light that is off may have a positive gradient, and one that is on may not.
-    assert kkt_residual(np.array([0.0, 5.0]), off, b) == 0
-    assert kkt_residual(np.array([1.0, 0.0]), off, b) == 0.5
-    assert kkt_residual(np.array([0.0, -1.0]), off, b) == 0.5
+    assert kkt_residual(np.array([0.0, 5.0]), off, *bounds) == 0
+    assert kkt_residual(np.array([1.0, 0.0]), off, *bounds) == 0.5
+    assert kkt_residual(np.array([0.0, -1.0]), off, *bounds) == 0.5
+    # One at its upper bound may have a negative one; no step goes further than the bounds.
+    assert kkt_residual(np.array([-7.0, 0.0]), off, 2.0, 0.0, 3.0) == 0
+    assert kkt_residual(np.array([-7.0, 0.0]), off, 2.0, 0.0, 4.0) == 0.5
 
 
 @pytest.mark.parametrize("seed", range(60))
