@@ -8,10 +8,11 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
 from lightpaint.solve.optimum import Optimum, minimise
+from lightpaint.solve.quadratic import UNREACHED
 from lightpaint.solve.reduced_problem import problems
 from lightpaint.solve.reduction import Reduction, Unknown
 from lightpaint.solve.selection import best_knobs, only
-from lightpaint.solve.solver import UNREACHED, SolverResult
+from lightpaint.solve.solver import SolverResult
 
 #: Pull of what reaches nothing in one channel towards its start, beside its other channels.
 FAINT = 1e-8

@@ -2,8 +2,8 @@
 
 import sys
 from collections.abc import Callable
-from itertools import combinations
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
