@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import TargetError
+from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.exr import Floats
 from lightpaint.target.target import Target
 
@@ -30,6 +30,20 @@ class NormalEquations:
     M: Doubles
     b: Doubles
     target_norm2: Doubles
+
+    def __add__(self, other: "NormalEquations") -> "NormalEquations":
+        """The problem of both pictures at once: of two tiles, cameras, frames or machines.
+
+        Raises SizeError if they are not of the same number of lights.
+        """
+        if self.M.shape != other.M.shape:
+            raise SizeError(
+                f"a problem of {self.M.shape[1]} lights and one of {other.M.shape[1]} do not add: "
+                "both need the same lights in the same order"
+            )
+        return NormalEquations(
+            self.M + other.M, self.b + other.b, self.target_norm2 + other.target_norm2
+        )
 
     def objective(self, w: Doubles) -> Doubles:
         """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3)."""
