@@ -27,6 +27,8 @@ from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.solve.constraints import Constraints
+from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
 from lightpaint.solve.solve import Solution, solve
 from lightpaint.target.target import Target, read_target
@@ -34,6 +36,7 @@ from lightpaint.version import __version__
 
 __all__ = [
     "Basis",
+    "Constraints",
     "Estimate",
     "Lighting",
     "LightpaintError",
@@ -48,6 +51,7 @@ __all__ = [
     "load_scene",
     "paint_with_light",
     "read_basis",
+    "read_constraints",
     "read_lighting",
     "read_target",
     "relight",

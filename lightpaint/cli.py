@@ -8,8 +8,8 @@ import argparse
 import io
 import sys
 import warnings
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
 
 from lightpaint.errors import LightpaintError
 from lightpaint.version import __version__
@@ -100,6 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_unit(solve)
     _add_lights(solve)
+    _add_constraints(solve)
     _add_budget(solve)
     _add_cache(solve)
     _add_view(solve)
@@ -174,14 +175,52 @@ def _add_lights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lights-file",
         metavar="F.toml",
-        help="lights and groups (default: <scene>.lights.toml where there is one); --lights "
-        "replaces its list, --group adds to its groups or replaces the one of that name",
+        help="lights, groups and constraints (default: <scene>.lights.toml where there is one); "
+        "--lights replaces its list, --group adds to its groups or replaces the one of that "
+        "name; with a saved basis only its constraints apply",
     )
     parser.add_argument(
         "--no-lights-file",
         dest="use_lights_file",
         action="store_false",
         help="leave the lights file beside the scene alone",
+    )
+
+
+def _add_constraints(parser: argparse.ArgumentParser) -> None:
+    """What is asked of the lights, as in the lights file and before it."""
+    group = parser.add_argument_group(
+        "constraints",
+        "NAME is a light, a group or a pattern; all may be repeated. LEVEL is a luminance like "
+        "2.5, a share of the present one like 40%%, or r,g,b. COLOR is #ffaa66, 3200K or r,g,b.",
+    )
+
+    def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
+        dest = "limits" if option == "--limit" else option[2:]
+        group.add_argument(
+            option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
+        )
+
+    add("--lock", "NAME[=LEVEL]", _lock, "keep it as it is, or at a level, or '3200K 40%%'")
+    add("--limit", "NAME=MIN:MAX", _limits, "emit between these levels; one may be left out")
+    add("--tie", "A,B,...", _names, "put these on one dimmer, their colours as they are")
+    add("--color", "NAME=COLOR", _named, "this colour, and only a dimmer")
+    add("--kelvin", "NAME=2700:6500", _kelvin, "white between these, or of one temperature")
+    add("--primaries", "NAME=COLOR,...", _primaries, "what a fixture with these LEDs can mix")
+    add("--off", "NAME", str, "off")
+    group.add_argument(
+        "--prefer-current",
+        type=_weight,
+        default=0.0,
+        metavar="STRENGTH",
+        help="pull to the present lighting, like 0.01: where the painting leaves it open, "
+        "lights stay (default: %(default)s)",
+    )
+    group.add_argument(
+        "--sparse",
+        type=_at_least(1),
+        metavar="K",
+        help="use the K lights that serve best, besides locked ones; the others are off",
     )
 
 
@@ -289,6 +328,47 @@ def _group(text: str) -> tuple[str, list[str]]:
     if not name.strip() or not equals:
         raise argparse.ArgumentTypeError(f"{text!r} is not name=a,b,c")
     return name.strip(), _names(members)
+
+
+def _named(text: str) -> tuple[str, Any]:
+    name, equals, value = text.rpartition("=")
+    if not name.strip() or not equals or not value.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE")
+    return name.strip(), _value(value)
+
+
+def _value(text: str) -> Any:
+    """Three numbers with commas; anything else as it is."""
+    parts = text.strip().split(",")
+    try:
+        return [float(part) for part in parts] if len(parts) > 1 else text.strip()
+    except ValueError:
+        return text.strip()
+
+
+def _lock(text: str) -> tuple[str, Any]:
+    return _named(text) if "=" in text else (text.strip(), True)
+
+
+def _limits(text: str) -> tuple[str, dict[str, Any]]:
+    name, value = _named(text)
+    least, colon, most = str(text.rpartition("=")[2]).partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{value!r} is not MIN:MAX; one of them may be left out")
+    return name, {k: _value(v) for k, v in (("min", least), ("max", most)) if v.strip()}
+
+
+def _kelvin(text: str) -> tuple[str, list[float]]:
+    name, value = _named(text)
+    try:
+        return name, [float(end.strip().upper().removesuffix("K")) for end in value.split(":")]
+    except (ValueError, AttributeError):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=2700:6500 or NAME=3200") from None
+
+
+def _primaries(text: str) -> tuple[str, list[str]]:
+    name, _ = _named(text)
+    return name, _names(text.rpartition("=")[2])
 
 
 class _at_least:  # noqa: N801 (used as a function)

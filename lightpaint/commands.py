@@ -11,13 +11,14 @@ from rich.markup import escape
 from lightpaint import console
 from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis, is_basis_file, read_basis, write_basis
-from lightpaint.basis.render import memory_needed, why_not_one_pass
+from lightpaint.basis.render import basis_lights, memory_needed, why_not_one_pass
 from lightpaint.doctor import examine
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images.photometry import Photometry, photometry
 from lightpaint.pipeline import (
     Look,
+    all_constraints,
     command_line,
     obtain_basis,
     paint_with_light,
@@ -33,7 +34,10 @@ from lightpaint.scene.lights import WHOLE_EMISSION, Emitter, Light
 from lightpaint.scene.quality import with_quality
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.solve.constraints import Constraints
+from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import read_lighting
+from lightpaint.solve.reduction import reduce_to
 from lightpaint.target.target import Target, read_target
 
 
@@ -168,14 +172,19 @@ def solve(options: Namespace, given: list[str]) -> int:
     # Everything a user gave is looked at before the first sample is taken.
     masks = _one_for_each(options.masks or [None], options.targets)
     targets = [read_target(t, mask=m) for t, m in zip(options.targets, masks, strict=True)]
+    constraints = _constraints(options)
     source = Path(options.source)
     if is_basis_file(source):
         _check_nothing_to_render(options)
         scene, made, spp = None, read_basis(source), None
         size = made.size
+        if options.lights_file:
+            constraints = read_constraints(options.lights_file).and_then(constraints)
+        reduce_to(constraints, made.lights)
     else:
         scene, spp = _with_quality(_load(options, path=source), options)
         made, size = None, scene.size
+        reduce_to(all_constraints(scene, constraints), basis_lights(scene))
     targets = [_fitted(target, size, options) for target in targets]
     for folder in folders:
         check_writable(folder)
@@ -192,6 +201,7 @@ def solve(options: Namespace, given: list[str]) -> int:
                 target,
                 folder,
                 basis=made,
+                constraints=constraints,
                 unpainted=options.unpainted,
                 cd_per_unit=options.cd_per_unit,
                 spp=options.spp,
@@ -372,11 +382,30 @@ def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
     return groups
 
 
+def _constraints(options: Namespace) -> Constraints:
+    """What the options ask of the lights."""
+    lights: dict[str, dict[str, Any]] = {}
+    for key in ("lock", "limits", "color", "kelvin", "primaries"):
+        for name, value in getattr(options, key):
+            lights.setdefault(name, {})[key] = value
+    for name in options.off:
+        lights.setdefault(name, {})["off"] = True
+    return Constraints.of(
+        lights,
+        tie=options.tie,
+        prefer_current=options.prefer_current,
+        sparse=options.sparse,
+        where="on the command line",
+    )
+
+
 def _show(look: Look, folder: Path) -> None:
     shares = energy_shares(look.basis, look.lighting)
+    held = any(light.constraint for light in look.lighting.lights)
     headings = ("light", "plugin", "emission now", "solved R G B", "unit", "share", "colour")
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
-    table = console.table(*headings, *amounts)
+    asked = ["asked (* holds it)"] if held else []
+    table = console.table(*headings, *amounts, *asked)
     for light, now, share in zip(look.lighting.lights, look.basis.lights, shares, strict=True):
         solved = "off" if not any(light.emission) else console.numbers(light.emission)
         if light.name in look.solution.quality.unreached and any(light.emission):
@@ -391,11 +420,15 @@ def _show(look: Look, folder: Path) -> None:
             f"{100 * share:.1f} %",
             "" if light.is_fixed else seen.color,
             *seen.amounts[: len(amounts)],
+            *([escape(light.constraint) + "*" * light.is_active] if held else []),
         )
     console.print_table(table)
     console.write(verdict(look.solution, look.predicted, look.verification))
     console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
+    if quality.curve:
+        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
+        console.write(f"missed of the painting, by number of lights: {listed}")
     if quality.unreached:
         console.say(
             f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "
@@ -432,8 +465,8 @@ def _folders(output: str | None, names: Sequence[str]) -> list[Path]:
 def _check_nothing_to_render(options: Namespace) -> None:
     asked = {"-s": options.sensor, "-D": options.parameters, "-m": options.variant}
     asked |= {"--lights": options.lights, "--group": options.groups}
-    asked |= {"--lights-file": options.lights_file, "--spp": options.spp}
-    asked |= {"--time": options.time_s, "--quality": options.quality}
+    asked |= {"--spp": options.spp, "--time": options.time_s}
+    asked |= {"--quality": options.quality}
     asked |= {"--resolution": options.resolution}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(

@@ -8,6 +8,7 @@
     ├── BasisError       a basis file, or one that does not fit what it is used with
     ├── TargetError      a painting or mask that cannot be solved for
     │   └── SizeError    … because its size differs from the basis
+    ├── ConstraintError  what is asked of a light, and cannot be understood or had
     ├── LightingError    a lighting.json
     └── OutputError      a place that cannot be written
 
@@ -19,6 +20,7 @@ __all__ = [
     "BackendError",
     "BasisError",
     "ColorError",
+    "ConstraintError",
     "ImageError",
     "LightingError",
     "LightpaintError",
@@ -59,6 +61,10 @@ class TargetError(LightpaintError):
 
 class SizeError(TargetError):
     """A painting or mask whose size is not that of the basis."""
+
+
+class ConstraintError(LightpaintError):
+    """Something asked of a light that means nothing, contradicts itself, or cannot be had."""
 
 
 class LightingError(LightpaintError):

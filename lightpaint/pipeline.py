@@ -22,7 +22,10 @@ from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.quality import Quality, with_quality
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.solve.constraints import Constraints
+from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import Lighting, combine, write_lighting
+from lightpaint.solve.reduction import reduce_to
 from lightpaint.solve.solve import Solution, solve
 from lightpaint.target.target import Target, read_target
 from lightpaint.target.template import write_template
@@ -77,6 +80,7 @@ def paint_with_light(
     *,
     basis: str | Path | Basis | None = None,
     mask: str | Path | None = None,
+    constraints: Constraints | None = None,
     unpainted: float = 0.0,
     spp: int | None = None,
     time_s: float | None = None,
@@ -99,6 +103,7 @@ def paint_with_light(
     folder: receives lighting.json, predicted.exr, comparison.png and report.html and, with
     a scene, relit.xml and verified.exr.
     basis: one made before of the same scene; taken from the cache or rendered if not given.
+    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
     unpainted: weight of unpainted pixels against the current look.
     sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
     resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
@@ -133,13 +138,17 @@ def paint_with_light(
     if scene is not None:
         written += [folder / "verified.exr", *check_relightable(scene, folder / "relit.xml")]
 
+    constraints = all_constraints(scene, constraints)
+    if scene is not None:
+        reduce_to(constraints, basis_lights(scene))  # names what cannot be had before it renders
+
     if basis is None:
         if scene is None:
             raise LightpaintError("give a scene, a basis, or both")
         basis = obtain_basis(
             scene, spp=spp, time_s=time_s, seed=seed, use_cache=use_cache, progress=progress
         )
-    solution = solve(basis, target, unpainted=unpainted)
+    solution = solve(basis, target, constraints=constraints, unpainted=unpainted)
     solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=cd_per_unit))
     predicted = combine(basis, solution.lighting)
     as_basis = spp or basis.origin.spp if asked is None and (time_s or quality) else None
@@ -159,6 +168,14 @@ def paint_with_light(
         look = Look(target, basis, solution, predicted, relit, verification)
         show_look(look, folder, command=command)
     return look
+
+
+def all_constraints(scene: Scene | None, given: Constraints | None) -> Constraints:
+    """What the lights file of `scene` asks, if it has one, and then `given`."""
+    asked = given or Constraints()
+    if scene is None or scene.lights_file is None:
+        return asked
+    return read_constraints(scene.lights_file).and_then(asked)
 
 
 def earlier_results(folder: Path) -> list[Path]:

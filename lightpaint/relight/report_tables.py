@@ -39,7 +39,7 @@ def lights_table(basis: Basis, solution: Solution) -> str:
             f'<th scope="row">{name}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
             f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
-            f"<td>{change(light, setting, solution.quality.unreached)}</td>"
+            f"<td>{change(light, setting, solution.quality.unreached)}{_asked(setting)}</td>"
             f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
             f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
         )
@@ -80,6 +80,12 @@ def change(light: BasisLight, setting: LightSetting, unreached: tuple[str, ...])
         return "was off, now on"
     stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
     return f"×{after / before:.3g}<small>{stops}</small>"
+
+
+def _asked(setting: LightSetting) -> str:
+    """What was asked of a light, and whether that holds it."""
+    holds = " (holds it)" if setting.is_active else ""
+    return f"<small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
 
 
 def fit_table(solution: Solution) -> str:

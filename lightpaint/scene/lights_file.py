@@ -1,6 +1,7 @@
 """The lights file: which lights to adjust and which go together, in a TOML beside the scene.
 
-For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details.
+For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What it asks of the
+lights in the solve is not looked at here (see solve/constraints_file.py).
 """
 
 import tomllib
@@ -12,7 +13,9 @@ from typing import Any
 from lightpaint.errors import SceneError
 
 SUFFIX = ".lights.toml"
-KNOWN = ("lights", "groups")
+#: What asks for something in the solve.
+CONSTRAINTS = ("light", "tie", "prefer", "sparse")
+KNOWN = ("lights", "groups", *CONSTRAINTS)
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,19 @@ def read_lights_file(path: Path) -> LightsFile:
 
     Raises SceneError, with the line where the TOML is wrong, or with the key that is.
     """
+    data = read_keys(path)
+    groups = data.get("groups", {})
+    if not isinstance(groups, dict):
+        raise SceneError(f'{path}: groups is a table, [groups], with lines like a = ["b", "c"]')
+    return LightsFile(
+        path,
+        _names(path, "lights", data["lights"]) if "lights" in data else None,
+        {name: _names(path, f"groups.{name}", its) for name, its in groups.items()},
+    )
+
+
+def read_keys(path: Path) -> dict[str, Any]:
+    """All keys of a lights file, none of them unknown. Raises SceneError."""
     text = ""
     try:
         text = path.read_text(encoding="utf-8")
@@ -50,14 +66,7 @@ def read_lights_file(path: Path) -> LightsFile:
         raise SceneError(f"{path} is not TOML: {reason}") from None
     if unknown := [key for key in data if key not in KNOWN]:
         raise SceneError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(KNOWN)}")
-    groups = data.get("groups", {})
-    if not isinstance(groups, dict):
-        raise SceneError(f'{path}: groups is a table, [groups], with lines like a = ["b", "c"]')
-    return LightsFile(
-        path,
-        _names(path, "lights", data["lights"]) if "lights" in data else None,
-        {name: _names(path, f"groups.{name}", its) for name, its in groups.items()},
-    )
+    return data
 
 
 def _names(path: Path, key: str, value: Any) -> tuple[str, ...]:

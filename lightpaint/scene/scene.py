@@ -313,7 +313,7 @@ def _find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
                 node=node_of[name],
                 file=node.file_index,
                 offset=node.offset - 1,
-                obstacle=why_not_adjusted(plugin, kind, emission),
+                obstacle=why_not_adjusted(emitter, plugin, kind, emission),
                 unit_flux=flux_of_unit(emitter, plugin, kind),
             )
         )

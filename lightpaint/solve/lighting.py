@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,8 @@ class LightSetting:
     is_fixed: whether it is what stays as it is in the scene, with weight 1.
     members: names of the emitters it consists of; itself if none are given.
     unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
+    constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
+    whether that held it back from what the painting asks for.
     """
 
     name: str
@@ -40,6 +42,8 @@ class LightSetting:
     is_fixed: bool = False
     members: tuple[str, ...] = ()
     unit_flux: RGB | None = None
+    constraint: str = ""
+    is_active: bool = False
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -68,6 +72,8 @@ class Quality:
     objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
     unreached: lights that no weighted pixel sees, which keep what the solve started from:
     their present emission.
+    curve: where only some lights may be on, numbers of lights and the relative residual,
+    √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
     """
 
     kkt_residual: RGB
@@ -76,6 +82,7 @@ class Quality:
     sweeps: tuple[int, int, int]
     converged: bool
     unreached: tuple[str, ...] = ()
+    curve: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -135,17 +142,31 @@ class Lighting:
         if name not in self.emission:
             raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
         lights = tuple(
-            replace(light, emission=emission, weight=emission) if light.name == name else light
+            replace(light, emission=emission, weight=emission, constraint="", is_active=False)
+            if light.name == name
+            else light
             for light in self.lights
         )
         return replace(self, lights=lights, quality=None)
 
     @classmethod
-    def of_weights(cls, basis: Basis, weights: Doubles, **about: Any) -> "Lighting":
-        """From weights (n, 3) in the order of `basis`."""
+    def of_weights(
+        cls,
+        basis: Basis,
+        weights: Doubles,
+        *,
+        asked: Sequence[tuple[str, bool]] | None = None,
+        **about: Any,
+    ) -> "Lighting":
+        """From weights (n, 3) in the order of `basis`.
+
+        asked: of each light its `constraint` and whether that `is_active`.
+        """
         settings = tuple(
-            _setting(light, _rgb(weight))
-            for light, weight in zip(basis.lights, weights, strict=True)
+            _setting(light, _rgb(weight), constraint, is_active)
+            for light, weight, (constraint, is_active) in zip(
+                basis.lights, weights, asked or [("", False)] * len(basis.lights), strict=True
+            )
         )
         return cls(settings, scene_identity=basis.origin.scene_identity, **about)
 
@@ -212,6 +233,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             "sweeps": list(q.sweeps),
             "converged": q.converged,
             "unreached": list(q.unreached),
+            **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
         }
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
@@ -250,7 +272,7 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _setting(light: BasisLight, weight: RGB) -> LightSetting:
+def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
         light.name,
@@ -262,6 +284,8 @@ def _setting(light: BasisLight, weight: RGB) -> LightSetting:
         is_fixed=light.is_fixed,
         members=light.members,
         unit_flux=light.unit_flux,
+        constraint=constraint,
+        is_active=is_active,
     )
 
 
@@ -272,6 +296,8 @@ def _ties(light: LightSetting) -> dict[str, Any]:
         ties["is_fixed"] = True
     if light.members != (light.name,):
         ties["members"] = list(light.members)
+    if light.constraint:
+        ties |= {"constraint": light.constraint, "is_active": light.is_active}
     return ties
 
 
@@ -297,6 +323,8 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
         is_fixed,
         tuple(members),
         _read_rgb(data["unit_flux"]) if "unit_flux" in data else None,
+        _read_text(data, "constraint"),
+        bool(data.get("is_active", False)),
     )
 
 
@@ -312,6 +340,7 @@ def _read_quality(data: dict[str, Any]) -> Quality:
         (r, g, b),
         converged,
         tuple(str(name) for name in unreached),
+        tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
     )
 
 

@@ -69,7 +69,8 @@ def minimise(
     result.
 
     If M is singular, as with two lights at one place, many x are optimal. Directions in which
-    nothing changes are then left about as they are at `start`: a Newton step does not move along them; unknowns with M_ii = 0 keep
+    nothing changes are then left about as they are at `start`: a Newton step does not move
+    along them; unknowns with M_ii = 0 keep
     their start. Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """
     q = scaled(np.asarray(M, np.float64), np.asarray(b, np.float64), lower, upper, tuple(caps))

@@ -1,14 +1,17 @@
 """From basis and painting to lighting, in one call."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.exr import Floats
+from lightpaint.solve.constrained import preferring, pulled, solve_constrained, solve_sparse
+from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, Quality
-from lightpaint.solve.normal_equations import NormalEquations, weighted_problem
-from lightpaint.solve.solver import solve_normal_equations
+from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
+from lightpaint.solve.reduction import reduce_to
+from lightpaint.solve.solver import SolverResult, solve_normal_equations
 from lightpaint.target.target import Target
 
 
@@ -32,33 +35,40 @@ class Solution:
 
 
 def solve(
-    basis: Basis, target: Target, *, unpainted: float = 0.0, start: Lighting | None = None
+    basis: Basis,
+    target: Target,
+    *,
+    constraints: Constraints | None = None,
+    unpainted: float = 0.0,
+    start: Lighting | None = None,
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
+    constraints: what else is asked of the lights.
     unpainted: weight of what is not painted, against the current look.
     start: lighting to begin with (the present one by default): a good guess saves sweeps,
     the answer is the same.
 
     Lights that are kept have weight 1; the others make up what they leave of the target.
 
-    Raises SizeError if basis and target differ in size, TargetError if nothing counts.
+    Raises SizeError if basis and target differ in size, TargetError if nothing counts,
+    ConstraintError if a constraint does not fit the lights.
     """
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     equations = NormalEquations.of(basis, image, importance)
     weights = basis.present_weights if start is None else start.weights_for(basis)
-    free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
-    result = solve_normal_equations(
-        equations.holding(basis.is_fixed),
-        weights[free],
-        is_scalar=[basis.lights[k].is_scalar for k in free],
-    )
-    weights[free] = result.weights
+    asked = None
+    tried: list[tuple[int, Doubles]] = []
+    if constraints:
+        result, asked, tried = _solve_asked(equations, basis, constraints, weights)
+    else:
+        result = _solve_free(equations, basis, weights)
+    weights = result.weights
 
     objective = equations.objective(weights)
     norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
-    unreached = tuple(basis.names[k] for k, ok in zip(free, result.reached, strict=True) if not ok)
+    unreached = tuple(name for name, ok in zip(basis.names, result.reached, strict=True) if not ok)
     quality = Quality(
         kkt_residual=_rgb(result.kkt_residual),
         objective=_rgb(objective),
@@ -66,9 +76,45 @@ def solve(
         sweeps=result.sweeps,
         converged=result.converged,
         unreached=unreached,
+        curve=tuple(
+            (count, float(np.sqrt(equations.objective(w).sum() / norm.sum()))) for count, w in tried
+        ),
     )
-    lighting = Lighting.of_weights(basis, weights, target=target.name, quality=quality)
+    lighting = Lighting.of_weights(basis, weights, asked=asked, target=target.name, quality=quality)
     return Solution(lighting, image, importance)
+
+
+def _solve_free(equations: NormalEquations, basis: Basis, start: Doubles) -> SolverResult:
+    """Every light that is not kept may have any colour."""
+    free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
+    result = solve_normal_equations(
+        equations.holding(basis.is_fixed),
+        start[free],
+        is_scalar=[basis.lights[k].is_scalar for k in free],
+    )
+    weights, reached = start.copy(), np.ones(len(start), dtype=bool)
+    weights[free], reached[free] = result.weights, result.reached
+    return replace(result, weights=weights, reached=tuple(reached.tolist()))
+
+
+def _solve_asked(
+    equations: NormalEquations, basis: Basis, constraints: Constraints, start: Doubles
+) -> tuple[SolverResult, list[tuple[str, bool]], list[tuple[int, Doubles]]]:
+    """Under constraints; with it, of each light, what is asked and whether that holds it.
+
+    Last, where only some lights may be on: numbers of lights and weights of the best such.
+    """
+    reduction = reduce_to(constraints, basis.lights)
+    if constraints.prefer_current:
+        present = basis.present_weights
+        equations = preferring(equations, basis, present, constraints.prefer_current)
+    tried: list[tuple[int, Doubles]] = []
+    if constraints.sparse is not None:
+        reduction, tried = solve_sparse(equations, reduction, start, constraints.sparse)
+    result = solve_constrained(equations, reduction, start)
+    active = pulled(equations, basis, result.weights)
+    labels = zip(reduction.labels, active, strict=True)
+    return result, [(label, bool(label) and holds) for label, holds in labels], tried
 
 
 def _rgb(values: Floats) -> tuple[float, float, float]:

@@ -70,9 +70,13 @@ def assets(tmp_path: Path) -> Path:
     rng = np.random.default_rng(0)
     write_rgb(tmp_path / "map.exr", rng.random((8, 16, 3)).astype(np.float32))
     Image.fromarray(rng.integers(0, 255, (8, 16, 3), np.uint8)).save(tmp_path / "picture.png")
-    corners = [(-1, 0.5, 0, 1, 0, 0), (-1, 1.5, 0, 0, 1, 0), (-1, 1, 1, 0, 0, 1)]
+    corners = [
+        (-1, 0.5, 0, 1, 0, 0, 0, 0),
+        (-1, 1.5, 0, 0, 1, 0, 1, 0),
+        (-1, 1, 1, 0, 0, 1, 0, 1),
+    ]
     lines = "\n".join(" ".join(map(str, corner)) for corner in corners)
-    properties = "".join(f"property float {p}\n" for p in ("x", "y", "z", "r", "g", "b"))
+    properties = "".join(f"property float {p}\n" for p in "xyzrgbuv")
     (tmp_path / "painted.ply").write_text(
         f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
         f"property list uchar int vertex_indices\nend_header\n{lines}\n3 0 1 2\n",

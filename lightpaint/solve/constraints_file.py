@@ -1,0 +1,22 @@
+"""Constraints from a lights file, the TOML beside a scene."""
+
+from pathlib import Path
+
+from lightpaint.scene.lights_file import CONSTRAINTS, read_keys
+from lightpaint.solve.constraints import Constraints
+
+
+def read_constraints(path: str | Path) -> Constraints:
+    """What the lights file at `path` asks of the lights; nothing if it only chooses them.
+
+    Raises SceneError for a file that is missing or no TOML, ConstraintError for a value that
+    means nothing, naming file, light and key.
+    """
+    data = {key: value for key, value in read_keys(Path(path)).items() if key in CONSTRAINTS}
+    return Constraints.of(
+        data.get("light"),
+        tie=data.get("tie", ()),
+        prefer_current=data.get("prefer", 0.0),
+        sparse=data.get("sparse"),
+        where=str(path),
+    )

@@ -1,0 +1,55 @@
+"""M and b in the unknowns that constraints leave."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpaint.solve.normal_equations import Doubles, NormalEquations
+from lightpaint.solve.optimum import Cap
+from lightpaint.solve.reduction import Reduction, Unknown, channel_groups
+
+
+@dataclass(frozen=True)
+class ReducedProblem:
+    """½ xᵀM x − bᵀx in the unknowns `its` of a reduction, of the channels it couples."""
+
+    channels: list[int]
+    its: list[int]
+    M: Doubles
+    b: Doubles
+    lower: Doubles
+    upper: Doubles
+    caps: tuple[Cap, ...]
+
+
+def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
+    """One problem for every set of channels that the unknowns couple.
+
+    With w = C x + w₀ it is M' = Σ_c C_cᵀ M_c C_c and b' = Σ_c C_cᵀ (b_c − M_c w₀_c).
+    """
+    made = []
+    for channels in channel_groups(reduction):
+        its = [k for k, x in enumerate(reduction.unknowns) if _touches(x, channels)]
+        M, b = np.zeros((len(its), len(its))), np.zeros(len(its))
+        for c in channels:
+            here = [k for k, i in enumerate(its) if _touches(reduction.unknowns[i], [c])]
+            C = np.zeros((len(reduction.held), len(here)))
+            for k, i in enumerate(here):
+                for light, rgb in reduction.unknowns[its[i]].columns:
+                    C[light, k] = rgb[c]
+            M[np.ix_(here, here)] += C.T @ equations.M[c] @ C
+            b[here] += C.T @ (equations.b[c] - equations.M[c] @ reduction.held[:, c])
+        place = {i: k for k, i in enumerate(its)}
+        caps = tuple(
+            replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
+            for cap in reduction.caps
+            if cap.unknowns[0] in place
+        )
+        lower = np.array([reduction.unknowns[i].lower for i in its])
+        upper = np.array([reduction.unknowns[i].upper for i in its])
+        made.append(ReducedProblem(channels, its, M, b, lower, upper, caps))
+    return made
+
+
+def _touches(unknown: Unknown, channels: list[int]) -> bool:
+    return any(rgb[c] for _, rgb in unknown.columns for c in channels)
