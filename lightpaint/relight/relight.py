@@ -122,10 +122,11 @@ def relit_files(
     changed = dict(_settings(scene, emission))
     kept = [emitter for emitter in scene.emitters if emitter not in changed]
     # Mitsuba refuses a scene in which no emitter may be sampled.
-    all_dark = not any(map(any, changed.values())) and not any(e.sampling_weight for e in kept)
+    sampled = any(any(rgb) and not emitter.by_chance for emitter, rgb in changed.items())
+    sampled = sampled or any(emitter.sampling_weight for emitter in kept)
     for emitter, rgb in changed.items():
         file = scene.files[emitter.file]
-        setting = (emitter, rgb, _sampling_weight(emitter, rgb, all_dark))
+        setting = (emitter, rgb, _sampling_weight(emitter, rgb, sampled))
         here = edits.setdefault(file.resolve(), _Edits(file)).settings
         if emitter.offset in here and here[emitter.offset][1:] != setting[1:]:
             raise _included_twice(file, here[emitter.offset][0], emitter)
@@ -161,11 +162,14 @@ def _included_twice(file: Path, one: Emitter, other: Emitter) -> SceneError:
     )
 
 
-def _sampling_weight(emitter: Emitter, rgb: RGB, all_dark: bool) -> float | None:
-    """The sampling weight to write, or None to leave it as it is."""
-    if any(rgb):
+def _sampling_weight(emitter: Emitter, rgb: RGB, sampled: bool) -> float | None:
+    """The sampling weight to write, or None to leave it as it is.
+
+    sampled: whether any other emitter is: Mitsuba refuses a scene in which none may be.
+    """
+    if any(rgb) and not (emitter.by_chance and sampled):
         return 1.0 if emitter.sampling_weight == 0 else None
-    return None if all_dark else 0.0
+    return 0.0 if sampled else None
 
 
 def _place_of_include(file: Path, root: Path) -> Path:

@@ -105,10 +105,8 @@ def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
     return r, g, b
 
 
-def why_not_adjusted(emitter: Any, plugin: str, kind: EmissionKind | None, emission: RGB) -> str:
+def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> str:
     """What keeps a light from being solved for, in words behind its name; "" if nothing."""
-    import mitsuba as mi
-
     if plugin not in PLUGINS:
         return f"is a {plugin} emitter, which lightpaint cannot scale"
     if kind is None:
@@ -116,14 +114,6 @@ def why_not_adjusted(emitter: Any, plugin: str, kind: EmissionKind | None, emiss
         return f"has a textured {parameter} that is neither a bitmap nor one colour"
     if min(emission) < 0:
         return f"has a negative {kind.parameter}, {' '.join(f'{v:g}' for v in emission)}"
-    if plugin == "area" and kind.scaling is Scaling.FACTORS:
-        # Mitsuba samples such a light by texture coordinates. Without any, what it renders
-        # depends on how often the light is sampled, and so on which others are switched on.
-        if not len(mi.traverse(emitter.get_shape())["vertex_texcoords"]):
-            return (
-                "is painted by a mesh attribute, on a mesh without the texture coordinates that "
-                "Mitsuba needs to sample it"
-            )
     return ""
 
 

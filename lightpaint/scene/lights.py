@@ -42,6 +42,16 @@ class Emitter:
     obstacle: str = ""
     unit_flux: float | None = None
 
+    @property
+    def by_chance(self) -> bool:
+        """Whether only rays that happen to hit it may find it: it is never sampled.
+
+        Meshes painted by an attribute: Mitsuba's sampling of these and the probability that it
+        states for it do not agree, so that a render would depend on the sampling weights, and
+        with them on which other lights are on.
+        """
+        return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
+
 
 @dataclass(frozen=True)
 class Light:

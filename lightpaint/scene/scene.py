@@ -284,7 +284,7 @@ def _chosen(
 
 def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
     # An emitter the scene keeps switched off is sampled again once it shines.
-    weight = (emitter.sampling_weight or 1.0) if any(rgb) else 0.0
+    weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.by_chance else 0.0
     return EmitterSetting(emitter.kind, rgb, weight)
 
 
@@ -313,7 +313,7 @@ def _find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
                 node=node_of[name],
                 file=node.file_index,
                 offset=node.offset - 1,
-                obstacle=why_not_adjusted(emitter, plugin, kind, emission),
+                obstacle=why_not_adjusted(plugin, kind, emission),
                 unit_flux=flux_of_unit(emitter, plugin, kind),
             )
         )
