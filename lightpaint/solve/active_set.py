@@ -136,7 +136,9 @@ def _up_to_the_first_limit(
     for k in np.flatnonzero(exceeded):
         before, after = float(q.A[k] @ x), float(q.A[k] @ target)
         wall = q.cap_upper[k] if after > q.cap_upper[k] else q.cap_lower[k]
-        cap_share = min(max((wall - before) / (after - before), 0.0), 1.0)
+        cap_share = (
+            min(max((wall - before) / (after - before), 0.0), 1.0) if after != before else 0.0
+        )
         if cap_share < share or (first_cap < 0 and not hit.size):
             share, first_cap = cap_share, int(k)
     if first_cap >= 0:

@@ -68,10 +68,11 @@ def minimise(
     to 0 by default. max_sweeps: the limit of Gauss–Seidel passes; running out of them is a
     result.
 
-    If M is singular, as with two lights at one place, many x are optimal. Directions in which
-    nothing changes are then left about as they are at `start`: a Newton step does not move
-    along them; unknowns with M_ii = 0 keep
-    their start. Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
+    If M is singular, as with two lights at one place, many x are optimal. The polish leaves
+    directions in which nothing changes as they are at `start`, so that the answer stays near it;
+    which one it is, is not promised. Unknowns with M_ii = 0 keep their start.
+
+    Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """
     q = scaled(np.asarray(M, np.float64), np.asarray(b, np.float64), lower, upper, tuple(caps))
     begin = np.zeros(q.n) if start is None else np.asarray(start, np.float64)

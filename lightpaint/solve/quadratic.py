@@ -198,7 +198,8 @@ def _scaled_caps(
         A[k, group] = coefficients / length
         cap_lower[k], cap_upper[k], cap_scale[k] = cap.lower / length, cap.upper / length, length
         least, most = float(A[k, group] @ low[group]), float(A[k, group] @ high[group])
-        room = 16 * EPSILON * max(abs(least), abs(cap_upper[k])) if np.isfinite(least) else 0.0
+        limits = np.array([least, most, cap_lower[k], cap_upper[k]])
+        room = 16 * EPSILON * float(np.abs(limits[np.isfinite(limits)]).max(initial=0))
         if cap.lower > cap.upper or least > cap_upper[k] + room or most < cap_lower[k] - room:
             raise ValueError(
                 f"cap {k} asks for {cap.lower:g} to {cap.upper:g}, and the bounds of its unknowns "

@@ -1,0 +1,69 @@
+"""Lights that a painting cannot tell apart, of images made for it."""
+
+from typing import Any
+
+import numpy as np
+
+from lightpaint.solve.indistinguishable import indistinguishable
+
+NAMES = ["key", "fill", "rim", "sky", "lamp"]
+
+
+def _images(seed: int = 0) -> Any:
+    """(3, 5, 200): five different lights."""
+    return np.random.default_rng(seed).random((3, 5, 200)) ** 3
+
+
+def _gram(images: Any) -> Any:
+    return images @ images.transpose(0, 2, 1)
+
+
+def test_different_lights_are_told_apart():
+    for seed in range(20):
+        assert indistinguishable(_gram(_images(seed)), NAMES) == ()
+
+
+def test_coincident_lights_are_a_group_whatever_their_power():
+    images = _images()
+    images[:, 2] = 7 * images[:, 0]
+    # Another colour is another weight, not another light.
+    images[:, 4] = images[:, 0] * np.array([1, 0.5, 1e-3])[:, None]
+    (found,) = indistinguishable(_gram(images), NAMES)
+    assert found.names == ("key", "rim", "lamp")
+    assert not found.is_mix
+    assert found.left < 1e-12
+    assert "key, rim and lamp light the painted part alike" in found.sentence
+    assert "wider mask" in found.sentence
+
+
+def test_a_light_that_is_a_mix_of_others():
+    images = _images()
+    images[:, 3] = 0.5 * images[:, 0] + 2 * images[:, 1]
+    (found,) = indistinguishable(_gram(images), NAMES)
+    assert found.names == ("key", "fill", "sky")
+    assert found.is_mix
+    assert "mixes of key, fill and sky" in found.sentence
+
+
+def test_fewer_pixels_than_lights():
+    found = indistinguishable(_gram(_images()[:, :, :2]), NAMES)
+    assert found
+    assert all(each.is_mix for each in found)
+
+
+def test_lights_that_reach_nothing_are_not_compared():
+    images = _images()
+    images[:, 1] = images[:, 4] = 0
+    assert indistinguishable(_gram(images), NAMES) == ()
+
+
+def test_one_channel_and_no_lights():
+    images = _images()
+    images[0, 1] = images[0, 0]
+    (found,) = indistinguishable(_gram(images)[0], NAMES)
+    assert found.names == ("key", "fill")
+    # In the other channels they do differ: it is in one that they can trade.
+    (found,) = indistinguishable(_gram(images), NAMES)
+    assert found.names == ("key", "fill")
+    assert found.is_mix
+    assert indistinguishable(np.zeros((3, 0, 0)), []) == ()
