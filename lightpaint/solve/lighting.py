@@ -27,6 +27,7 @@ class LightSetting:
     weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
     is_fixed: whether it is what stays as it is in the scene, with weight 1.
     members: names of the emitters it consists of; itself if none are given.
+    standard_error: of the emission, from the noise it was solved with, where that is known.
     """
 
     name: str
@@ -37,11 +38,15 @@ class LightSetting:
     weight: RGB
     is_fixed: bool = False
     members: tuple[str, ...] = ()
+    standard_error: RGB | None = None
 
     def __post_init__(self) -> None:
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
-        for what, rgb in (("emission", self.emission), ("weight", self.weight)):
+        given = {"emission": self.emission, "weight": self.weight}
+        if self.standard_error is not None and not self.is_fixed:
+            given["standard error"] = self.standard_error
+        for what, rgb in given.items():
             if not all(math.isfinite(v) and v >= 0 for v in rgb):
                 raise LightingError(
                     f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
@@ -110,7 +115,9 @@ class Lighting:
         if name not in self.emission:
             raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
         lights = tuple(
-            replace(light, emission=emission, weight=emission) if light.name == name else light
+            replace(light, emission=emission, weight=emission, standard_error=None)
+            if light.name == name
+            else light
             for light in self.lights
         )
         return replace(self, lights=lights, quality=None)
@@ -239,6 +246,8 @@ def _setting(light: BasisLight, weight: RGB) -> LightSetting:
 def _ties(light: LightSetting) -> dict[str, Any]:
     """What the file says of a light only where it does not go without saying."""
     ties: dict[str, Any] = {}
+    if light.standard_error is not None:
+        ties["standard_error"] = list(light.standard_error)
     if light.is_fixed:
         ties["is_fixed"] = True
     if light.members != (light.name,):
@@ -261,6 +270,7 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
         _read_rgb(data["weight"]),
         is_fixed,
         tuple(members),
+        _read_rgb(data["standard_error"]) if "standard_error" in data else None,
     )
 
 

@@ -1,15 +1,29 @@
 """From basis and painting to lighting, in one call."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.basis.basis import Basis
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
 from lightpaint.solve.lighting import Lighting, Quality
-from lightpaint.solve.normal_equations import NormalEquations, weighted_problem
+from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
 from lightpaint.solve.solver import solve_normal_equations
 from lightpaint.target.target import Target
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What the last step to an answer started from (see refine.py).
+
+    mixed: V, an independent render of the scene at the weights `before`, (n, 3).
+    gradient: (3, n), ⟨Φ_i, Ψ − V⟩.
+    """
+
+    mixed: Estimate
+    before: Doubles
+    gradient: Doubles
 
 
 @dataclass(frozen=True)
@@ -18,11 +32,23 @@ class Solution:
 
     image: (h, w, 3), what was solved for; importance: (h, w), its weights. They differ from
     the target's where unpainted pixels count or emitters are seen.
+    current_share: (h, w), how much of `image` is the current look, as the basis has it.
+    refinement: how the answer of the basis was improved, if it was.
     """
 
     lighting: Lighting
     image: Floats
     importance: Floats
+    equations: NormalEquations
+    current_share: Floats
+    refinement: Refinement | None = None
+
+    @property
+    def right_hand_side(self) -> Doubles:
+        """(3, n), the b of M w = b that the weights solve."""
+        if (r := self.refinement) is None:
+            return self.equations.b
+        return np.einsum("cij,jc->ci", self.equations.M, r.before) + r.gradient
 
     @property
     def quality(self) -> Quality:
@@ -46,11 +72,27 @@ def solve(
     """
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
-    equations = NormalEquations.of(basis, image, importance)
-    weights = basis.present_weights if start is None else start.weights_for(basis)
+    counted = np.where(importance > 0, importance, 1)
+    problem = Solution(
+        lighting=Lighting.of_weights(basis, basis.present_weights, target=target.name),
+        image=image,
+        importance=importance,
+        equations=NormalEquations.of(basis, image, importance),
+        current_share=np.where(importance > 0, 1 - target.importance / counted, 0),
+    )
+    return solution_of(
+        basis, problem, start=basis.present_weights if start is None else start.weights_for(basis)
+    )
+
+
+def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
+    """`problem` with the weights that solve it. start: (n, 3), where to begin."""
+    equations = problem.equations
+    weights = np.array(start)
     free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
+    asked = replace(equations, b=problem.right_hand_side)
     result = solve_normal_equations(
-        equations.holding(basis.is_fixed),
+        asked.holding(basis.is_fixed),
         weights[free],
         is_scalar=[basis.lights[k].is_scalar for k in free],
     )
@@ -67,8 +109,9 @@ def solve(
         converged=result.converged,
         unreached=unreached,
     )
-    lighting = Lighting.of_weights(basis, weights, target=target.name, quality=quality)
-    return Solution(lighting, image, importance)
+    target = problem.lighting.target
+    lighting = Lighting.of_weights(basis, weights, target=target, quality=quality)
+    return replace(problem, lighting=lighting)
 
 
 def _rgb(values: Floats) -> tuple[float, float, float]:
