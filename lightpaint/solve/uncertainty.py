@@ -232,7 +232,7 @@ def _propagated(M: Doubles, C: Doubles, w: Doubles, gradient: Doubles) -> tuple[
         errors[i] = _one_sided(M, C, on, i, gradient[i])
         may_be_on[i] = errors[i] > 0
     free = np.flatnonzero(may_be_on)
-    inverse = _inverse(M[np.ix_(free, free)])
+    inverse = pseudo_inverse(M[np.ix_(free, free)])
     covariance = inverse @ C[np.ix_(free, free)] @ inverse
     spread = np.sqrt(np.maximum(np.diag(covariance), 0))
     errors[free] = np.where(on[free], spread, errors[free])
@@ -246,7 +246,7 @@ def _one_sided(M: Doubles, C: Doubles, on: npt.NDArray[np.bool_], i: int, gradie
     on by SIDES · s − |u|.
     """
     others = np.flatnonzero(on)
-    answer = -_inverse(M[np.ix_(others, others)]) @ M[others, i]
+    answer = -pseudo_inverse(M[np.ix_(others, others)]) @ M[others, i]
     stiffness = M[i, i] + M[i, others] @ answer
     if stiffness <= SINGULAR * M[i, i]:
         return 0.0  # the others do all that it could do
@@ -298,17 +298,7 @@ def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     return safe[:, None] * vectors[:, seen] * root, (vectors[:, seen] / root).T / safe
 
 
-def _inverse(M: Doubles) -> Doubles:
+def pseudo_inverse(M: Doubles) -> Doubles:
+    """Of a positive semidefinite matrix, whatever the sizes of its unknowns."""
     _, inverse = _roots(M)
     return np.asarray(inverse.T @ inverse)
-
-
-def relative(uncertainty: Uncertainty, flux: Floats) -> Doubles:
-    """Standard error of each light's energy over its energy, (n,); 0 where it is off.
-
-    flux: (n, 3), what a unit of weight adds to the image, by which channels count.
-    """
-    energy = (flux * uncertainty.weights).sum(axis=1)
-    # Errors of the channels go together: one path carries all three.
-    error = (flux * uncertainty.standard_error).sum(axis=1)
-    return np.where(energy > 0, error / np.where(energy > 0, energy, 1), 0.0)
