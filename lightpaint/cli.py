@@ -93,6 +93,14 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
+    solve.add_argument(
+        "--refine",
+        type=_at_least(0),
+        default=0,
+        metavar="K",
+        help="times to render the scene as solved, with as many samples as the basis, and improve "
+        "the answer by what that shows (default: %(default)s)",
+    )
     _add_lights(solve)
     _add_budget(solve)
     _add_cache(solve)

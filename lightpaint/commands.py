@@ -24,6 +24,12 @@ from lightpaint.pipeline import (
     render_template,
     verify_result,
 )
+from lightpaint.relight.explanation import (
+    how_sure,
+    relative_errors,
+    spoken_error,
+    what_is_missed,
+)
 from lightpaint.relight.relight import check_relightable, scene_of
 from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
@@ -161,6 +167,7 @@ def solve(options: Namespace, given: list[str]) -> int:
                 folder,
                 basis=made,
                 unpainted=options.unpainted,
+                refine=options.refine,
                 spp=options.spp,
                 time_s=options.time_s,
                 quality=options.quality,
@@ -339,8 +346,9 @@ def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
 
 def _show(look: Look, folder: Path) -> None:
     shares = energy_shares(look.basis, look.lighting)
-    table = console.table("light", "plugin", "emission now", "solved R G B", "unit", "share")
-    for light, now, share in zip(look.lighting.lights, look.basis.lights, shares, strict=True):
+    table = console.table("light", "plugin", "emission now", "solved R G B", "±", "unit", "share")
+    errors = relative_errors(look.uncertainty)
+    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else console.numbers(light.emission)
         if light.name in look.solution.quality.unreached and any(light.emission):
             solved += " (kept)"
@@ -349,11 +357,15 @@ def _show(look: Look, folder: Path) -> None:
             light.plugin,
             "" if light.is_fixed else console.numbers(now.emission),
             "kept" if light.is_fixed else solved,
+            spoken_error(light, float(errors[k])),
             "" if light.is_fixed else light.unit,
-            f"{100 * share:.1f} %",
+            f"{100 * shares[k]:.1f} %",
         )
     console.print_table(table)
     console.write(verdict(look.solution, look.predicted, look.verification))
+    for sentence in what_is_missed(look.diagnosis):
+        console.write(sentence)
+    console.write(how_sure(look.basis, look.solution, look.uncertainty))
     console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
     if quality.unreached:
@@ -394,7 +406,7 @@ def _check_nothing_to_render(options: Namespace) -> None:
     asked |= {"--lights": options.lights, "--group": options.groups}
     asked |= {"--lights-file": options.lights_file, "--spp": options.spp}
     asked |= {"--time": options.time_s, "--quality": options.quality}
-    asked |= {"--resolution": options.resolution}
+    asked |= {"--resolution": options.resolution, "--refine": options.refine}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"

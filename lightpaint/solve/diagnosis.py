@@ -11,6 +11,7 @@ noise of the prediction adds to the first is taken out of it.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.color import luminance
@@ -233,10 +234,10 @@ def _place(solution: Solution, unreachable: Floats) -> Place | None:
     )
 
 
-def _edges(length: int, parts: int) -> Floats:
+def _edges(length: int, parts: int) -> npt.NDArray[np.int_]:
     """Where `length` pixels are cut into that many nearly equal parts, or single pixels."""
     parts = min(length, parts)
-    return np.arange(parts + 1) * length // parts
+    return np.asarray(np.arange(parts + 1) * length // parts, dtype=np.int_)
 
 
 def _rgb(values: Floats) -> tuple[float, float, float]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
 from lightpaint.solve.lighting import Lighting, Quality
 from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
@@ -15,15 +14,18 @@ from lightpaint.target.target import Target
 
 @dataclass(frozen=True)
 class Refinement:
-    """What the last step to an answer started from (see refine.py).
+    """What is known of the noise in the last step to an answer (see refine.py).
 
-    mixed: V, an independent render of the scene at the weights `before`, (n, 3).
-    gradient: (3, n), ⟨Φ_i, Ψ − V⟩.
+    before: (n, 3), the weights that it went from.
+    noise: (h, w, 3), half difference of the prediction there, as far as it decided the step.
+    lacking: (3, n), what is still to be expected to lack in the gradient.
+    share: of the step that the render of the mix decided, 0 to 1; the basis did the rest.
     """
 
-    mixed: Estimate
     before: Doubles
-    gradient: Doubles
+    noise: Floats
+    lacking: Doubles
+    share: float
 
 
 @dataclass(frozen=True)
@@ -32,23 +34,21 @@ class Solution:
 
     image: (h, w, 3), what was solved for; importance: (h, w), its weights. They differ from
     the target's where unpainted pixels count or emitters are seen.
+    equations: of the basis as it is; solved: those that the weights solve, which differ where
+    noise was taken out of them.
     current_share: (h, w), how much of `image` is the current look, as the basis has it.
-    refinement: how the answer of the basis was improved, if it was.
+    noise_removed: the part of the noise in `equations` that is not in `solved`.
+    refinement: the last step by which the answer was improved, if it was.
     """
 
     lighting: Lighting
     image: Floats
     importance: Floats
     equations: NormalEquations
+    solved: NormalEquations
     current_share: Floats
+    noise_removed: float = 0.0
     refinement: Refinement | None = None
-
-    @property
-    def right_hand_side(self) -> Doubles:
-        """(3, n), the b of M w = b that the weights solve."""
-        if (r := self.refinement) is None:
-            return self.equations.b
-        return np.einsum("cij,jc->ci", self.equations.M, r.before) + r.gradient
 
     @property
     def quality(self) -> Quality:
@@ -73,11 +73,13 @@ def solve(
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     counted = np.where(importance > 0, importance, 1)
+    equations = NormalEquations.of(basis, image, importance)
     problem = Solution(
         lighting=Lighting.of_weights(basis, basis.present_weights, target=target.name),
         image=image,
         importance=importance,
-        equations=NormalEquations.of(basis, image, importance),
+        equations=equations,
+        solved=equations,
         current_share=np.where(importance > 0, 1 - target.importance / counted, 0),
     )
     return solution_of(
@@ -86,13 +88,12 @@ def solve(
 
 
 def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
-    """`problem` with the weights that solve it. start: (n, 3), where to begin."""
+    """`problem` with the weights that solve `problem.solved`. start: (n, 3), where to begin."""
     equations = problem.equations
     weights = np.array(start)
     free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
-    asked = replace(equations, b=problem.right_hand_side)
     result = solve_normal_equations(
-        asked.holding(basis.is_fixed),
+        problem.solved.holding(basis.is_fixed),
         weights[free],
         is_scalar=[basis.lights[k].is_scalar for k in free],
     )

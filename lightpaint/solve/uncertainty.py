@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis, mix
-from lightpaint.images.exr import Floats
 from lightpaint.solve.lighting import LightSetting
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
-from lightpaint.solve.solve import Solution
+from lightpaint.solve.solve import Solution, solution_of
 from lightpaint.solve.solver import UNREACHED, solve_normal_equations
 
 #: Standard errors on either side of a 95 % interval.
@@ -62,7 +61,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class _Noise:
+class Noise:
     """Sums over pixels of products of half differences, per channel.
 
     power: (3, n, n), N_ij = Σ D h_i h_j, what the noise adds to M. drawn: (3, n), what the
@@ -84,23 +83,20 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
     """
     weights = solution.lighting.weights_for(basis)
     equations = solution.equations
-    noise = _noise(basis, solution, weights)
+    noise = noise_sums(basis, solution, weights)
     corrected = without_noise(equations, noise.power)
-    if solution.refinement is None:
-        right = equations.b - noise.drawn
-    else:
-        # The render of the mix is unbiased: only the step taken from it was.
-        before = solution.refinement.before
-        step = solution.refinement.gradient
-        right = np.einsum("cij,jc->ci", corrected, before) + step
+    before, lacking = lacking_gradient(solution, noise)
+    step = solution.solved.b - np.einsum("cij,jc->ci", solution.solved.M, before) + lacking
+    right = np.einsum("cij,jc->ci", corrected, before) + step
     bias = _solved(basis, NormalEquations(corrected, right, equations.target_norm2), weights)
     bias -= weights
 
     scatter, excess = np.zeros_like(weights), np.zeros(3)
-    gradient = np.einsum("cij,jc->ic", equations.M, weights) - solution.right_hand_side.T
+    solved = solution.solved
+    gradient = np.einsum("cij,jc->ic", solved.M, weights) - solved.b.T
     for unknowns in unknown_groups(basis, equations):
         to = _columns(unknowns, len(weights))
-        M = to.T @ _block_diagonal(equations.M) @ to
+        M = to.T @ _block_diagonal(solved.M) @ to
         C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
         flat = np.array([weights[i, cs[0]] for i, cs in unknowns])
         errors, spread = _propagated(M, C, flat, to.T @ gradient.T.ravel())
@@ -109,9 +105,38 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
         for c in {c for _, cs in unknowns for c in cs}:
             excess[c] += spread / len({c for _, cs in unknowns for c in cs})
     excess += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
-    return Uncertainty(
-        weights, scatter, bias, noise.objective_error, noise.objective_noise, excess
+    return Uncertainty(weights, scatter, bias, noise.objective_error, noise.objective_noise, excess)
+
+
+def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
+    """Some weights, (n, 3), and what noise made b − M w lack there on average, (3, n)."""
+    if (r := solution.refinement) is not None:
+        return r.before, r.lacking
+    n = noise.power.shape[1]
+    # At no light at all the noise of the basis lacks nothing in M: all of it is still to come.
+    nothing = np.zeros((n, 3))
+    if solution.noise_removed == 0:
+        return nothing, -noise.drawn
+    weights = np.array([light.weight for light in solution.lighting.lights])
+    lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.drawn
+    return weights, (1 - solution.noise_removed) * lack
+
+
+def correct_noise(basis: Basis, solution: Solution, *, share: float = 0.5) -> Solution:
+    """The solution of the equations without that share of the noise power in M and b.
+
+    What was solved before, `solution`, is where it starts. docs/method.md has what it is worth.
+    """
+    weights = solution.lighting.weights_for(basis)
+    noise = noise_sums(basis, solution, weights)
+    e = solution.equations
+    M = (1 - share) * e.M + share * without_noise(e, noise.power)
+    problem = replace(
+        solution,
+        solved=NormalEquations(M, e.b - share * noise.drawn, e.target_norm2),
+        noise_removed=share,
     )
+    return solution_of(basis, problem, start=weights)
 
 
 def with_error_bars(solution: Solution, uncertainty: Uncertainty) -> Solution:
@@ -138,9 +163,7 @@ def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:
     return made
 
 
-def unknown_groups(
-    basis: Basis, equations: NormalEquations
-) -> list[list[tuple[int, list[int]]]]:
+def unknown_groups(basis: Basis, equations: NormalEquations) -> list[list[tuple[int, list[int]]]]:
     """(light, channels it moves together) of each unknown weight, by independent problem."""
     power = np.einsum("cii->ic", equations.M)
     lit = power > UNREACHED * power.max(initial=0)
@@ -159,7 +182,7 @@ def unknown_groups(
     return groups
 
 
-def _noise(basis: Basis, solution: Solution, weights: Doubles) -> _Noise:
+def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     """One pass over the pixels that count."""
     n = len(weights)
     importance = solution.importance.ravel()
@@ -188,7 +211,7 @@ def _noise(basis: Basis, solution: Solution, weights: Doubles) -> _Noise:
                 gradient[c, :, d] += product
                 gradient[d, :, c] += product.T
     D = importance[:, None]
-    return _Noise(
+    return Noise(
         power,
         drawn,
         gradient,
@@ -200,22 +223,18 @@ def _noise(basis: Basis, solution: Solution, weights: Doubles) -> _Noise:
 def residual_and_noise(
     basis: Basis, solution: Solution, weights: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """What the answer misses and half the difference of what its two halves predict.
+    """What the answer misses, and half the difference of what its two halves predict.
 
     Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
-    it holds the current look. After a refinement both come from its render.
+    it holds the current look.
     """
-    moved = weights
-    residual = solution.image.astype(np.float64)
-    noise = -solution.current_share[..., None] * mix(
-        basis.half_differences, basis.present_weights
-    ).astype(np.float64)
-    if solution.refinement is not None:
-        moved = weights - solution.refinement.before
-        residual = residual - solution.refinement.mixed.image
-        noise = noise + solution.refinement.mixed.half_difference
-    residual = residual - basis.mix(moved)
-    noise = noise + mix(basis.half_differences, moved)
+    residual = solution.image.astype(np.float64) - basis.mix(weights)
+    if (r := solution.refinement) is not None:
+        noise = r.noise + mix(basis.half_differences, weights - r.before)
+    else:
+        noise = mix(basis.half_differences, weights).astype(np.float64)
+        present = mix(basis.half_differences, basis.present_weights)
+        noise = noise - solution.current_share[..., None] * present
     return residual.reshape(-1, 3), noise.reshape(-1, 3)
 
 
@@ -228,8 +247,8 @@ def _propagated(M: Doubles, C: Doubles, w: Doubles, gradient: Doubles) -> tuple[
     errors = np.zeros(w.size)
     on = w > 0
     may_be_on = on.copy()
-    for i in np.flatnonzero(~on):
-        errors[i] = _one_sided(M, C, on, i, gradient[i])
+    for i in np.flatnonzero(~on).tolist():
+        errors[i] = _one_sided(M, C, on, i, float(gradient[i]))
         may_be_on[i] = errors[i] > 0
     free = np.flatnonzero(may_be_on)
     inverse = pseudo_inverse(M[np.ix_(free, free)])
@@ -253,7 +272,7 @@ def _one_sided(M: Doubles, C: Doubles, on: npt.NDArray[np.bool_], i: int, gradie
     along = np.zeros(on.size)
     along[i], along[others] = 1, answer
     wanted = -max(gradient, 0.0) / stiffness
-    spread = float(np.sqrt(max(along @ C @ along, 0.0))) / stiffness
+    spread = float(np.sqrt(np.maximum(along @ C @ along, 0.0))) / stiffness
     return max(0.0, float(spread + wanted / SIDES))
 
 
@@ -295,7 +314,8 @@ def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     values, vectors = np.linalg.eigh(M / safe[:, None] / safe)
     seen = values > SINGULAR * values.max(initial=0)
     root = np.sqrt(values[seen])
-    return safe[:, None] * vectors[:, seen] * root, (vectors[:, seen] / root).T / safe
+    inverse = (vectors[:, seen] / root).T / safe
+    return np.asarray(safe[:, None] * vectors[:, seen] * root), np.asarray(inverse)
 
 
 def pseudo_inverse(M: Doubles) -> Doubles:

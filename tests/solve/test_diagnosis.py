@@ -117,9 +117,7 @@ def test_the_parts_add_up(make_basis: Any, seed: int, n: int, is_scalar: bool):
     noise = rng.normal(0, 0.05, (n, *SIZE, 3))
     basis = make_basis(n, SIZE, seed=seed, half_differences=noise)
     if is_scalar:
-        basis = replace(
-            basis, lights=(replace(basis.lights[0], is_scalar=True), *basis.lights[1:])
-        )
+        basis = replace(basis, lights=(replace(basis.lights[0], is_scalar=True), *basis.lights[1:]))
     importance = np.clip(rng.normal(0.5, 0.5, SIZE), 0, None)
     importance[0, 0] = 1
     target = _target(rng.random((*SIZE, 3)) * rng.random(3), importance)
