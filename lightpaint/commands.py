@@ -167,6 +167,7 @@ def solve(options: Namespace, given: list[str]) -> int:
                 folder,
                 basis=made,
                 unpainted=options.unpainted,
+                noise_correction=options.noise_correction,
                 refine=options.refine,
                 spp=options.spp,
                 time_s=options.time_s,

@@ -26,7 +26,7 @@ from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.solve.diagnosis import Diagnosis, diagnose
 from lightpaint.solve.lighting import Lighting, combine, write_lighting
 from lightpaint.solve.solve import Solution, solve
-from lightpaint.solve.uncertainty import Uncertainty, error_bars, with_error_bars
+from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.target.target import Target, read_target
 from lightpaint.target.template import write_template
 
@@ -84,6 +84,7 @@ def paint_with_light(
     basis: str | Path | Basis | None = None,
     mask: str | Path | None = None,
     unpainted: float = 0.0,
+    noise_correction: bool = False,
     refine: int = 0,
     spp: int | None = None,
     time_s: float | None = None,
@@ -106,6 +107,7 @@ def paint_with_light(
     a scene, relit.xml and verified.exr.
     basis: one made before of the same scene; taken from the cache or rendered if not given.
     unpainted: weight of unpainted pixels against the current look.
+    noise_correction: whether half of the noise's power is taken out of the equations.
     refine: how often to render the scene as solved, with as many samples as the basis, and
     improve the answer by what that shows; needs a scene.
     sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
@@ -148,6 +150,8 @@ def paint_with_light(
             scene, spp=spp, time_s=time_s, seed=seed, use_cache=use_cache, progress=progress
         )
     solution = solve(basis, target, unpainted=unpainted)
+    if noise_correction:
+        solution = correct_noise(basis, solution)
     if scene is not None:
         solution = refine_by_rendering(
             scene, basis, solution, rounds=refine, seed=seed, progress=progress

@@ -47,20 +47,38 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
         for k in order[:ROWS]
         if errors[k] > 0
     ]
-    more = sum(errors > 0) - len(rows)
+    more = int((errors > 0).sum()) - len(rows)
+    others = f" {more} lights that matter less are left out." if more > 0 else ""
     norm2 = max(float(solution.equations.target_norm2.sum()), np.finfo(np.float64).tiny)
     excess = float(np.sqrt(uncertainty.excess.sum() / norm2))
     return (
         '<section><h2>How sure</h2><div class="explained">'
         f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
-        "<p>What the noise of the basis alone makes of each light, as brightness. To be "
-        "wrong within these costs the picture "
-        f"about {spoken_percent(excess)} of the painted light (RMS).</p></div>"
-        "<table><thead><tr><th scope=col>light</th><th scope=col>solved</th>"
-        "<th scope=col>95 % between</th><th scope=col>of it</th>"
-        f"<th scope=col>of the picture</th></tr></thead><tbody>{''.join(rows)}</tbody></table>"
-        f"{f'<p>{more} more matter less.</p>' if more > 0 else ''}</div></section>"
+        "<p>The table shows the brightness of each light, and between which values many samples "
+        "would find it in 95 of 100 cases. Together these errors miss about "
+        f"{spoken_percent(excess)} of the painted light (RMS).{others}</p>{_steps(solution)}</div>"
+        "<table><thead><tr><th scope=\"col\">light</th><th scope=\"col\">solved</th>"
+        "<th scope=\"col\">95 % between</th><th scope=\"col\">of it</th>"
+        f"<th scope=\"col\">of the picture</th></tr></thead><tbody>{''.join(rows)}</tbody></table>"
+        "</div></section>"
     )
+
+
+def _steps(solution: Solution) -> str:
+    """What was done against noise, besides sampling."""
+    steps = []
+    if solution.noise_removed:
+        steps.append(
+            f"{spoken_percent(solution.noise_removed)} of the noise's power in the "
+            "equations was taken out of them"
+        )
+    if solution.refinement is not None:
+        steps.append(
+            "the answer was refined by a render of the mix, which decided "
+            f"{spoken_percent(solution.refinement.share)} of the last step"
+        )
+    text = "; ".join(steps)
+    return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
 
 
 def missed_section(
@@ -116,6 +134,8 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: f
     grey = unpainted_look(current, stops=stops)
     figures = []
     for name, image, caption in parts:
+        if name == "Forbidden" and diagnosis.share(diagnosis.forbidden) < SMALLEST_GAIN:
+            continue  # an empty picture
         # As in the residual's map: predicted − painted, so that bright is too bright.
         colours = diverging(-luminance(image) / limit)
         figures.append(

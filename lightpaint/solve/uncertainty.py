@@ -88,15 +88,18 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
     before, lacking = lacking_gradient(solution, noise)
     step = solution.solved.b - np.einsum("cij,jc->ci", solution.solved.M, before) + lacking
     right = np.einsum("cij,jc->ci", corrected, before) + step
-    bias = _solved(basis, NormalEquations(corrected, right, equations.target_norm2), weights)
-    bias -= weights
+    unbiased = NormalEquations(corrected, right, equations.target_norm2)
+    bias = np.asarray(_solved(basis, unbiased, weights) - weights)
 
     scatter, excess = np.zeros_like(weights), np.zeros(3)
-    solved = solution.solved
-    gradient = np.einsum("cij,jc->ic", solved.M, weights) - solved.b.T
+    # How firmly lights are off, had there been no bias.
+    gradient = np.einsum("cij,jc->ic", corrected, weights + bias) - right.T
+    # A render of the mix shows all of an earlier error, of which a step by the noisy M leaves
+    # a part; the unbiased answer, on which the interval hangs, has the scatter of its own M.
+    M_of_scatter = solution.solved.M if solution.refinement is None else corrected
     for unknowns in unknown_groups(basis, equations):
         to = _columns(unknowns, len(weights))
-        M = to.T @ _block_diagonal(solved.M) @ to
+        M = to.T @ _block_diagonal(M_of_scatter) @ to
         C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
         flat = np.array([weights[i, cs[0]] for i, cs in unknowns])
         errors, spread = _propagated(M, C, flat, to.T @ gradient.T.ravel())
@@ -229,12 +232,13 @@ def residual_and_noise(
     it holds the current look.
     """
     residual = solution.image.astype(np.float64) - basis.mix(weights)
+    noise: Doubles
     if (r := solution.refinement) is not None:
-        noise = r.noise + mix(basis.half_differences, weights - r.before)
+        noise = np.asarray(r.noise + mix(basis.half_differences, weights - r.before), np.float64)
     else:
         noise = mix(basis.half_differences, weights).astype(np.float64)
         present = mix(basis.half_differences, basis.present_weights)
-        noise = noise - solution.current_share[..., None] * present
+        noise -= solution.current_share[..., None] * present
     return residual.reshape(-1, 3), noise.reshape(-1, 3)
 
 
