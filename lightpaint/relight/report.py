@@ -66,7 +66,7 @@ def report_page(
         wipe=wipe(looks),
         exposure=_exposure(stops, predicted.image),
         maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
-        missed=missed_section(basis, solution, diagnosis, current, stops=stops),
+        missed=missed_section(solution, diagnosis, current, stops=stops),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
         fit=fit_table(solution),

@@ -57,9 +57,9 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
         "<p>The table shows the brightness of each light, and between which values many samples "
         "would find it in 95 of 100 cases. Together these errors miss about "
         f"{spoken_percent(excess)} of the painted light (RMS).{others}</p>{_steps(solution)}</div>"
-        "<table><thead><tr><th scope=\"col\">light</th><th scope=\"col\">solved</th>"
-        "<th scope=\"col\">95 % between</th><th scope=\"col\">of it</th>"
-        f"<th scope=\"col\">of the picture</th></tr></thead><tbody>{''.join(rows)}</tbody></table>"
+        '<table><thead><tr><th scope="col">light</th><th scope="col">solved</th>'
+        '<th scope="col">95 % between</th><th scope="col">of it</th>'
+        f'<th scope="col">of the picture</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
         "</div></section>"
     )
 
@@ -82,7 +82,7 @@ def _steps(solution: Solution) -> str:
 
 
 def missed_section(
-    basis: Basis, solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, stops: float
+    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, stops: float
 ) -> str:
     """Why it does not look like the painting: sentences, shares, maps and bounds."""
     if diagnosis is None:

@@ -23,6 +23,9 @@ SIDES = 1.96
 #: the estimate of it is itself noise, and what is left of M would soon be indefinite.
 LARGEST_NOISE = 0.5
 
+#: Steps in which it is decided how much of the noise to take out of M.
+SHARES = 8
+
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 SINGULAR = 1e-12
 
@@ -125,21 +128,48 @@ def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles
     return weights, (1 - solution.noise_removed) * lack
 
 
-def correct_noise(basis: Basis, solution: Solution, *, share: float = 0.5) -> Solution:
+def correct_noise(basis: Basis, solution: Solution, *, share: float | None = None) -> Solution:
     """The solution of the equations without that share of the noise power in M and b.
 
+    share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
     What was solved before, `solution`, is where it starts. docs/method.md has what it is worth.
     """
     weights = solution.lighting.weights_for(basis)
     noise = noise_sums(basis, solution, weights)
     e = solution.equations
-    M = (1 - share) * e.M + share * without_noise(e, noise.power)
+    least = without_noise(e, noise.power)
+    if share is None:
+        share = _best_share(basis, solution, noise, least)
     problem = replace(
         solution,
-        solved=NormalEquations(M, e.b - share * noise.drawn, e.target_norm2),
+        solved=NormalEquations(
+            (1 - share) * e.M + share * least, e.b - share * noise.drawn, e.target_norm2
+        ),
         noise_removed=share,
     )
     return solution_of(basis, problem, start=weights)
+
+
+def _best_share(basis: Basis, solution: Solution, noise: Noise, least: Doubles) -> float:
+    """The share s that makes the expected excess of the objective least, in steps of SHARES.
+
+    What is left of the bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which
+    grows as M_s = M − s N becomes smaller. least: M without all noise.
+    """
+    weights = solution.lighting.weights_for(basis)
+    M = solution.equations.M
+    right = NormalEquations(least, solution.equations.b - noise.drawn, noise.objective_noise)
+    bias = _solved(basis, right, weights) - weights
+    shares = np.linspace(0, 1, SHARES + 1)
+    cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, M, bias)
+    for c in range(3):
+        on = np.flatnonzero((weights[:, c] > 0) & ~basis.is_fixed)
+        here = np.ix_(on, on)
+        C = noise.gradient[c, :, c][here]
+        for k, s in enumerate(shares):
+            inverse = pseudo_inverse((1 - s) * M[c][here] + s * least[c][here])
+            cost[k] += np.einsum("ij,ji->", M[c][here], inverse @ C @ inverse)
+    return float(shares[np.argmin(cost)])
 
 
 def with_error_bars(solution: Solution, uncertainty: Uncertainty) -> Solution:
@@ -213,13 +243,13 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
                 product = rows[c] @ rows[d].T
                 gradient[c, :, d] += product
                 gradient[d, :, c] += product.T
-    D = importance[:, None]
+    weight = importance[:, None]
     return Noise(
         power,
         drawn,
         gradient,
-        objective_error=2 * np.sqrt(np.square(D * residual * mixed).sum(axis=0)),
-        objective_noise=(D * np.square(mixed)).sum(axis=0),
+        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
+        objective_noise=(weight * np.square(mixed)).sum(axis=0),
     )
 
 
@@ -238,7 +268,7 @@ def residual_and_noise(
     else:
         noise = mix(basis.half_differences, weights).astype(np.float64)
         present = mix(basis.half_differences, basis.present_weights)
-        noise -= solution.current_share[..., None] * present
+        noise = np.asarray(noise - solution.current_share[..., None] * present, np.float64)
     return residual.reshape(-1, 3), noise.reshape(-1, 3)
 
 

@@ -27,7 +27,10 @@ def target(scene: lp.Scene) -> lp.Target:
 
 
 def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.Target):
-    """In 85 to 99 % of all lights, channels and seeds; and what improves the answer, does."""
+    """In 85 % of all lights, channels and seeds or more; what improves the answer, does.
+
+    Of 40 seeds it is 92 % (docs/method.md); with twelve, one bad seed is 8 %.
+    """
     many = lp.render_basis(scene, spp=4096, seed=999)
     best = solve(many, target)
     truth = best.lighting.weights_for(many)
@@ -45,7 +48,7 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
             w = solution.lighting.weights_for(basis)
             objective.setdefault(name, []).append(float(best.equations.objective(w).sum()))
     for name, shares in held.items():
-        assert 0.85 <= np.mean(shares) <= 0.99, name
+        assert np.mean(shares) >= 0.85, name
     least = sum(best.quality.objective)
     excess = {name: np.mean(values) - least for name, values in objective.items()}
     assert excess["refined"] < 0.9 * excess["plain"]
