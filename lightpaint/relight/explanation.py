@@ -48,15 +48,11 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     if not effect.any():
         return "More samples would change no light: the basis has no noise."
     k = int(np.argmax(effect))
-    name = solution.lighting.lights[k].name
-    if errors[k] > 1:
-        change = f"change light {name} by as much as all of it"
-    else:
-        change = f"change light {name} by ± {spoken_percent(float(errors[k]))}"
+    light = f"light {solution.lighting.lights[k].name}, {spoken_percent(shares[k])} of the picture"
+    change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
     return (
-        f"More samples would {change} (95 %), the picture by "
-        f"± {spoken_percent(float(effect[k]))}; --spp {halving_spp(basis, uncertainty, k)} "
-        "halves that."
+        f"More samples would change {light}, by {change} (95 %); "
+        f"--spp {halving_spp(basis, uncertainty, k)} halves that."
     )
 
 

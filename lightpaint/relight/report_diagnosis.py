@@ -55,7 +55,8 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
         '<section><h2>How sure</h2><div class="explained">'
         f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
         "<p>The table shows the brightness of each light, and between which values many samples "
-        "would find it in 95 of 100 cases. Together these errors miss about "
+        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
+        "yet make up for each other in the picture: together these errors miss about "
         f"{spoken_percent(excess)} of the painted light (RMS).{others}</p>{_steps(solution)}</div>"
         '<table><thead><tr><th scope="col">light</th><th scope="col">solved</th>'
         '<th scope="col">95 % between</th><th scope="col">of it</th>'
