@@ -99,6 +99,21 @@ def _parser() -> argparse.ArgumentParser:
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
     _add_unit(solve)
+    solve.add_argument(
+        "--correct-noise",
+        dest="noise_correction",
+        action="store_true",
+        help="take half of the noise's power, as the halves of the samples show it, out of the "
+        "equations: closer to the answer of many samples at low --spp, and costs next to nothing",
+    )
+    solve.add_argument(
+        "--refine",
+        type=_at_least(0),
+        default=0,
+        metavar="K",
+        help="times to render the scene as solved, with as many samples as the basis, and improve "
+        "the answer by what that shows (default: %(default)s)",
+    )
     _add_lights(solve)
     _add_constraints(solve)
     _add_budget(solve)

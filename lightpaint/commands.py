@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.markup import escape
 
 from lightpaint import console
@@ -25,6 +26,12 @@ from lightpaint.pipeline import (
     relight_look,
     render_template,
     verify_result,
+)
+from lightpaint.relight.explanation import (
+    how_sure,
+    relative_errors,
+    spoken_error,
+    what_is_missed,
 )
 from lightpaint.relight.relight import check_relightable, scene_of
 from lightpaint.relight.verdict import agreement, energy_shares, verdict
@@ -204,6 +211,8 @@ def solve(options: Namespace, given: list[str]) -> int:
                 constraints=constraints,
                 unpainted=options.unpainted,
                 cd_per_unit=options.cd_per_unit,
+                noise_correction=options.noise_correction,
+                refine=options.refine,
                 spp=options.spp,
                 time_s=options.time_s,
                 quality=options.quality,
@@ -402,11 +411,12 @@ def _constraints(options: Namespace) -> Constraints:
 def _show(look: Look, folder: Path) -> None:
     shares = energy_shares(look.basis, look.lighting)
     held = any(light.constraint for light in look.lighting.lights)
-    headings = ("light", "plugin", "emission now", "solved R G B", "unit", "share", "colour")
+    headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
     asked = ["asked (* holds it)"] if held else []
     table = console.table(*headings, *amounts, *asked)
-    for light, now, share in zip(look.lighting.lights, look.basis.lights, shares, strict=True):
+    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
+    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else console.numbers(light.emission)
         if light.name in look.solution.quality.unreached and any(light.emission):
             solved += " (kept)"
@@ -416,14 +426,20 @@ def _show(look: Look, folder: Path) -> None:
             light.plugin,
             "" if light.is_fixed else console.numbers(now.emission),
             "kept" if light.is_fixed else solved,
+            spoken_error(light, float(errors[k])),
             "" if light.is_fixed else light.unit,
-            f"{100 * share:.1f} %",
+            f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else seen.color,
             *seen.amounts[: len(amounts)],
             *([escape(light.constraint) + "*" * light.is_active] if held else []),
         )
     console.print_table(table)
     console.write(verdict(look.solution, look.predicted, look.verification))
+    if look.diagnosis is not None:
+        for sentence in what_is_missed(look.diagnosis):
+            console.write(sentence)
+    if look.uncertainty is not None:
+        console.write(how_sure(look.basis, look.solution, look.uncertainty))
     console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
     if quality.curve:
@@ -467,7 +483,7 @@ def _check_nothing_to_render(options: Namespace) -> None:
     asked |= {"--lights": options.lights, "--group": options.groups}
     asked |= {"--spp": options.spp, "--time": options.time_s}
     asked |= {"--quality": options.quality}
-    asked |= {"--resolution": options.resolution}
+    asked |= {"--resolution": options.resolution, "--refine": options.refine}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"

@@ -16,6 +16,7 @@ from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relight.comparison import write_comparison
+from lightpaint.relight.refine import refine_by_rendering
 from lightpaint.relight.relight import check_relightable, relight
 from lightpaint.relight.report import report_page
 from lightpaint.relight.verify import Verification, verify
@@ -24,9 +25,11 @@ from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.constraints_file import read_constraints
+from lightpaint.solve.diagnosis import Diagnosis, diagnose
 from lightpaint.solve.lighting import Lighting, combine, write_lighting
 from lightpaint.solve.reduction import reduce_to
 from lightpaint.solve.solve import Solution, solve
+from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.target.target import Target, read_target
 from lightpaint.target.template import write_template
 
@@ -58,6 +61,8 @@ class Look:
     """One painting and its answer.
 
     relit and verification are None where there was only a saved basis and no scene.
+    uncertainty: how sure the lights are; diagnosis: why the painting is not met. None under
+    constraints, of which they know nothing yet.
     """
 
     target: Target
@@ -66,6 +71,8 @@ class Look:
     predicted: Estimate
     relit: Scene | None
     verification: Verification | None
+    uncertainty: Uncertainty | None
+    diagnosis: Diagnosis | None
 
     @property
     def lighting(self) -> Lighting:
@@ -82,6 +89,8 @@ def paint_with_light(
     mask: str | Path | None = None,
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
+    noise_correction: bool = False,
+    refine: int = 0,
     spp: int | None = None,
     time_s: float | None = None,
     quality: Quality | None = None,
@@ -105,6 +114,9 @@ def paint_with_light(
     basis: one made before of the same scene; taken from the cache or rendered if not given.
     constraints: what is asked of the lights; it goes before what the scene's lights file asks.
     unpainted: weight of unpainted pixels against the current look.
+    noise_correction: whether half of the noise's power is taken out of the equations.
+    refine: how often to render the scene as solved, with as many samples as the basis, and
+    improve the answer by what that shows; needs a scene.
     sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
     resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
     verification has the whole film.
@@ -125,6 +137,8 @@ def paint_with_light(
     asked = spp
     if scene is not None and basis is None:
         scene, spp = with_quality(scene, quality, spp=spp, time_s=time_s, resolution=resolution)
+    if refine and scene is None:
+        raise LightpaintError("refining renders the scene: give it, and not only its basis")
     if isinstance(basis, str | Path):
         basis = read_basis(Path(basis))
     if scene is not None and basis is not None:
@@ -149,6 +163,17 @@ def paint_with_light(
             scene, spp=spp, time_s=time_s, seed=seed, use_cache=use_cache, progress=progress
         )
     solution = solve(basis, target, constraints=constraints, unpainted=unpainted)
+    if noise_correction:
+        solution = correct_noise(basis, solution)
+    if scene is not None:
+        solution = refine_by_rendering(
+            scene, basis, solution, rounds=refine, seed=seed, progress=progress
+        )
+    uncertainty, diagnosis = None, None
+    if not constraints:
+        uncertainty = error_bars(basis, solution)
+        solution = with_error_bars(solution, uncertainty)
+        diagnosis = diagnose(basis, target, solution)
     solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=cd_per_unit))
     predicted = combine(basis, solution.lighting)
     as_basis = spp or basis.origin.spp if asked is None and (time_s or quality) else None
@@ -165,7 +190,7 @@ def paint_with_light(
         if relit is not None:
             verification = verify(predicted, relit, spp=checked_spp, seed=seed, progress=progress)
             write_estimate(folder / "verified.exr", verification.verified, {})
-        look = Look(target, basis, solution, predicted, relit, verification)
+        look = Look(target, basis, solution, predicted, relit, verification, uncertainty, diagnosis)
         show_look(look, folder, command=command)
     return look
 
@@ -262,6 +287,8 @@ def show_look(look: Look, folder: Path, *, command: str) -> None:
         predicted=look.predicted,
         verification=look.verification,
         command=command,
+        uncertainty=look.uncertainty,
+        diagnosis=look.diagnosis,
     )
     write_text(folder / "report.html", page)
 

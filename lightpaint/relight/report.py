@@ -14,6 +14,7 @@ from lightpaint.images.display import encode_display
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
 from lightpaint.relight.pictures import exposure_of, spoken_stops, target_picture
+from lightpaint.relight.report_diagnosis import missed_section, sure_section
 from lightpaint.relight.report_pictures import Picture, maps, wipe
 from lightpaint.relight.report_tables import (
     amounts_heading,
@@ -25,8 +26,10 @@ from lightpaint.relight.report_tables import (
 )
 from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification
+from lightpaint.solve.diagnosis import Diagnosis
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.solve import Solution
+from lightpaint.solve.uncertainty import Uncertainty
 from lightpaint.target.target import Target
 
 
@@ -38,11 +41,14 @@ def report_page(
     predicted: Estimate,
     verification: Verification | None,
     command: str,
+    uncertainty: Uncertainty | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> str:
     """The page as HTML text.
 
     verification: None where nothing was rendered to check the prediction.
     command: the shell command that made the result.
+    uncertainty, diagnosis: without them the page has no section on what they tell.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -61,7 +67,9 @@ def report_page(
         wipe=wipe(looks),
         exposure=_exposure(stops, predicted.image),
         maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
-        lights=lights_table(basis, solution),
+        missed=missed_section(solution, diagnosis, current, stops=stops),
+        sure=sure_section(basis, solution, uncertainty),
+        lights=lights_table(basis, solution, uncertainty),
         amounts=amounts_heading(solution),
         fit=fit_table(solution),
         verification=verification_table(verification),

@@ -23,6 +23,9 @@ from lightpaint.solve.solve import Solution
 #: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
 UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
 
+#: Colours of a signed quantity from its lower to its upper end, for the legend.
+SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
+
 #: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
 LARGEST_PNG = 150_000
 #: Width of the lights' pictures in the table, in pixels.
@@ -115,16 +118,15 @@ def maps(
 
     predicted, current: (h, w, 3) linear.
     """
-    signed = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
     limit = residual_limit(solution, predicted, stops=stops)
     picture = residual_picture(solution, predicted, current, stops=stops, limit=limit)
     figures = [
-        _map(
+        figure(
             Picture("Residual", "False-colour map of the residual.", picture),
             "Luminance, predicted − target. Hatched pixels do not count.",
-            _scale(signed, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+            scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
         ),
-        _map(
+        figure(
             Picture(
                 "Importance",
                 "Map of how much each pixel counts.",
@@ -132,34 +134,35 @@ def maps(
             ),
             f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
             f"{solution.importance.max():.3g} at most.",
-            _scale([UNCOUNTED, COUNTED], "hatched: does not count", "yellow: counts fully"),
+            scale([UNCOUNTED, COUNTED], "hatched: does not count", "yellow: counts fully"),
         ),
     ]
     if verification is not None:
         z = verification.z.mean(axis=-1, dtype=np.float64)
         figures.append(
-            _map(
+            figure(
                 Picture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
                 "Predicted − verified in standard errors, mean of the channels. Noise alone "
                 "looks like even grain; a shape in it is an error.",
-                _scale(
-                    signed, f"−{LIMIT:g} predicted darker", "0", f"predicted brighter +{LIMIT:g}"
+                scale(
+                    SIGNED, f"−{LIMIT:g} predicted darker", "0", f"predicted brighter +{LIMIT:g}"
                 ),
             )
         )
     return "".join(figures)
 
 
-def _map(picture: Picture, caption: str, scale: str) -> str:
+def figure(picture: Picture, caption: str, legend: str) -> str:
+    """A map with its legend, as `scale` makes it, and what it shows."""
     height, width = picture.pixels.shape[:2]
     return (
         f'<figure><img width="{width}" height="{height}" alt="{picture.alt} {caption}" '
-        f'src="{data_uri(to_8_bit(picture.pixels))}">{scale}'
+        f'src="{data_uri(to_8_bit(picture.pixels))}">{legend}'
         f"<figcaption><strong>{picture.name}.</strong> {caption}</figcaption></figure>"
     )
 
 
-def _scale(colours: list[str], *ends: str) -> str:
+def scale(colours: list[str], *ends: str) -> str:
     """The legend of a map: its colours from left to right, and what they are in words."""
     words = "".join(f"<span>{end}</span>" for end in ends)
     gradient = f"linear-gradient(to right, {', '.join(colours)})"

@@ -14,23 +14,29 @@ from lightpaint.basis.basis import RGB, Basis, BasisLight
 from lightpaint.images.color import luminance, rgb_to_hex
 from lightpaint.images.display import to_8_bit
 from lightpaint.images.photometry import Photometry
+from lightpaint.relight.explanation import relative_errors, spoken_error
 from lightpaint.relight.report_pictures import data_uri, thumbnail
 from lightpaint.relight.verdict import energy_shares, relative_residual
 from lightpaint.relight.verify import LIMIT, Verification
 from lightpaint.solve.lighting import LightSetting
 from lightpaint.solve.solve import Solution
+from lightpaint.solve.uncertainty import Uncertainty
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
 
-def lights_table(basis: Basis, solution: Solution) -> str:
+def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:
     """One row per light, in document order."""
+    errors = None if uncertainty is None else relative_errors(uncertainty)
     shares = energy_shares(basis, solution.lighting)
     settings = {light.name: light for light in solution.lighting.lights}
     rows = []
-    for light, image, share in zip(basis.lights, basis.images, shares, strict=True):
+    for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
+        share = shares[k]
         picture, stops = thumbnail(image, basis.emitters_seen)
         name, setting = escape(light.name), settings[light.name]
+        error = "" if errors is None else spoken_error(setting, float(errors[k]))
+        error = f"<small>{error}</small>" if error else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
             f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
@@ -39,7 +45,7 @@ def lights_table(basis: Basis, solution: Solution) -> str:
             f'<th scope="row">{name}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
             f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
-            f"<td>{change(light, setting, solution.quality.unreached)}{_asked(setting)}</td>"
+            f"<td>{change(light, setting, solution.quality.unreached)}{error}{_asked(setting)}</td>"
             f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
             f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
         )

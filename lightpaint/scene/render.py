@@ -28,6 +28,7 @@ class Stream(IntEnum):
     TEMPLATE = 2
     NUMBERS = 3
     SECOND_VERIFICATION = 4
+    REFINEMENT = 5
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:

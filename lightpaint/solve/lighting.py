@@ -31,6 +31,7 @@ class LightSetting:
     unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
     constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
     whether that held it back from what the painting asks for.
+    standard_error: of the emission, from the noise it was solved with, where that is known.
     """
 
     name: str
@@ -44,11 +45,15 @@ class LightSetting:
     unit_flux: RGB | None = None
     constraint: str = ""
     is_active: bool = False
+    standard_error: RGB | None = None
 
     def __post_init__(self) -> None:
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
-        for what, rgb in (("emission", self.emission), ("weight", self.weight)):
+        given = {"emission": self.emission, "weight": self.weight}
+        if self.standard_error is not None and not self.is_fixed:
+            given["standard error"] = self.standard_error
+        for what, rgb in given.items():
             if not all(math.isfinite(v) and v >= 0 for v in rgb):
                 raise LightingError(
                     f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
@@ -142,7 +147,14 @@ class Lighting:
         if name not in self.emission:
             raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
         lights = tuple(
-            replace(light, emission=emission, weight=emission, constraint="", is_active=False)
+            replace(
+                light,
+                emission=emission,
+                weight=emission,
+                constraint="",
+                is_active=False,
+                standard_error=None,
+            )
             if light.name == name
             else light
             for light in self.lights
@@ -292,6 +304,8 @@ def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -
 def _ties(light: LightSetting) -> dict[str, Any]:
     """What the file says of a light only where it does not go without saying."""
     ties: dict[str, Any] = {}
+    if light.standard_error is not None:
+        ties["standard_error"] = list(light.standard_error)
     if light.is_fixed:
         ties["is_fixed"] = True
     if light.members != (light.name,):
@@ -325,6 +339,7 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
         _read_rgb(data["unit_flux"]) if "unit_flux" in data else None,
         _read_text(data, "constraint"),
         bool(data.get("is_active", False)),
+        _read_rgb(data["standard_error"]) if "standard_error" in data else None,
     )
 
 

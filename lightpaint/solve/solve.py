@@ -16,16 +16,44 @@ from lightpaint.target.target import Target
 
 
 @dataclass(frozen=True)
+class Refinement:
+    """What is known of the noise in the last step to an answer (see refine.py).
+
+    before: (n, 3), the weights that it went from.
+    noise: (h, w, 3), half difference of the prediction there, as far as it decided the step.
+    lacking: (3, n), what is still to be expected to lack in the gradient.
+    share: of the step that the render of the mix decided, 0 to 1; the basis did the rest.
+    """
+
+    before: Doubles
+    noise: Floats
+    lacking: Doubles
+    share: float
+
+
+@dataclass(frozen=True)
 class Solution:
     """The lighting that comes closest to a target, and the problem it solves.
 
     image: (h, w, 3), what was solved for; importance: (h, w), its weights. They differ from
     the target's where unpainted pixels count or emitters are seen.
+    equations: of the basis as it is; solved: those that the weights solve, which differ where
+    noise was taken out of them.
+    current_share: (h, w), how much of `image` is the current look, as the basis has it.
+    constraints: what was asked of the lights beside being not negative.
+    noise_removed: the part of the noise in `equations` that is not in `solved`.
+    refinement: the last step by which the answer was improved, if it was.
     """
 
     lighting: Lighting
     image: Floats
     importance: Floats
+    equations: NormalEquations
+    solved: NormalEquations
+    current_share: Floats
+    constraints: Constraints | None = None
+    noise_removed: float = 0.0
+    refinement: Refinement | None = None
 
     @property
     def quality(self) -> Quality:
@@ -56,14 +84,31 @@ def solve(
     """
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
+    counted = np.where(importance > 0, importance, 1)
     equations = NormalEquations.of(basis, image, importance)
-    weights = basis.present_weights if start is None else start.weights_for(basis)
+    problem = Solution(
+        lighting=Lighting.of_weights(basis, basis.present_weights, target=target.name),
+        image=image,
+        importance=importance,
+        equations=equations,
+        solved=equations,
+        current_share=np.where(importance > 0, 1 - target.importance / counted, 0),
+        constraints=constraints,
+    )
+    return solution_of(
+        basis, problem, start=basis.present_weights if start is None else start.weights_for(basis)
+    )
+
+
+def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
+    """`problem` with the weights that solve `problem.solved`. start: (n, 3), where to begin."""
+    equations = problem.equations
     asked = None
     tried: list[tuple[int, Doubles]] = []
-    if constraints:
-        result, asked, tried = _solve_asked(equations, basis, constraints, weights)
+    if problem.constraints:
+        result, asked, tried = _solve_asked(problem.solved, basis, problem.constraints, start)
     else:
-        result = _solve_free(equations, basis, weights)
+        result = _solve_free(problem.solved, basis, start)
     weights = result.weights
 
     objective = equations.objective(weights)
@@ -80,8 +125,9 @@ def solve(
             (count, float(np.sqrt(equations.objective(w).sum() / norm.sum()))) for count, w in tried
         ),
     )
-    lighting = Lighting.of_weights(basis, weights, asked=asked, target=target.name, quality=quality)
-    return Solution(lighting, image, importance)
+    target = problem.lighting.target
+    lighting = Lighting.of_weights(basis, weights, asked=asked, target=target, quality=quality)
+    return replace(problem, lighting=lighting)
 
 
 def _solve_free(equations: NormalEquations, basis: Basis, start: Doubles) -> SolverResult:

@@ -1,0 +1,176 @@
+"""The parts of the report on how sure the answer is and what is missed. Each returns HTML."""
+
+from html import escape
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.images.color import luminance
+from lightpaint.images.exr import Floats
+from lightpaint.relight.explanation import (
+    how_sure,
+    relative_errors,
+    spoken_bound,
+    spoken_percent,
+    what_is_missed,
+)
+from lightpaint.relight.pictures import coverage, diverging, round_up, unpainted_look
+from lightpaint.relight.report_pictures import SIGNED, Picture, figure, scale
+from lightpaint.relight.verdict import energy_shares
+from lightpaint.solve.diagnosis import Diagnosis
+from lightpaint.solve.solve import Solution
+from lightpaint.solve.uncertainty import Uncertainty
+
+#: Rows of a table, beyond which only those that matter most are shown.
+ROWS = 8
+
+#: Bounds with a smaller share of the miss are not worth a row.
+SMALLEST_GAIN = 0.002
+
+
+def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> str:
+    """How far noise may have moved the answer: a sentence, and the lights it matters for."""
+    if uncertainty is None:
+        return ""
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
+    low, high = (luminance(end) for end in uncertainty.interval)
+    effect = np.where(np.isfinite(errors), errors, 0) * shares
+    # Those that are off and may be on come behind, by how bright they may be.
+    order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
+    rows = [
+        f'<tr><th scope="row">{escape(basis.names[k])}</th>'
+        f"<td>{float(luminance(uncertainty.weights[k])):.3g}</td>"
+        f"<td>{low[k]:.3g} … {high[k]:.3g}</td>"
+        f"<td>{f'± {spoken_percent(float(errors[k]))}' if np.isfinite(errors[k]) else '–'}</td>"
+        f"<td>{f'± {spoken_percent(float(effect[k]))}' if effect[k] else '–'}</td></tr>"
+        for k in order[:ROWS]
+        if errors[k] > 0
+    ]
+    more = int((errors > 0).sum()) - len(rows)
+    others = f" {more} lights that matter less are left out." if more > 0 else ""
+    norm2 = max(float(solution.equations.target_norm2.sum()), np.finfo(np.float64).tiny)
+    excess = float(np.sqrt(uncertainty.excess.sum() / norm2))
+    return (
+        '<section><h2>How sure</h2><div class="explained">'
+        f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
+        "<p>The table shows the brightness of each light, and between which values many samples "
+        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
+        "yet make up for each other in the picture: together these errors miss about "
+        f"{spoken_percent(excess)} of the painted light (RMS).{others}</p>{_steps(solution)}</div>"
+        '<table><thead><tr><th scope="col">light</th><th scope="col">solved</th>'
+        '<th scope="col">95 % between</th><th scope="col">of it</th>'
+        f'<th scope="col">of the picture</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+        "</div></section>"
+    )
+
+
+def _steps(solution: Solution) -> str:
+    """What was done against noise, besides sampling."""
+    steps = []
+    if solution.noise_removed:
+        steps.append(
+            f"{spoken_percent(solution.noise_removed)} of the noise's power in the "
+            "equations was taken out of them"
+        )
+    if solution.refinement is not None:
+        steps.append(
+            "the answer was refined by a render of the mix, which decided "
+            f"{spoken_percent(solution.refinement.share)} of the last step"
+        )
+    text = "; ".join(steps)
+    return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
+
+
+def missed_section(
+    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, stops: float
+) -> str:
+    """Why it does not look like the painting: sentences, shares, maps and bounds."""
+    if diagnosis is None:
+        return ""
+    sentences = "".join(f"<p>{escape(text)}</p>" for text in what_is_missed(diagnosis))
+    return (
+        f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
+        f"{_shares(diagnosis)}</div>"
+        f'<div class="maps">{_maps(solution, diagnosis, current, stops=stops)}</div>'
+        f"{_bounds(diagnosis)}</section>"
+    )
+
+
+def _shares(diagnosis: Diagnosis) -> str:
+    d = diagnosis
+    parts = [
+        ("out of reach of any mix", d.unreachable),
+        ("forbidden: needs light below zero", d.forbidden),
+        ("noise of the basis", d.noise),
+    ]
+    rows = [
+        f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(d.share(part))}'
+        '</span><div class="bar" aria-hidden="true">'
+        f'<i style="width: {100 * d.share(part):.2f}%"></i></div></td></tr>'
+        for what, part in parts
+    ]
+    if d.ignored > 0:
+        times = d.ignored / d.total if d.total > 0 else np.inf
+        rows.append(
+            '<tr><th scope="row">besides, where it does not count</th>'
+            f"<td>{f'{times:.2g} times as much' if np.isfinite(times) else 'all'}</td></tr>"
+        )
+    return f"<table><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: float) -> str:
+    parts = [
+        (
+            "Out of reach",
+            diagnosis.unreachable_map,
+            "What no mix of the lights makes, negative ones included.",
+        ),
+        ("Forbidden", diagnosis.forbidden_map, "What only light below zero would mend."),
+    ]
+    counted = solution.importance > 0
+    sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]
+    limit = round_up(max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-stops))
+    share = coverage(solution.importance)[..., None]
+    grey = unpainted_look(current, stops=stops)
+    figures = []
+    for name, image, caption in parts:
+        if name == "Forbidden" and diagnosis.share(diagnosis.forbidden) < SMALLEST_GAIN:
+            continue  # an empty picture
+        # As in the residual's map: predicted − painted, so that bright is too bright.
+        colours = diverging(-luminance(image) / limit)
+        figures.append(
+            figure(
+                Picture(name, f"False-colour map: {name}.", share * colours + (1 - share) * grey),
+                caption,
+                scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+            )
+        )
+    if diagnosis.ignored > 0:
+        colours = diverging(-diagnosis.ignored_map / limit)
+        figures.append(
+            figure(
+                Picture("Not counted", "False-colour map of what does not count.", colours),
+                "Painted and missed where the importance is small.",
+                scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+            )
+        )
+    return "".join(figures)
+
+
+def _bounds(diagnosis: Diagnosis) -> str:
+    rows = [
+        f'<tr><th scope="row">{escape(bound.light)}</th>'
+        f"<td>{'kept as it is' if bound.is_kept else spoken_bound(bound.multiplier)}</td>"
+        f"<td>{spoken_percent(diagnosis.share(bound.gain))} less missed</td></tr>"
+        for bound in diagnosis.bounds
+        if diagnosis.share(bound.gain) >= SMALLEST_GAIN
+    ]
+    if not rows:
+        return ""
+    return (
+        '<div class="explained"><div><h3>What holds the lights back</h3><p>What would be gained '
+        "if one light might go below zero, and so take light away, or were not kept: a hint at "
+        "which other lights spill where they should not.</p></div>"
+        f"<table><tbody>{''.join(rows)}</tbody></table></div>"
+    )

@@ -1,0 +1,245 @@
+"""Why does it not look like the painting? The residual, split by what stands in the way.
+
+With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to every light, so
+
+    ‖Ψ − ΣwΦ‖² = ‖Ψ − ΣuΦ‖² + ‖Σ(u − w)Φ‖²
+
+exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
+noise of the prediction adds to the first is taken out of it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import Basis
+from lightpaint.images.color import luminance
+from lightpaint.images.exr import Floats
+from lightpaint.solve.lighting import combine
+from lightpaint.solve.normal_equations import Doubles, NormalEquations
+from lightpaint.solve.solve import Solution
+from lightpaint.solve.solver import solve_normal_equations
+from lightpaint.solve.uncertainty import pseudo_inverse, unknown_groups
+from lightpaint.target.target import Target
+
+#: Bounds for which the problem is solved again: those that seem to matter most.
+RELEASED = 4
+
+#: Blocks along each side of the image over which it is asked where light is missing, and
+#: regions that are spoken of: left, middle, right.
+BLOCKS, REGIONS = 12, 3
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What holds the answer back: a light that may not go below zero, or that is kept.
+
+    gain: by how much the objective would fall without this one bound, all channels together.
+    multiplier: (3,), how fast it would fall at first, per unit of weight; 0 where the light
+    is on. For a light that is off its gain is what taking light away with it would bring.
+    """
+
+    light: str
+    is_kept: bool
+    gain: float
+    multiplier: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where most is out of reach of the lights.
+
+    region: row and column, 0 to 2, of the ninth of the image with most of it, and share, how
+    much of it that is. box: top, left, bottom, right, in pixels, of its worst block.
+    painted, reached: mean RGB there, of the painting and of the closest mix of any sign.
+    """
+
+    region: tuple[int, int]
+    share: float
+    box: tuple[int, int, int, int]
+    painted: tuple[float, float, float]
+    reached: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and where it comes from.
+
+    unreachable: what no weights of any sign can reach. forbidden: what they can and w >= 0
+    cannot. noise: what the basis' own noise adds. The three sum to `total`.
+    ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
+    norm2: ‖Ψ‖², to hold them against.
+    unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
+    reason. Their sum is Ψ − ΣwΦ. ignored_map: (h, w), of luminance, weighted.
+    bounds: by their gain, the largest first. place: None where nothing is out of reach.
+    """
+
+    total: float
+    unreachable: float
+    forbidden: float
+    noise: float
+    ignored: float
+    norm2: float
+    unreachable_map: Floats
+    forbidden_map: Floats
+    ignored_map: Floats
+    bounds: tuple[Bound, ...]
+    place: Place | None
+
+    def share(self, part: float) -> float:
+        """`part` of what is missed, 0 to 1."""
+        return part / self.total if self.total > 0 else 0.0
+
+    @property
+    def missed(self) -> float:
+        """What is missed relative to the painting, root mean square."""
+        return float(np.sqrt(self.total / self.norm2)) if self.norm2 > 0 else 0.0
+
+
+def diagnose(basis: Basis, target: Target, solution: Solution) -> Diagnosis:
+    """Split what `solution` misses of `target`. Raises SizeError if they differ in size."""
+    target = target.fitted_to(basis.size, resize=False)
+    weights = solution.lighting.weights_for(basis)
+    predicted = combine(basis, solution.lighting)
+    free = of_any_sign(basis, solution)
+    D = solution.importance[..., None].astype(np.float64)
+    missed = solution.image.astype(np.float64) - predicted.image
+    # The difference of two mixes, so that both maps add up to what is missed, to the bit.
+    forbidden = basis.mix(free - weights).astype(np.float64)
+    unreachable = missed - forbidden
+    total = float((D * np.square(missed)).sum())
+    out_of_reach = min(float((D * np.square(unreachable)).sum()), total)
+    noise = float((D * np.square(predicted.half_difference, dtype=np.float64)).sum())
+    noise = min(noise, out_of_reach)
+    uncounted = np.maximum(1 - solution.importance.astype(np.float64), 0)
+    # Where nothing was painted no colour is missed either.
+    uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
+    outside = target.image.astype(np.float64) - predicted.image
+    return Diagnosis(
+        total=total,
+        unreachable=out_of_reach - noise,
+        forbidden=total - out_of_reach,
+        noise=noise,
+        ignored=float((uncounted[..., None] * np.square(outside)).sum()),
+        norm2=float((D * np.square(solution.image, dtype=np.float64)).sum()),
+        unreachable_map=unreachable,
+        forbidden_map=forbidden,
+        ignored_map=uncounted * luminance(outside),
+        bounds=_bounds(basis, solution, weights),
+        place=_place(solution, unreachable) if out_of_reach > noise else None,
+    )
+
+
+def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
+    """The weights (n, 3) that come closest if they may be negative; kept lights stay at 1."""
+    equations = solution.equations
+    weights = solution.lighting.weights_for(basis)
+    for unknowns in unknown_groups(basis, equations):
+        # Directions of the weights, (3, n), one for each unknown, flat.
+        to = np.zeros((3, len(weights), len(unknowns)))
+        for k, (i, cs) in enumerate(unknowns):
+            to[cs, i, k] = 1
+        gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
+        M = np.einsum("cik,cij,cjl->kl", to, equations.M, to, optimize=True)
+        step = pseudo_inverse(M) @ np.einsum("cik,ci->k", to, gradient)
+        weights = weights - np.einsum("cik,k->ic", to, step)
+    return weights
+
+
+def _bounds(basis: Basis, solution: Solution, weights: Doubles) -> tuple[Bound, ...]:
+    """The lights that hold the answer back most, each with the problem solved without it."""
+    equations = solution.equations
+    gradient = np.einsum("cij,jc->ic", equations.M, weights) - equations.b.T
+    power = np.einsum("cii->ic", equations.M)
+    # A light that is off wants to be negative where its gradient is positive.
+    wants = np.where(weights > 0, 0, np.maximum(gradient, 0)) * (power > 0)
+    for i, light in enumerate(basis.lights):
+        if light.is_fixed:
+            wants[i] = gradient[i]
+        elif light.is_scalar:
+            wants[i] = max(gradient[i].sum(), 0) / 3 if not weights[i].any() else 0
+    # To first order, and with all others as they are: good enough to choose by.
+    estimate = (np.square(wants) / np.where(power > 0, power, 1)).sum(axis=1)
+    chosen = [int(i) for i in np.argsort(-estimate)[:RELEASED] if estimate[i] > 0]
+    before = float(equations.objective(weights).sum())
+    bounds = []
+    for i in chosen:
+        gain = before - _objective_without(basis, equations, weights, i, wants[i] > 0)
+        is_kept = bool(basis.is_fixed[i])
+        bounds.append(Bound(basis.names[i], is_kept, max(gain, 0.0), _rgb(2 * wants[i])))
+    return tuple(sorted(bounds, key=lambda bound: -bound.gain))
+
+
+def _objective_without(
+    basis: Basis, equations: NormalEquations, weights: Doubles, i: int, is_off: Floats
+) -> float:
+    """The objective of the best lighting without the bound of light i.
+
+    is_off: (3,), channels in which it is at zero. Without its bound it goes below in these,
+    so that it is the same to be bounded by zero from above: Φ_i → −Φ_i.
+    """
+    is_fixed = basis.is_fixed.copy()
+    start = weights.copy()
+    if is_fixed[i]:
+        is_fixed[i] = False
+    else:
+        sign = np.ones((3, len(weights)))
+        sign[is_off, i] = -1
+        equations = replace(
+            equations,
+            M=equations.M * sign[:, :, None] * sign[:, None, :],
+            b=equations.b * sign,
+        )
+    free = np.flatnonzero(~is_fixed)
+    result = solve_normal_equations(
+        equations.holding(is_fixed),
+        start[free],
+        is_scalar=[basis.lights[k].is_scalar for k in free],
+        tolerance=1e-6,
+        max_sweeps=2000,
+    )
+    start[free] = result.weights
+    return float(equations.objective(start).sum())
+
+
+def _place(solution: Solution, unreachable: Floats) -> Place | None:
+    """The region and block of the image with the most energy out of reach."""
+    D = solution.importance[..., None].astype(np.float64)
+    rows, columns = (_edges(length, BLOCKS) for length in solution.importance.shape)
+
+    def block_sums(image: Floats) -> Floats:
+        return np.add.reduceat(np.add.reduceat(image, rows[:-1], 0), columns[:-1], 1)
+
+    # Noise has either sign: the square of a block's mean is nearly without it.
+    counted = block_sums(D)
+    safe = np.where(counted > 0, counted, 1)
+    lacking = block_sums(D * unreachable) / safe
+    energy = (counted * np.square(lacking)).sum(axis=-1)
+    if not energy.any():
+        return None
+    region = np.zeros((REGIONS, REGIONS))
+    place_of = [REGIONS * np.arange(length) // length for length in energy.shape]
+    np.add.at(region, np.ix_(*place_of), energy)
+    worst = np.unravel_index(int(np.argmax(region)), region.shape)
+    inside = (place_of[0] == worst[0])[:, None] & (place_of[1] == worst[1])
+    y, x = np.unravel_index(int(np.argmax(np.where(inside, energy, -1))), energy.shape)
+    painted = (block_sums(D * solution.image) / safe)[y, x]
+    return Place(
+        region=(int(worst[0]), int(worst[1])),
+        share=float(region[worst] / energy.sum()),
+        box=(int(rows[y]), int(columns[x]), int(rows[y + 1]), int(columns[x + 1])),
+        painted=_rgb(painted),
+        reached=_rgb(painted - lacking[y, x]),
+    )
+
+
+def _edges(length: int, parts: int) -> npt.NDArray[np.int_]:
+    """Where `length` pixels are cut into that many nearly equal parts, or single pixels."""
+    parts = min(length, parts)
+    return np.asarray(np.arange(parts + 1) * length // parts, dtype=np.int_)
+
+
+def _rgb(values: Floats) -> tuple[float, float, float]:
+    r, g, b = (float(v) for v in values)
+    return r, g, b

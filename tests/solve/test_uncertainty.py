@@ -1,0 +1,203 @@
+"""Error bars against what noise really does, and the steps that take some of it back."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import SizeError
+from lightpaint.images.estimate import Estimate
+from lightpaint.solve.refine import refine
+from lightpaint.solve.solve import solve
+from lightpaint.solve.uncertainty import (
+    correct_noise,
+    error_bars,
+    pseudo_inverse,
+    with_error_bars,
+)
+from lightpaint.target.target import Target
+
+SIZE = (24, 24)
+SEEDS = 40
+
+
+def _target(image: Any) -> Target:
+    return Target("t", image.astype(np.float32), np.ones(SIZE, np.float32), everything=True)
+
+
+def _pools(n: int = 5) -> Any:
+    """Overlapping pools of light, (n, h, w, 3)."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    places = np.random.default_rng(0).random((n, 2))
+    pools = [np.exp(-((x - a) ** 2 + (y - b) ** 2) / 0.15) for a, b in places]
+    return np.stack(pools)[..., None] * np.ones(3)
+
+
+def _painted(clean: Any) -> Target:
+    """Something no mix of the pools is: half dark, reddish, and lit from below."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1], :1][:2]
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 0, 0.3, 0], clean)
+    image = image * (x > 9) * np.array([1, 0.7, 0.3]) + 0.2 * y / SIZE[0]
+    return _target(image)
+
+
+def _noisy(clean: Any, sigma: float, rng: np.random.Generator) -> tuple[Any, Any]:
+    """Mean and half difference of two halves: skewed noise, the same in all channels."""
+
+    def half() -> Any:
+        error = rng.exponential(1, (*clean.shape[:-1], 1)) - 1
+        return clean * (1 + sigma * np.sqrt(2) * error)
+
+    a, b = half(), half()
+    return (a + b) / 2, (a - b) / 2
+
+
+def _with_scalar(basis: Basis, *dimmed: int) -> Basis:
+    lights = [replace(x, is_scalar=k in dimmed) for k, x in enumerate(basis.lights)]
+    return replace(basis, lights=tuple(lights))
+
+
+@pytest.mark.parametrize(
+    ("sigma", "dimmed"), [(0.05, ()), (0.2, ()), (0.2, (0, 2)), (0.5, (1,)), (0.5, ())]
+)
+def test_intervals_hold_the_answer_without_noise(
+    make_basis: Any, sigma: float, dimmed: tuple[int, ...]
+):
+    """95 % intervals, over seeds: those of lights that are on, and of those that are off."""
+    clean = _pools()
+    target = _painted(clean)
+    quiet = _with_scalar(make_basis(images=clean), *dimmed)
+    truth = solve(quiet, target).lighting.weights_for(quiet)
+    held, missed, told = [], [], []
+    for seed in range(SEEDS):
+        images, halves = _noisy(clean, sigma, np.random.default_rng(seed))
+        basis = _with_scalar(make_basis(images=images, half_differences=halves), *dimmed)
+        found = error_bars(basis, solve(basis, target))
+        low, high = found.interval
+        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        missed.append(np.square(found.weights - truth).mean())
+        told.append(np.square(found.standard_error).mean())
+    assert 0.85 <= np.mean(held) <= 0.99
+    # So is each light by itself, unless half of M is noise and more than that is guessed.
+    if sigma < 0.5:
+        assert np.mean(held, axis=0).min() > 0.8
+    # The errors are as large as they say.
+    assert np.sqrt(np.mean(told) / np.mean(missed)) == pytest.approx(1, abs=0.4)
+
+
+def test_one_light_by_hand(make_basis: Any):
+    """w = b / M of one light: δw = Σ (h r − Φ w h) / M, and the bias N w / M."""
+    rng = np.random.default_rng(1)
+    image = 1 + rng.random((1, *SIZE, 3))
+    half = rng.normal(0, 0.1, image.shape)
+    basis = make_basis(images=image, half_differences=half)
+    painted = rng.random((*SIZE, 3))
+    solution = solve(basis, _target(painted))
+    found = error_bars(basis, solution)
+    M, w = np.square(image[0]).sum((0, 1)), found.weights[0]
+    residual = painted - w * image[0]
+    gradient = half[0] * residual - image[0] * w * half[0]
+    np.testing.assert_allclose(
+        found.scatter[0], np.sqrt(np.square(gradient).sum((0, 1))) / M, rtol=1e-4
+    )
+    power = np.square(half[0]).sum((0, 1))
+    np.testing.assert_allclose(found.bias[0], w * power / (M - power), rtol=1e-4)
+    np.testing.assert_allclose(
+        found.objective_noise, (np.square(w) * np.square(half[0])).sum((0, 1)), rtol=1e-4
+    )
+    # Without all of the noise the answer moves by just that bias.
+    corrected = correct_noise(basis, solution, share=1.0)
+    np.testing.assert_allclose(
+        corrected.lighting.weights_for(basis)[0], w + found.bias[0], rtol=1e-4
+    )
+    np.testing.assert_allclose(error_bars(basis, corrected).bias, 0, atol=1e-5)
+
+
+def test_without_noise_nothing_is_uncertain(make_basis: Any):
+    basis = make_basis(4, SIZE)
+    solution = solve(basis, _painted(_pools()))
+    found = error_bars(basis, solution)
+    assert found.scatter.max() == 0
+    np.testing.assert_allclose(found.bias, 0, atol=1e-5)
+    errors = [x.standard_error for x in with_error_bars(solution, found).lighting.lights]
+    assert None not in errors
+
+
+def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
+    clean = _pools(3)
+    clean[2] = 0
+    images, halves = _noisy(clean, 0.2, np.random.default_rng(0))
+    basis = make_basis(
+        images=images, half_differences=halves, emission=[[1, 1, 1], [1, 0, 0], [2, 2, 2]]
+    )
+    lights = (replace(basis.lights[0], is_fixed=True), *basis.lights[1:])
+    basis = replace(basis, lights=lights)
+    solution = solve(basis, _target(clean[0] + 0.5 * clean[1]))
+    found = error_bars(basis, solution)
+    assert not found.standard_error[[0, 2]].any()
+    assert found.standard_error[1].all()
+    told = with_error_bars(solution, found).lighting
+    assert [x.standard_error is None for x in told.lights] == [True, False, True]
+
+
+@pytest.mark.parametrize("mixed_sigma", [0.05, 0.3, 3.0])
+def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
+    """On average over seeds; a render of the mix that is nothing but noise does no harm."""
+    clean = _pools()
+    target = _painted(clean)
+    quiet = make_basis(images=clean)
+    best = solve(quiet, target)
+    excess: dict[str, list[float]] = {"plain": [], "corrected": [], "refined": []}
+    held, shares = [], []
+    truth = best.lighting.weights_for(quiet)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        images, halves = _noisy(clean, 0.5, rng)
+        basis = make_basis(images=images, half_differences=halves)
+        plain = solve(basis, target)
+        weights = plain.lighting.weights_for(basis)
+        mix = np.einsum("nc,nhwc->hwc", weights, clean)
+        image, half = _noisy(mix, mixed_sigma, rng)
+        mixed = Estimate(image.astype(np.float32), half.astype(np.float32))
+        refined = refine(basis, plain, mixed)
+        assert refined.refinement is not None
+        shares.append(refined.refinement.share)
+        found = {"plain": plain, "corrected": correct_noise(basis, plain), "refined": refined}
+        for name, solution in found.items():
+            w = solution.lighting.weights_for(basis)
+            value = best.equations.objective(w) - best.equations.objective(truth)
+            excess[name].append(float(value.sum()))
+        low, high = error_bars(basis, refined).interval
+        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+    mean = {name: np.mean(values) for name, values in excess.items()}
+    assert mean["corrected"] < 0.9 * mean["plain"]
+    assert mean["refined"] < {0.05: 0.6, 0.3: 0.75, 3.0: 1.1}[mixed_sigma] * mean["plain"]
+    assert np.mean(shares) == pytest.approx({0.05: 1, 0.3: 0.9, 3.0: 0.25}[mixed_sigma], abs=0.15)
+    assert 0.8 <= np.mean(held) <= 1
+
+
+def test_the_render_of_the_mix_has_the_size_of_the_basis(make_basis: Any):
+    basis = make_basis(2, SIZE)
+    solution = solve(basis, _painted(_pools()))
+    small = np.zeros((12, 12, 3), np.float32)
+    with pytest.raises(SizeError, match="render of the mix is 12x12 but the basis is 24x24"):
+        refine(basis, solution, Estimate(small, small))
+
+
+def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
+    basis = make_basis(4, SIZE)
+    solution = solve(basis, _painted(_pools()))
+    image = basis.mix(solution.lighting.weights_for(basis))
+    again = refine(basis, solution, Estimate(image, 0 * image))
+    weights = partial(Basis.mix, basis)
+    np.testing.assert_allclose(
+        weights(again.lighting.weights_for(basis)), image, rtol=1e-4, atol=1e-5
+    )
+
+
+def test_pseudo_inverse_leaves_out_what_changes_nothing():
+    M = np.diag([1e8, 1e-8, 0.0])
+    np.testing.assert_allclose(pseudo_inverse(M), np.diag([1e-8, 1e8, 0]), rtol=1e-12)
