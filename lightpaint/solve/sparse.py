@@ -155,7 +155,7 @@ class _Search:
         return lights, now
 
     def from_all(self, most: int) -> dict[int, tuple[tuple[int, ...], _Found]]:
-        """Lights taken from the optimum of all, the one that is missed least each time."""
+        """By count: lights taken from the optimum of all, each time the one missed least."""
         now = self.solve(self.candidates)
         lights = tuple(np.flatnonzero(now.weights.any(axis=1)).tolist())
         sets = {}

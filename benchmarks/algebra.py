@@ -1,0 +1,141 @@
+"""What the algebra costs: normal equations, solves and strokes, without a renderer.
+
+    python benchmarks/algebra.py [--repeats N]
+
+Four tables: forming M and b against a plain float64 BLAS product of the same shape; one
+channel's solve, M given, against scipy's nnls on the Cholesky factor of M; a stroke of a
+64-pixel brush, update and solve of three channels; and many looks from one basis.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+from lightpaint.solve.normal_equations import BLOCK, NormalEquations, inner_products
+from lightpaint.solve.optimum import minimise
+from lightpaint.solve.solver import solve_normal_equations
+from lightpaint.solve.tiles import TiledEquations
+
+HEIGHT, WIDTH, BRUSH = 360, 640, 64
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=9)
+    repeats = parser.parse_args().repeats
+    gram(repeats)
+    solves(repeats)
+    strokes(4 * repeats)
+    looks()
+
+
+def gram(repeats: int) -> None:
+    """M, b and ‖Ψ‖² of a whole picture, against products of the same blocks in float64."""
+    print(f"normal equations, {WIDTH}x{HEIGHT}, three channels, ms (least of the runs)")
+    print(f"{'lights':>8s}{'ours':>10s}{'product':>10s}{'ratio':>8s}")
+    for n in (12, 64):
+        images, target, importance = picture(n)
+        plain = np.random.default_rng(0).random((n + 1, BLOCK))
+        blocks = 3 * HEIGHT * WIDTH / BLOCK
+
+        def product(plain: Any = plain, blocks: float = blocks) -> None:
+            for _ in range(int(blocks)):
+                plain @ plain.T
+
+        ours = timed(lambda p=(images, target, importance): inner_products(*p), repeats)
+        base = timed(product, repeats)
+        print(f"{n:8d}{1e3 * min(ours):10.1f}{1e3 * min(base):10.1f}{min(base) / min(ours):8.2f}")
+
+
+def solves(repeats: int) -> None:
+    """One channel, M given, from all lights at 1."""
+    print("\nsolve of one channel, M given, ms (least / median of the runs)")
+    print(f"{'lights':>8s}{'ours':>18s}{'nnls':>18s}{'off':>6s}{'KKT':>10s}")
+    for n in (12, 64, 256, 1000):
+        rng = np.random.default_rng(n)
+        A = rng.random((2 * n + 10, n)) ** 3
+        y = A @ (rng.random(n) * (rng.random(n) < 0.6)) + 0.3 * rng.normal(size=len(A))
+        M, b = A.T @ A, A.T @ y
+
+        def by_scipy(M: Any = M, b: Any = b) -> None:
+            L = np.linalg.cholesky(M)
+            nnls(L.T, np.linalg.solve(L, b), maxiter=100 * len(b))
+
+        ours = timed(lambda M=M, b=b: minimise(M, b, start=np.ones(b.size)), repeats)
+        oracle = timed(by_scipy, min(repeats, 3))
+        found = minimise(M, b, start=np.ones(n))
+        print(
+            f"{n:8d}{pair(ours):>18s}{pair(oracle):>18s}"
+            f"{np.count_nonzero(found.x == 0):6d}{found.kkt_residual:10.0e}"
+        )
+
+
+def strokes(count: int) -> None:
+    """A square of new colour, and of new importance, anywhere; then the solve from the last."""
+    print(f"\nstroke of {BRUSH}x{BRUSH} pixels in {WIDTH}x{HEIGHT}, ms (least / median)")
+    print(f"{'lights':>8s}{'colour':>18s}{'importance':>18s}{'solve':>18s}")
+    for n in (12, 64):
+        tiled = TiledEquations(*picture(n))
+        rng = np.random.default_rng(1)
+        weights = solve_normal_equations(tiled.equations, np.ones((n, 3))).weights
+        spent: dict[str, list[float]] = {"target": [], "importance": [], "solve": []}
+        for k in range(count):
+            top, left = rng.integers(0, HEIGHT - BRUSH), rng.integers(0, WIDTH - BRUSH)
+            region = slice(top, top + BRUSH), slice(left, left + BRUSH)
+            kind = ("target", "importance")[k % 2]
+            start = time.perf_counter()
+            tiled.update(region, **{kind: rng.random(3) if kind == "target" else rng.random()})
+            between = time.perf_counter()
+            weights = solve_normal_equations(tiled.equations, weights).weights
+            spent[kind].append(between - start)
+            spent["solve"].append(time.perf_counter() - between)
+        print(f"{n:8d}" + "".join(f"{pair(each):>18s}" for each in spent.values()))
+
+
+def looks() -> None:
+    """Other targets under the same importance: M stays, b is new."""
+    print("\nlooks a second from one basis, M given (three channels each)")
+    for n in (12, 64):
+        images, target, importance = picture(n)
+        M, b, norm2 = inner_products(images, target, importance)
+        rng = np.random.default_rng(2)
+        weights, done = np.ones((n, 3)), 0
+        start = time.perf_counter()
+        while time.perf_counter() - start < 2:
+            other = b * rng.uniform(0.5, 1.5, b.shape)
+            weights = solve_normal_equations(NormalEquations(M, other, norm2), weights).weights
+            done += 1
+        print(f"{n:8d}{done / (time.perf_counter() - start):10.0f}")
+
+
+def picture(n: int) -> tuple[Any, Any, Any]:
+    """Basis images, a target and an importance of 1."""
+    rng = np.random.default_rng(n)
+    images = rng.random((n, HEIGHT, WIDTH, 3), dtype=np.float32) ** 3
+    target = rng.random((HEIGHT, WIDTH, 3), dtype=np.float32)
+    return images, target, np.ones((HEIGHT, WIDTH), np.float32)
+
+
+def timed(work: Callable[[], object], repeats: int) -> list[float]:
+    """Seconds of each run, after one that is not counted."""
+    work()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - start)
+    return seconds
+
+
+def pair(seconds: list[float]) -> str:
+    """Least and median, in milliseconds."""
+    return f"{1e3 * min(seconds):.2f} / {1e3 * float(np.median(seconds)):.2f}"
+
+
+if __name__ == "__main__":
+    main()
