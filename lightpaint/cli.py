@@ -79,7 +79,17 @@ def _parser() -> argparse.ArgumentParser:
 
     solve = _command(commands, "solve", "find the lighting that comes closest to a painting")
     solve.add_argument("source", metavar="SCENE|BASIS", help="scene XML, or a *.basis.exr")
-    solve.add_argument("targets", metavar="TARGET", nargs="+", help="painted EXR")
+    solve.add_argument("targets", metavar="TARGET", nargs="*", help="painted EXR")
+    solve.add_argument(
+        "--target",
+        dest="views",
+        type=_key_value,
+        action="append",
+        default=[],
+        metavar="SENSOR=TARGET",
+        help="instead of TARGET: painting of the view through that sensor; give it once for each "
+        "view, and one lighting answers all of them",
+    )
     _add_output(solve, "DIR", "result folder (default: named after the target)")
     solve.add_argument(
         "--mask",

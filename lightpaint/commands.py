@@ -22,9 +22,11 @@ from lightpaint.pipeline import (
     all_constraints,
     command_line,
     obtain_basis,
+    paint_views_with_light,
     paint_with_light,
     relight_look,
     render_template,
+    result_folders,
     verify_result,
 )
 from lightpaint.relight.explanation import (
@@ -175,6 +177,10 @@ def template(options: Namespace, _given: list[str]) -> int:
 
 def solve(options: Namespace, given: list[str]) -> int:
     """`lightpaint solve SCENE|BASIS TARGET...`"""
+    if options.views:
+        return _solve_views(options, given)
+    if not options.targets:
+        raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
     folders = _folders(options.output, [Path(t).stem for t in options.targets])
     # Everything a user gave is looked at before the first sample is taken.
     masks = _one_for_each(options.masks or [None], options.targets)
@@ -226,6 +232,51 @@ def solve(options: Namespace, given: list[str]) -> int:
     return 0
 
 
+def _solve_views(options: Namespace, given: list[str]) -> int:
+    """`lightpaint solve SCENE --target SENSOR=TARGET...`"""
+    if options.targets:
+        raise TargetError("TARGET and --target at once: give every painting with its sensor")
+    not_for_views = {"-s": options.sensor, "--time": options.time_s, "--refine": options.refine}
+    not_for_views |= {"--quality": options.quality, "--correct-noise": options.noise_correction}
+    if idle := [name for name, value in not_for_views.items() if value]:
+        raise TargetError(f"{', '.join(idle)} cannot be had with --target: leave it out")
+    if is_basis_file(Path(options.source)):
+        raise BasisError("a basis has one view only: give the scene, to solve for several")
+    paths = [path for _, path in options.views]
+    masks = _one_for_each(options.masks or [None], paths)
+    targets = [read_target(t, mask=m) for t, m in zip(paths, masks, strict=True)]
+    scenes: list[Scene] = []
+    for sensor, _ in options.views:
+        options.sensor = sensor
+        scene = _load(options, path=Path(options.source), is_first=not scenes)
+        scenes.append(scene.reduced(options.resolution) if options.resolution else scene)
+    folder = Path(options.output or targets[0].name)
+    targets = [_fitted(t, s.size, options) for t, s in zip(targets, scenes, strict=True)]
+    check_writable(folder)
+    check_relightable(scenes[0], folder / "relit.xml")
+    for target in targets:
+        _warn_of_pixels(target.not_finite, target.name)
+    bases_made = [_basis(scene, options.spp, options) for scene in scenes]
+    with console.progress() as progress:
+        looks = paint_views_with_light(
+            scenes,
+            targets,
+            folder,
+            bases=bases_made,
+            constraints=_constraints(options),
+            unpainted=options.unpainted,
+            cd_per_unit=options.cd_per_unit,
+            spp=options.spp,
+            seed=options.seed,
+            command=command_line(given),
+            progress=progress,
+        )
+    for look in looks:
+        console.write(f"\n{look.basis.origin.sensor}:")
+        _show(look, folder / look.basis.origin.sensor)
+    return 0
+
+
 def relight(options: Namespace, _given: list[str]) -> int:
     """`lightpaint relight SCENE lighting.json...`"""
     answers = [read_lighting(path) for path in options.lightings]
@@ -249,7 +300,8 @@ def verify(options: Namespace, _given: list[str]) -> int:
     """`lightpaint verify DIR...`"""
     use_variant(options.variant)
     agree = True
-    for folder in options.folders:
+    folders = [view for folder in options.folders for view in result_folders(Path(folder))]
+    for folder in folders:
         with console.progress() as progress:
             result = verify_result(folder, spp=options.spp, seed=options.seed, progress=progress)
         console.write(f"{folder}: {_agreement(result)}")
@@ -289,10 +341,17 @@ def doctor(options: Namespace, _given: list[str]) -> int:
     return 2 if missing else 0
 
 
-def _load(options: Namespace, *, path: Path | None = None, is_to_solve: bool = True) -> Scene:
+def _load(
+    options: Namespace,
+    *,
+    path: Path | None = None,
+    is_to_solve: bool = True,
+    is_first: bool = True,
+) -> Scene:
     """The scene that was asked for, and what is worth knowing of it.
 
-    is_to_solve: whether its lights are looked at, and not only their sum.
+    is_to_solve: whether its lights are looked at, and not only their sum. is_first: whether
+    anything is to be said that would be said again of another view.
     """
     chosen: dict[str, Any] = {"use_lights_file": False}
     if is_to_solve:
@@ -309,6 +368,8 @@ def _load(options: Namespace, *, path: Path | None = None, is_to_solve: bool = T
         variant=options.variant,
         **chosen,
     )
+    if not is_first:
+        return scene
     if is_to_solve:
         if scene.lights_file is not None:
             console.say(f"lights and groups as in {scene.lights_file}")
@@ -450,6 +511,8 @@ def _show(look: Look, folder: Path) -> None:
             f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "
             "paint where it shines, or pass --unpainted"
         )
+    for ambiguity in look.ambiguities:
+        console.say(ambiguity.sentence)
     if not quality.converged:
         console.say(
             f"the solve stopped after {max(quality.sweeps)} sweeps at a KKT residual of "

@@ -2,14 +2,14 @@
 
 import json
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.render import basis_lights, is_of, render_basis
-from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError
+from lightpaint.errors import BasisError, ImageError, LightpaintError, OutputError, SceneError
 from lightpaint.files import check_writable, restoring, write_text
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.display import choose_exposure, write_png
@@ -26,9 +26,10 @@ from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.diagnosis import Diagnosis, diagnose
+from lightpaint.solve.indistinguishable import Ambiguity, ambiguities
 from lightpaint.solve.lighting import Lighting, combine, write_lighting
 from lightpaint.solve.reduction import reduce_to
-from lightpaint.solve.solve import Solution, solve
+from lightpaint.solve.solve import Solution, solve, solve_views
 from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.target.target import Target, read_target
 from lightpaint.target.template import write_template
@@ -41,6 +42,9 @@ FEWEST = 4
 
 #: What every solve writes.
 ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html")
+
+#: What each view has where there are several.
+VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html")
 
 #: What a solve and a relight write, and the next solve replaces.
 RESULTS = (
@@ -61,8 +65,9 @@ class Look:
     """One painting and its answer.
 
     relit and verification are None where there was only a saved basis and no scene.
-    uncertainty: how sure the lights are; diagnosis: why the painting is not met. None under
-    constraints, of which they know nothing yet.
+    uncertainty: how sure the lights are; diagnosis: why the painting is not met; ambiguities:
+    lights that it cannot tell apart. Not under constraints or for several views, of which
+    they know nothing yet.
     """
 
     target: Target
@@ -73,6 +78,7 @@ class Look:
     verification: Verification | None
     uncertainty: Uncertainty | None
     diagnosis: Diagnosis | None
+    ambiguities: tuple[Ambiguity, ...] = ()
 
     @property
     def lighting(self) -> Lighting:
@@ -170,10 +176,12 @@ def paint_with_light(
             scene, basis, solution, rounds=refine, seed=seed, progress=progress
         )
     uncertainty, diagnosis = None, None
+    alike: tuple[Ambiguity, ...] = ()
     if not constraints:
         uncertainty = error_bars(basis, solution)
         solution = with_error_bars(solution, uncertainty)
         diagnosis = diagnose(basis, target, solution)
+        alike = ambiguities(basis, solution)
     solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=cd_per_unit))
     predicted = combine(basis, solution.lighting)
     as_basis = spp or basis.origin.spp if asked is None and (time_s or quality) else None
@@ -190,9 +198,88 @@ def paint_with_light(
         if relit is not None:
             verification = verify(predicted, relit, spp=checked_spp, seed=seed, progress=progress)
             write_estimate(folder / "verified.exr", verification.verified, {})
-        look = Look(target, basis, solution, predicted, relit, verification, uncertainty, diagnosis)
+        proof = (relit, verification, uncertainty, diagnosis, alike)
+        look = Look(target, basis, solution, predicted, *proof)
         show_look(look, folder, command=command)
     return look
+
+
+def paint_views_with_light(
+    scenes: Sequence[Scene],
+    targets: Sequence[Target],
+    folder: str | Path,
+    *,
+    bases: Sequence[Basis] | None = None,
+    constraints: Constraints | None = None,
+    unpainted: float = 0.0,
+    spp: int | None = None,
+    seed: int = 0,
+    resize: bool = False,
+    cd_per_unit: float | None = None,
+    use_cache: bool = True,
+    command: str = "",
+    progress: Progress = silent,
+) -> list[Look]:
+    """Find the one lighting that comes closest to paintings of several views of a scene.
+
+    scenes: the same scene, loaded through another sensor each; targets: what each is to show.
+    folder: receives lighting.json and relit.xml, and for each sensor a folder of that name with
+    predicted.exr, verified.exr, comparison.png and report.html.
+    bases: of these views, if made before. Other arguments as of `paint_with_light`.
+    """
+    folder = Path(folder)
+    names = [scene.sensor_names[scene.sensor] for scene in scenes]
+    if len(set(names)) < len(names):
+        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+    for name in names:
+        if Path(name).name != name or name in ("..", ""):
+            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+    constraints = all_constraints(scenes[0], constraints)
+    reduce_to(constraints, basis_lights(scenes[0]))
+    check_writable(folder)
+    written = [*earlier_results(folder), folder / "lighting.json"]
+    written += check_relightable(scenes[0], folder / "relit.xml")
+    for name in names:
+        here = [file for pattern in RESULTS for file in (folder / name).glob(pattern)]
+        written += [*here, *(folder / name / file for file in VIEW_RESULTS)]
+    sizes = [scene.size for scene in scenes] if bases is None else [b.size for b in bases]
+    fitted = [t.fitted_to(size, resize=resize) for t, size in zip(targets, sizes, strict=True)]
+    if bases is None:
+        bases = [
+            obtain_basis(scene, spp=spp, seed=seed, use_cache=use_cache, progress=progress)
+            for scene in scenes
+        ]
+    solutions = solve_views(
+        list(zip(bases, fitted, strict=True)), constraints=constraints, unpainted=unpainted
+    )
+    lighting = replace(solutions[0].lighting, cd_per_unit=cd_per_unit)
+    looks = []
+    with restoring(folder, written):
+        write_lighting(folder / "lighting.json", lighting)
+        for scene, name, basis, target, solution in zip(
+            scenes, names, bases, fitted, solutions, strict=True
+        ):
+            (folder / name).mkdir(exist_ok=True)
+            predicted = combine(basis, lighting)
+            checked_spp = scene.spp if spp is None else spp
+            view = {"sensor": name, "spp": checked_spp}
+            path = folder / name / "predicted.exr"
+            write_estimate(path, predicted, {VIEW_KEY: json.dumps(view)})
+            relit = relight(scene, lighting, folder / "relit.xml")
+            verification = verify(predicted, relit, spp=checked_spp, seed=seed, progress=progress)
+            write_estimate(folder / name / "verified.exr", verification.verified, {})
+            solved = replace(solution, lighting=lighting)
+            look = Look(target, basis, solved, predicted, relit, verification, None, None)
+            show_look(look, folder / name, command=command)
+            looks.append(look)
+    return looks
+
+
+def result_folders(folder: Path) -> list[Path]:
+    """`folder` itself, or where it holds several views the folders of these."""
+    if (folder / "predicted.exr").is_file() or not (folder / "relit.xml").is_file():
+        return [folder]
+    return sorted(file.parent for file in folder.glob("*/predicted.exr")) or [folder]
 
 
 def all_constraints(scene: Scene | None, given: Constraints | None) -> Constraints:
@@ -346,7 +433,10 @@ def verify_result(
     Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
     """
     folder = Path(folder)
-    missing = [name for name in ("predicted.exr", "relit.xml") if not (folder / name).is_file()]
+    relit_xml = folder / "relit.xml"
+    if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
+        relit_xml = folder.parent / "relit.xml"  # one of several views
+    missing = [file.name for file in (folder / "predicted.exr", relit_xml) if not file.is_file()]
     if missing:
         raise OutputError(
             f"{folder} is no result folder with a relit scene: it has no "
@@ -355,7 +445,7 @@ def verify_result(
     path = folder / "predicted.exr"
     predicted, attributes = read_estimate_with_attributes(path)
     sensor, solved_spp = _read_view(path, attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(folder / "relit.xml", sensor=sensor, use_lights_file=False)
+    relit = load_scene(relit_xml, sensor=sensor, use_lights_file=False)
     return verify(
         predicted,
         relit,

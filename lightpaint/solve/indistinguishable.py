@@ -5,12 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lightpaint.basis.basis import Basis
 from lightpaint.solve.normal_equations import Doubles
 from lightpaint.solve.quadratic import UNREACHED, Bools
+from lightpaint.solve.solve import Solution
 
 #: Two images are taken for one if their normalised inner product is above 1 − ALIKE, and
 #: several make up for each other if what is left of a mix of them is below that share.
 ALIKE = 1e-6
+
+#: The largest `alike` that noise is an excuse for.
+MOST_ALIKE = 0.01
 
 #: Share of a light in a mix that cancels, below which it has no part in it.
 PART = 0.05
@@ -42,6 +47,23 @@ class Ambiguity:
             f"{what}: only what they do together is determined. A wider mask or another view, "
             "where they differ, would tell them apart; or tie them, or keep one as it is"
         )
+
+
+def ambiguities(basis: Basis, solution: Solution) -> tuple[Ambiguity, ...]:
+    """The lights of `basis` that the painting cannot tell apart, as far as its noise lets see.
+
+    Noise makes the images of two lights at one place differ: by its share of their power.
+    """
+    free = np.flatnonzero(~basis.is_fixed)
+    noise, power = (
+        np.square(images[free], dtype=np.float64).sum(axis=(1, 2, 3))
+        for images in (basis.half_differences, basis.images)
+    )
+    shares = noise[power > 0] / power[power > 0]
+    alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE
+    # Where noise is much of a picture, what is alike cannot be seen.
+    M = solution.equations.M[:, free][:, :, free]
+    return indistinguishable(M, [basis.names[k] for k in free], alike=min(alike, MOST_ALIKE))
 
 
 def indistinguishable(

@@ -4,7 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.solve.indistinguishable import indistinguishable
+from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.solve.indistinguishable import ambiguities, indistinguishable
+from lightpaint.solve.solve import solve
+from lightpaint.target.target import Target
 
 NAMES = ["key", "fill", "rim", "sky", "lamp"]
 
@@ -67,3 +70,21 @@ def test_one_channel_and_no_lights():
     assert found.names == ("key", "fill")
     assert found.is_mix
     assert indistinguishable(np.zeros((3, 0, 0)), []) == ()
+
+
+def test_two_lights_at_one_place_are_named_in_spite_of_noise():
+    rng = np.random.default_rng(0)
+    clean = rng.random((3, 16, 16, 3))
+    clean[2] = clean[0]
+    noise = rng.normal(scale=0.01, size=(2, *clean.shape))
+    images = (clean + noise[0]).astype(np.float32)
+    lights = tuple(
+        BasisLight(name, "area", "radiance", "W/(m² sr)", (1.0, 1.0, 1.0)) for name in "abc"
+    )
+    origin = Origin("s", "", "c", 0, "one pass", (8, 8), (1, 1))
+    seen = np.zeros((16, 16), dtype=bool)
+    basis = Basis(lights, images, noise[1].astype(np.float32), seen, origin)
+    target = Target("t", basis.mix(np.ones((3, 3))), np.ones((16, 16), np.float32), False)
+    [found] = ambiguities(basis, solve(basis, target))
+    assert found.names == ("a", "c")
+    assert not found.is_mix
