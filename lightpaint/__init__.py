@@ -12,7 +12,8 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
 
-`paint_with_light` is all of it in one call. Importing this sets no Mitsuba variant; that
+`paint_with_light` is all of it in one call; `solve_views` and `paint_views_with_light` take
+several views. Importing this sets no Mitsuba variant; that
 happens when the first scene is loaded.
 """
 
@@ -21,7 +22,7 @@ from lightpaint.basis.render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.images.display import display_picture
 from lightpaint.images.estimate import Estimate
-from lightpaint.pipeline import Look, paint_with_light
+from lightpaint.pipeline import Look, paint_views_with_light, paint_with_light
 from lightpaint.relight.relight import relight
 from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification, verify
@@ -30,7 +31,7 @@ from lightpaint.scene.variant import use_variant
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
-from lightpaint.solve.solve import Solution, solve
+from lightpaint.solve.solve import Solution, solve, solve_views
 from lightpaint.target.target import Target, read_target
 from lightpaint.version import __version__
 
@@ -49,6 +50,7 @@ __all__ = [
     "combine",
     "display_picture",
     "load_scene",
+    "paint_views_with_light",
     "paint_with_light",
     "read_basis",
     "read_constraints",
@@ -57,6 +59,7 @@ __all__ = [
     "relight",
     "render_basis",
     "solve",
+    "solve_views",
     "use_variant",
     "verdict",
     "verify",

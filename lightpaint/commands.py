@@ -6,19 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.markup import escape
 
-from lightpaint import console
+from lightpaint import console, tables
 from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis, is_basis_file, read_basis, write_basis
 from lightpaint.basis.render import basis_lights, memory_needed, why_not_one_pass
 from lightpaint.doctor import examine
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_writable
-from lightpaint.images.photometry import Photometry, photometry
 from lightpaint.pipeline import (
-    Look,
     all_constraints,
     command_line,
     obtain_basis,
@@ -29,17 +26,7 @@ from lightpaint.pipeline import (
     result_folders,
     verify_result,
 )
-from lightpaint.relight.explanation import (
-    how_sure,
-    relative_errors,
-    spoken_error,
-    what_is_missed,
-)
 from lightpaint.relight.relight import check_relightable, scene_of
-from lightpaint.relight.verdict import agreement, energy_shares, verdict
-from lightpaint.relight.verify import Verification
-from lightpaint.scene.emitters import MULTIPLE
-from lightpaint.scene.lights import WHOLE_EMISSION, Emitter, Light
 from lightpaint.scene.quality import with_quality
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
@@ -54,88 +41,13 @@ def lights(options: Namespace, _given: list[str]) -> int:
     """`lightpaint lights SCENE`"""
     scene = _load(options)
     if options.json:
-        listed = [_described(light, options.cd_per_unit) for light in scene.lights]
+        listed = [tables.described(light, options.cd_per_unit) for light in scene.lights]
         scale = {} if options.cd_per_unit is None else {"cd_per_unit": options.cd_per_unit}
         data = {"scene": str(scene.path), **scale, "lights": listed}
         console.write(json.dumps(data, indent=2))
         return 0
-    headings = ("light", "plugin", "emission R G B", "unit", "size or place", "sampling", "colour")
-    # Lumen and candela only where somebody has said what a number stands for.
-    amounts = () if options.cd_per_unit is None else ("luminous", "flux")
-    table = console.table(*headings, *amounts)
-    for light in scene.lights:
-        single = light.member_names == (light.name,) and not light.is_fixed
-        if not single:
-            what = "kept as it is" if light.is_fixed else console.numbers(light.emission)
-            unit = "" if light.is_fixed else light.unit
-            count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
-            whole = _photometry(light, options.cd_per_unit)
-            table.add_row(
-                escape(light.name),
-                light.plugin,
-                what,
-                unit,
-                count,
-                "",
-                "" if light.is_fixed else whole.color,
-                *whole.amounts[: len(amounts)],
-            )
-        for member in light.members:
-            its = _photometry(member, options.cd_per_unit)
-            table.add_row(
-                escape(member.name if single else f"  {member.name}"),
-                member.plugin,
-                console.numbers(member.emission),
-                member.kind.unit if member.kind is not None else MULTIPLE,
-                member.form,
-                f"{member.sampling_weight:g}",
-                its.color,
-                *its.amounts[: len(amounts)],
-            )
-    console.print_table(table)
+    tables.show_lights(scene, options.cd_per_unit)
     return 0
-
-
-def _photometry(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
-    """As the scene has it."""
-    unit, flux = MULTIPLE, None
-    if isinstance(light, Light):
-        unit, flux = light.unit, light.unit_flux
-    elif light.kind is not None:
-        unit = light.kind.unit
-        flux = None if light.unit_flux is None else (light.unit_flux,) * 3
-    return photometry(light.emission, unit=unit, unit_flux=flux, cd_per_unit=cd_per_unit)
-
-
-def _described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
-    """A light, and the emitters in it, for other programs."""
-    members = [
-        {
-            "name": member.name,
-            "plugin": member.plugin,
-            "parameter": member.kind.parameter if member.kind is not None else WHOLE_EMISSION,
-            "unit": member.kind.unit if member.kind is not None else MULTIPLE,
-            "emission": list(member.emission),
-            "form": member.form,
-            "sampling_weight": member.sampling_weight,
-            "photometry": _photometry(member, cd_per_unit).fields(),
-        }
-        for member in light.members
-    ]
-    about = {
-        "name": light.name,
-        "plugin": light.plugin,
-        "parameter": light.parameter,
-        "unit": light.unit,
-        "emission": list(light.emission),
-        "form": light.form,
-        "is_fixed": light.is_fixed,
-        "photometry": _photometry(light, cd_per_unit).fields(),
-        "members": members,
-    }
-    if len(members) == 1:
-        about["sampling_weight"] = light.members[0].sampling_weight
-    return about
 
 
 def basis(options: Namespace, _given: list[str]) -> int:
@@ -226,7 +138,7 @@ def solve(options: Namespace, given: list[str]) -> int:
                 command=command_line(given),
                 progress=progress,
             )
-        _show(look, folder)
+        tables.show_look(look, folder)
     if scene is None:
         console.say("solved from a saved basis: no render was made; lightpaint relight makes one")
     return 0
@@ -273,7 +185,7 @@ def _solve_views(options: Namespace, given: list[str]) -> int:
         )
     for look in looks:
         console.write(f"\n{look.basis.origin.sensor}:")
-        _show(look, folder / look.basis.origin.sensor)
+        tables.show_look(look, folder / look.basis.origin.sensor)
     return 0
 
 
@@ -304,7 +216,7 @@ def verify(options: Namespace, _given: list[str]) -> int:
     for folder in folders:
         with console.progress() as progress:
             result = verify_result(folder, spp=options.spp, seed=options.seed, progress=progress)
-        console.write(f"{folder}: {_agreement(result)}")
+        console.write(f"{folder}: {tables.spoken_agreement(result)}")
         agree &= result.agrees
     return 0 if agree else 1
 
@@ -466,66 +378,6 @@ def _constraints(options: Namespace) -> Constraints:
         prefer_current=options.prefer_current,
         sparse=options.sparse,
         where="on the command line",
-    )
-
-
-def _show(look: Look, folder: Path) -> None:
-    shares = energy_shares(look.basis, look.lighting)
-    held = any(light.constraint for light in look.lighting.lights)
-    headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
-    amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
-    asked = ["asked (* holds it)"] if held else []
-    table = console.table(*headings, *amounts, *asked)
-    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
-    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
-        solved = "off" if not any(light.emission) else console.numbers(light.emission)
-        if light.name in look.solution.quality.unreached and any(light.emission):
-            solved += " (kept)"
-        seen = look.lighting.photometry(light)
-        table.add_row(
-            escape(light.name),
-            light.plugin,
-            "" if light.is_fixed else console.numbers(now.emission),
-            "kept" if light.is_fixed else solved,
-            spoken_error(light, float(errors[k])),
-            "" if light.is_fixed else light.unit,
-            f"{100 * shares[k]:.1f} %",
-            "" if light.is_fixed else seen.color,
-            *seen.amounts[: len(amounts)],
-            *([escape(light.constraint) + "*" * light.is_active] if held else []),
-        )
-    console.print_table(table)
-    console.write(verdict(look.solution, look.predicted, look.verification))
-    if look.diagnosis is not None:
-        for sentence in what_is_missed(look.diagnosis):
-            console.write(sentence)
-    if look.uncertainty is not None:
-        console.write(how_sure(look.basis, look.solution, look.uncertainty))
-    console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    quality = look.solution.quality
-    if quality.curve:
-        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
-        console.write(f"missed of the painting, by number of lights: {listed}")
-    if quality.unreached:
-        console.say(
-            f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "
-            "paint where it shines, or pass --unpainted"
-        )
-    for ambiguity in look.ambiguities:
-        console.say(ambiguity.sentence)
-    if not quality.converged:
-        console.say(
-            f"the solve stopped after {max(quality.sweeps)} sweeps at a KKT residual of "
-            f"{max(quality.kkt_residual):.1e}"
-        )
-    if look.verification is not None and not look.verification.agrees:
-        console.say(f"WARNING: {_agreement(look.verification)}")
-
-
-def _agreement(result: Verification) -> str:
-    return (
-        f"{agreement(result)}; RMSE {result.rmse:.2g} (noise {result.noise_rmse:.2g}), "
-        f"ΔE {result.delta_e_mean:.1f}"
     )
 
 
