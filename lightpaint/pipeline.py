@@ -66,8 +66,7 @@ class Look:
 
     relit and verification are None where there was only a saved basis and no scene.
     uncertainty: how sure the lights are; diagnosis: why the painting is not met; ambiguities:
-    lights that it cannot tell apart. Not under constraints or for several views, of which
-    they know nothing yet.
+    lights that it cannot tell apart. None of these for several views.
     """
 
     target: Target
@@ -175,13 +174,10 @@ def paint_with_light(
         solution = refine_by_rendering(
             scene, basis, solution, rounds=refine, seed=seed, progress=progress
         )
-    uncertainty, diagnosis = None, None
-    alike: tuple[Ambiguity, ...] = ()
-    if not constraints:
-        uncertainty = error_bars(basis, solution)
-        solution = with_error_bars(solution, uncertainty)
-        diagnosis = diagnose(basis, target, solution)
-        alike = ambiguities(basis, solution)
+    uncertainty = error_bars(basis, solution)
+    solution = with_error_bars(solution, uncertainty)
+    diagnosis = diagnose(basis, target, solution)
+    alike = () if constraints else ambiguities(basis, solution)
     solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=cd_per_unit))
     predicted = combine(basis, solution.lighting)
     as_basis = spp or basis.origin.spp if asked is None and (time_s or quality) else None

@@ -77,7 +77,9 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
         return ["The lights can do what is painted."]
     parts = {
         "no mix of the lights can reach": d.unreachable,
-        "only light below zero could": d.forbidden,
+        "only light below zero could"
+        if not d.is_constrained
+        else "what is asked of the lights, or zero, forbids": d.forbidden,
         "is noise of the basis": d.noise,
     }
     told = [

@@ -126,7 +126,11 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: f
             diagnosis.unreachable_map,
             "What no mix of the lights makes, negative ones included.",
         ),
-        ("Forbidden", diagnosis.forbidden_map, "What only light below zero would mend."),
+        (
+            "Forbidden",
+            diagnosis.forbidden_map,
+            "What only light below zero, or beyond what is asked, would mend.",
+        ),
     ]
     counted = solution.importance > 0
     sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]

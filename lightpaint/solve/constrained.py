@@ -20,6 +20,9 @@ FAINT = 1e-8
 #: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
 PULL = 1e-7
 
+#: Share by which a sum may be short of its limit and be said to be at it.
+AT_LIMIT = 1e-9
+
 
 def solve_constrained(
     equations: NormalEquations, reduction: Reduction, start: Doubles
@@ -29,6 +32,48 @@ def solve_constrained(
     start: (n, 3), weights to begin with; lights that reach nothing stay as near to them as
     the constraints allow.
     """
+    return _solve_reduced(equations, reduction, start)[0]
+
+
+def free_directions(equations: NormalEquations, reduction: Reduction, start: Doubles) -> Doubles:
+    """(3 n, k), directions of the weights, channel by channel, that no limit holds at the optimum.
+
+    Arguments as of `solve_constrained`.
+    """
+    _, x = _solve_reduced(equations, reduction, start)
+    lit = reached(equations)
+    columns = []
+    for unknown in reduction.unknowns:
+        column = np.zeros((3, len(reduction.held)))
+        for light, rgb in unknown.columns:
+            column[:, light] += rgb
+        columns.append((column * lit.T).ravel())
+    C = np.array(columns).reshape(len(columns), -1).T
+    inside = np.array(
+        [u.lower < value < u.upper for u, value in zip(reduction.unknowns, x, strict=True)],
+        dtype=bool,
+    )
+    # A sum at its limit leaves only the directions in which it stays the same.
+    blocked = []
+    for cap in reduction.caps:
+        its, coefficients = list(cap.unknowns), np.asarray(cap.coefficients)
+        if not cap.lower * (1 + AT_LIMIT) < coefficients @ x[its] < cap.upper * (1 - AT_LIMIT):
+            row = np.zeros(x.size)
+            row[its] = coefficients
+            blocked.append(row)
+    kept = np.flatnonzero(inside)
+    if not blocked:
+        return np.asarray(C[:, kept])
+    rows = np.array(blocked)[:, kept]
+    _, sizes, right = np.linalg.svd(rows)
+    rank = int((sizes > AT_LIMIT * sizes.max(initial=0)).sum())
+    return np.asarray(C[:, kept] @ right[rank:].T)
+
+
+def _solve_reduced(
+    equations: NormalEquations, reduction: Reduction, start: Doubles
+) -> tuple[SolverResult, Doubles]:
+    """The result and the values x of the unknowns."""
     lit = reached(equations)
     equations = _with_faint_pull(equations, lit, start)
     x = np.array([0.0] * len(reduction.unknowns))
@@ -48,13 +93,14 @@ def solve_constrained(
         for c in problem.channels:
             residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
             tolerances[c] = optimum.tolerance
-    return SolverResult(
+    result = SolverResult(
         weights_of(reduction, x),
         residuals,
         (sweeps[0], sweeps[1], sweeps[2]),
         _reached_knobs(reduction, lit),
         float(tolerances.max()),
     )
+    return result, x
 
 
 def solve_sparse(

@@ -72,7 +72,8 @@ class Diagnosis:
     norm2: ‖Ψ‖², to hold them against.
     unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
     reason. Their sum is Ψ − ΣwΦ. ignored_map: (h, w), of luminance, weighted.
-    bounds: by their gain, the largest first. place: None where nothing is out of reach.
+    bounds: by their gain, the largest first; none of other constraints. is_constrained: whether
+    there are any, which then forbid too. place: None where nothing is out of reach.
     """
 
     total: float
@@ -86,6 +87,7 @@ class Diagnosis:
     ignored_map: Floats
     bounds: tuple[Bound, ...]
     place: Place | None
+    is_constrained: bool = False
 
     def share(self, part: float) -> float:
         """`part` of what is missed, 0 to 1."""
@@ -126,7 +128,8 @@ def diagnose(basis: Basis, target: Target, solution: Solution) -> Diagnosis:
         unreachable_map=unreachable,
         forbidden_map=forbidden,
         ignored_map=uncounted * luminance(outside),
-        bounds=_bounds(basis, solution, weights),
+        bounds=() if solution.constraints else _bounds(basis, solution, weights),
+        is_constrained=bool(solution.constraints),
         place=_place(solution, unreachable) if out_of_reach > noise else None,
     )
 

@@ -12,7 +12,8 @@ from lightpaint.solve.constrained import preferring, pulled, solve_constrained, 
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, Quality
 from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
-from lightpaint.solve.reduction import reduce_to
+from lightpaint.solve.reduction import Reduction, reduce_to
+from lightpaint.solve.selection import only
 from lightpaint.solve.solver import SolverResult, solve_normal_equations
 from lightpaint.target.target import Target
 
@@ -209,6 +210,17 @@ def _solve_asked(
     active = pulled(equations, basis, result.weights)
     labels = zip(reduction.labels, active, strict=True)
     return result, [(label, bool(label) and holds) for label, holds in labels], tried
+
+
+def chosen_reduction(basis: Basis, solution: Solution) -> Reduction:
+    """What constraints leave to solve for, with the lights that `sparse` has chosen."""
+    assert solution.constraints is not None
+    reduction = reduce_to(solution.constraints, basis.lights)
+    if solution.constraints.sparse is None:
+        return reduction
+    weights = solution.lighting.weights_for(basis)
+    on = [k for k, (lights, _) in enumerate(reduction.knobs) if weights[list(lights)].any()]
+    return only(reduction, on)
 
 
 def _rgb(values: Floats) -> tuple[float, float, float]:

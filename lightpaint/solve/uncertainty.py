@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis, mix
+from lightpaint.solve.constrained import free_directions, preferring, solve_constrained
 from lightpaint.solve.lighting import LightSetting
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
 from lightpaint.solve.quadratic import UNREACHED
-from lightpaint.solve.solve import Solution, solution_of
+from lightpaint.solve.solve import Solution, chosen_reduction, solution_of
 from lightpaint.solve.solver import solve_normal_equations
 
 #: Standard errors on either side of a 95 % interval.
@@ -83,7 +84,8 @@ class Noise:
 def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
     """Standard error and bias of every weight that `solve` or `refine` found.
 
-    Lights that are kept or reach nothing have none.
+    Lights that are kept or reach nothing have none. Under constraints, what a limit holds has
+    none either: the error is of what is free to move there.
     """
     weights = solution.lighting.weights_for(basis)
     equations = solution.equations
@@ -93,6 +95,8 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
     step = solution.solved.b - np.einsum("cij,jc->ci", solution.solved.M, before) + lacking
     right = np.einsum("cij,jc->ci", corrected, before) + step
     unbiased = NormalEquations(corrected, right, equations.target_norm2)
+    if solution.constraints:
+        return _constrained_error_bars(basis, solution, noise, unbiased)
     bias = np.asarray(_solved(basis, unbiased, weights) - weights)
 
     scatter, excess = np.zeros_like(weights), np.zeros(3)
@@ -113,6 +117,34 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
             excess[c] += spread / len({c for _, cs in unknowns for c in cs})
     excess += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
     return Uncertainty(weights, scatter, bias, noise.objective_error, noise.objective_noise, excess)
+
+
+def _constrained_error_bars(
+    basis: Basis, solution: Solution, noise: Noise, unbiased: NormalEquations
+) -> Uncertainty:
+    """As `error_bars`, along the directions of the weights that constraints leave."""
+    assert solution.constraints is not None
+    weights = solution.lighting.weights_for(basis)
+    reduction = chosen_reduction(basis, solution)
+    solved = solution.solved if solution.refinement is None else unbiased
+    if strength := solution.constraints.prefer_current:
+        present = basis.present_weights
+        solved = preferring(solved, basis, present, strength)
+        unbiased = preferring(unbiased, basis, present, strength)
+    bias = solve_constrained(unbiased, reduction, weights).weights - weights
+    to = free_directions(solved, reduction, weights)
+    inverse = pseudo_inverse(to.T @ _block_diagonal(solved.M) @ to)
+    C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
+    covariance = to @ inverse @ C @ inverse @ to.T
+    n = len(weights)
+    scatter = np.sqrt(np.maximum(np.diag(covariance), 0)).reshape(3, n).T
+    by_channel = covariance.reshape(3, n, 3, n)
+    M = solution.equations.M
+    excess = np.array([(M[c] * by_channel[c, :, c]).sum() for c in range(3)])
+    excess += np.einsum("ic,cij,jc->c", bias, M, bias)
+    return Uncertainty(
+        weights, scatter, np.asarray(bias), noise.objective_error, noise.objective_noise, excess
+    )
 
 
 def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
