@@ -99,9 +99,10 @@ def missed_section(
 
 def _shares(diagnosis: Diagnosis) -> str:
     d = diagnosis
+    by_what = "by zero or by what is asked" if d.is_constrained else "needs light below zero"
     parts = [
         ("out of reach of any mix", d.unreachable),
-        ("forbidden: needs light below zero", d.forbidden),
+        (f"forbidden: {by_what}", d.forbidden),
         ("noise of the basis", d.noise),
     ]
     rows = [
