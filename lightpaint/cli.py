@@ -100,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     solve.add_argument(
         "--unpainted",
-        type=_weight,
+        type=_number(may_be_zero=True),
         default=0.0,
         metavar="W",
         help="weight of unpainted pixels against the current look (default: %(default)s)",
@@ -235,7 +235,7 @@ def _add_constraints(parser: argparse.ArgumentParser) -> None:
     add("--off", "NAME", str, "off")
     group.add_argument(
         "--prefer-current",
-        type=_weight,
+        type=_number(may_be_zero=True),
         default=0.0,
         metavar="STRENGTH",
         help="pull to the present lighting, like 0.01: where the painting leaves it open, "
@@ -270,7 +270,7 @@ def _add_budget(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--time",
         dest="time_s",
-        type=_seconds,
+        type=_number(" of seconds"),
         metavar="SECONDS",
         help="instead: render the basis for so long, besides what earlier runs have kept; "
         "compiling counts, the verification does not",
@@ -323,7 +323,7 @@ def _add_unit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--unit",
         dest="cd_per_unit",
-        type=_scale,
+        type=_number(" of cd/m²"),
         metavar="CD/M2",
         help="cd/m² that a radiance of 1 in the scene stands for, to have lumen, candela and lux "
         "(default: numbers in proportion, without a unit)",
@@ -412,34 +412,21 @@ class _at_least:  # noqa: N801 (used as a function)
         return value
 
 
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds > 0")
-    return value
+class _number:  # noqa: N801 (used as a function)
+    """A finite number > 0, or >= 0. about: what it is a number of, with a space before."""
 
+    def __init__(self, about: str = "", *, may_be_zero: bool = False) -> None:
+        self.about, self.may_be_zero = about, may_be_zero
 
-def _scale(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of cd/m² > 0")
-    return value
-
-
-def _weight(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number >= 0")
-    return value
+    def __call__(self, text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = -1.0
+        if not (0 < value < float("inf") or (self.may_be_zero and value == 0)):
+            bound = ">= 0" if self.may_be_zero else "> 0"
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number{self.about} {bound}")
+        return value
 
 
 if __name__ == "__main__":

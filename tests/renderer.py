@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint.basis.basis import Basis
 from lightpaint.scene.emitters import RGB
 from lightpaint.scene.scene import Scene
 
@@ -124,3 +125,13 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
     del loaded
     gc.collect()
     return np.array(planes).reshape(len(names), height, width, 3) / traced
+
+
+def same_basis(a: Basis, b: Basis) -> None:
+    """Assert that two bases are of the same samples."""
+    assert a.origin == b.origin
+    # float32 sums, once taken apart and put together again.
+    assert np.abs(a.images - b.images).max() <= 4 * SAME_SAMPLES * a.images.max()
+    gap = np.abs(a.half_differences - b.half_differences).max()
+    assert gap <= 4 * SAME_SAMPLES * a.images.max()
+    np.testing.assert_array_equal(a.emitters_seen, b.emitters_seen)

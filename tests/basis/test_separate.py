@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, write_room
+from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_room
 
 import lightpaint.scene.render
 from lightpaint.basis.basis import Basis, read_basis, write_basis
@@ -33,15 +33,6 @@ def small_passes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
     return load_scene(write_room(tmp_path, lights=THREE, integrator=VOLPATH))
-
-
-def same(a: Basis, b: Basis) -> None:
-    assert a.origin == b.origin
-    # float32 sums, once taken apart and put together again.
-    assert np.abs(a.images - b.images).max() <= 4 * SAME_SAMPLES * a.images.max()
-    gap = np.abs(a.half_differences - b.half_differences).max()
-    assert gap <= 4 * SAME_SAMPLES * a.images.max()
-    np.testing.assert_array_equal(a.emitters_seen, b.emitters_seen)
 
 
 def interrupted_after(passes: int, scene: Scene, kept: list[Basis], **budget: object) -> str:
@@ -96,7 +87,7 @@ def test_interrupted_and_gone_on_is_as_if_never_interrupted(
         write_basis(tmp_path / "part.exr", part)
         part = read_basis(tmp_path / "part.exr")
         assert part.origin == kept[-1].origin
-    same(render_basis(scene, spp=16, start=part), render_basis(scene, spp=16))
+    same_basis(render_basis(scene, spp=16, start=part), render_basis(scene, spp=16))
 
 
 def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
@@ -108,7 +99,7 @@ def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
     first = render_basis(scene, spp=8)
     more = render_basis(scene, spp=24, start=first, progress=count)
     assert sum(done > 0 for done in rendered) == 3 * 4
-    same(more, render_basis(scene, spp=24))
+    same_basis(more, render_basis(scene, spp=24))
 
 
 def test_nothing_is_mixed(scene: Scene, tmp_path: Path) -> None:
@@ -155,7 +146,7 @@ def test_a_time_is_kept_and_adds_samples(tmp_path: Path, integrator: str) -> Non
     more = obtain_basis(scene, time_s=0.1)
     assert more.origin.spp > first.origin.spp
     if integrator is VOLPATH:  # whose passes are as short for a number of samples
-        same(more, render_basis(scene, spp=more.origin.spp))
+        same_basis(more, render_basis(scene, spp=more.origin.spp))
 
 
 def test_a_time_goes_on_from_unequal_lights(scene: Scene) -> None:
@@ -166,7 +157,7 @@ def test_a_time_goes_on_from_unequal_lights(scene: Scene) -> None:
     whole = render_basis(scene, time_s=0.01, start=part)
     assert whole.origin.each_light == ()
     assert whole.origin.spp > 16
-    same(whole, render_basis(scene, spp=whole.origin.spp))
+    same_basis(whole, render_basis(scene, spp=whole.origin.spp))
 
 
 def test_a_budget_is_a_number_or_a_time(scene: Scene) -> None:
