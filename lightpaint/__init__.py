@@ -22,16 +22,19 @@ from lightpaint.basis.render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.images.display import display_picture
 from lightpaint.images.estimate import Estimate
-from lightpaint.pipeline import Look, paint_views_with_light, paint_with_light
+from lightpaint.pipeline import paint_views_with_light, paint_with_light
 from lightpaint.relight.relight import relight
 from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification, verify
+from lightpaint.results import Look
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.settings import Settings
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
-from lightpaint.solve.solve import Solution, solve, solve_views
+from lightpaint.solve.solve import Solution, solve
+from lightpaint.solve.views import solve_views
 from lightpaint.target.target import Target, read_target
 from lightpaint.version import __version__
 
@@ -43,6 +46,7 @@ __all__ = [
     "LightpaintError",
     "Look",
     "Scene",
+    "Settings",
     "Solution",
     "Target",
     "Verification",

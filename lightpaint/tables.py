@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.markup import escape
 
 from lightpaint import console
 from lightpaint.images.photometry import Photometry, photometry
-from lightpaint.pipeline import Look
 from lightpaint.relight.explanation import (
     how_sure,
     relative_errors,
@@ -17,6 +15,7 @@ from lightpaint.relight.explanation import (
 )
 from lightpaint.relight.verdict import agreement, energy_shares, verdict
 from lightpaint.relight.verify import Verification
+from lightpaint.results import Look
 from lightpaint.scene.emitters import MULTIPLE
 from lightpaint.scene.lights import WHOLE_EMISSION, Emitter, Light
 from lightpaint.scene.scene import Scene
@@ -110,7 +109,7 @@ def show_look(look: Look, folder: Path) -> None:
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
     asked = ["asked (* holds it)"] if held else []
     table = console.table(*headings, *amounts, *asked)
-    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
+    errors = relative_errors(look.uncertainty)
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else console.numbers(light.emission)
         if light.name in look.solution.quality.unreached and any(light.emission):
@@ -130,11 +129,9 @@ def show_look(look: Look, folder: Path) -> None:
         )
     console.print_table(table)
     console.write(verdict(look.solution, look.predicted, look.verification))
-    if look.diagnosis is not None:
-        for sentence in what_is_missed(look.diagnosis):
-            console.write(sentence)
-    if look.uncertainty is not None:
-        console.write(how_sure(look.basis, look.solution, look.uncertainty))
+    for sentence in what_is_missed(look.diagnosis):
+        console.write(sentence)
+    console.write(how_sure(look.basis, look.solution, look.uncertainty))
     console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
     if quality.curve:

@@ -19,7 +19,7 @@ from lightpaint import paint_with_light, read_basis
 from lightpaint.basis.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
-from lightpaint.pipeline import verify_result
+from lightpaint.results import verify_result
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 
@@ -457,7 +457,7 @@ def test_interrupted_keeps_what_is_done_and_goes_on(tmp_path: Path, delay_s: flo
 def test_killed_at_any_moment_leaves_a_readable_basis(tmp_path: Path, delay_s: float) -> None:
     code = f"""
 import lightpaint.scene.render, lightpaint as lp, sys
-from lightpaint.pipeline import obtain_basis
+from lightpaint.basis.obtain import obtain_basis
 sys.modules["lightpaint.basis.budget"].KEEP_EVERY_S = 0
 lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
 scene = lp.load_scene({str(CORNELL)!r})

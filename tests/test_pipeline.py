@@ -11,7 +11,7 @@ from lightpaint import pipeline
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.exr import Part, rgb_channels, write_parts
-from lightpaint.pipeline import VIEW_KEY, verify_result
+from lightpaint.results import VIEW_KEY, verify_result
 
 IMAGE = np.ones((2, 3, 3), np.float32)
 

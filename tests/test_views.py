@@ -13,13 +13,22 @@ from lightpaint.cli import main
 from lightpaint.errors import BasisError
 from lightpaint.images.exr import write_rgb
 from lightpaint.scene.scene import load_scene
+from lightpaint.solve.diagnosis import diagnose
 from lightpaint.solve.normal_equations import NormalEquations
-from lightpaint.solve.solve import solve, solve_views
+from lightpaint.solve.solve import problem_of, solution_of, solve
+from lightpaint.solve.uncertainty import error_bars
+from lightpaint.solve.views import joint_basis, joint_problem, solve_views
 from lightpaint.target.target import Target
 
 CLOSE = """<sensor type="perspective" id="close"><float name="fov" value="40"/>
     <transform name="to_world"><lookat origin="1 1 2" target="0 0.5 0" up="0 1 0"/></transform>
     <film type="hdrfilm"><integer name="width" value="14"/><integer name="height" value="10"/>
+    </film></sensor>"""
+
+
+SAME = """<sensor type="perspective" id="same"><float name="fov" value="50"/>
+    <transform name="to_world"><lookat origin="0 1 3.5" target="0 0.8 0" up="0 1 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="20"/>
     </film></sensor>"""
 
 
@@ -42,7 +51,7 @@ def test_a_lighting_that_both_views_show_comes_back(bases: list[Basis]) -> None:
     weights = np.random.default_rng(0).uniform(0.1, 2, (4, 3))
     views = [(basis, painting(basis, weights, "x")) for basis in bases]
     first, second = solve_views(views)
-    assert first.lighting == second.lighting
+    assert first.lighting.lights == second.lighting.lights
     # float32 pixels of the paintings.
     np.testing.assert_allclose(first.lighting.weights_for(bases[0]), weights, rtol=1e-4)
 
@@ -50,14 +59,15 @@ def test_a_lighting_that_both_views_show_comes_back(bases: list[Basis]) -> None:
 def test_views_add(bases: list[Basis]) -> None:
     rng = np.random.default_rng(1)
     views = [(basis, painting(basis, rng.uniform(0, 2, (4, 3)), "x")) for basis in bases]
-    solution = solve_views(views)[0]
+    solutions = solve_views(views)
+    solution = solutions[0]
     together = sum(
         (NormalEquations.of(b, t.image, t.importance) for b, t in views[1:]),
         NormalEquations.of(views[0][0], views[0][1].image, views[0][1].importance),
     )
     found = solution.lighting.weights_for(bases[0])
     best = together.objective(found).sum()
-    assert best == pytest.approx(sum(solution.quality.objective))
+    assert best == pytest.approx(sum(sum(s.quality.objective) for s in solutions))
     # No other lighting does better: not that of either view alone, nor any nearby.
     for basis, target in views:
         alone = solve(basis, target).lighting.weights_for(basis)
@@ -112,8 +122,78 @@ def test_from_the_command_line(
         (["camera.exr", "--target", "close=close.exr"], "at once"),
         (["--target", "close=close.exr", "--target", "close=close.exr"], "twice"),
         (["--target", "attic=close.exr"], "no sensor 'attic'"),
-        (["--target", "close=close.exr", "--refine", "1"], "--refine cannot be had"),
+        (["--target", "close=close.exr", "-s", "camera"], "-s cannot be had"),
         ([], "no painting"),
     ):
         assert main(["solve", str(room), *arguments, "--spp", "64"]) == 2
         assert words in capsys.readouterr().err
+
+
+def test_error_bars_are_those_of_all_views_together(bases: list[Basis]) -> None:
+    weights = np.random.default_rng(4).uniform(0.2, 2, (4, 3))
+    targets = [painting(basis, weights, "x") for basis in bases]
+
+    def errors(*views: int) -> np.ndarray:
+        whole, parts = joint_basis([bases[k] for k in views])
+        problems = [problem_of(p, targets[k]) for p, k in zip(parts, views, strict=True)]
+        solution = solution_of(whole, joint_problem(problems), start=whole.present_weights)
+        return error_bars(whole, solution).standard_error
+
+    alone = errors(0)
+    np.testing.assert_allclose(
+        alone, error_bars(bases[0], solve(bases[0], targets[0])).standard_error
+    )
+    # The same pixels once more leave the bias as it is, and take the scatter for independent.
+    ratio = errors(0, 0) / alone
+    assert (ratio < 1 + 1e-9).all()
+    assert (ratio > np.sqrt(0.5) - 1e-9).all()
+
+
+def test_error_bars_of_two_views_hold(room: Path) -> None:
+    scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
+    weights = np.random.default_rng(6).uniform(0.2, 2, (4, 3))
+    targets = [painting(render_basis(s, spp=2048, seed=99), weights, "x") for s in scenes]
+    inside = []
+    for seed in range(12):
+        whole, parts = joint_basis([render_basis(s, spp=16, seed=seed) for s in scenes])
+        problems = [problem_of(p, t) for p, t in zip(parts, targets, strict=True)]
+        solution = solution_of(whole, joint_problem(problems), start=whole.present_weights)
+        low, high = error_bars(whole, solution).interval
+        inside.append((low <= weights) & (weights <= high))
+    # 95 % are to be; 144 values, those of one seed and light together, so that some 36 count.
+    assert 0.85 <= np.mean(inside) <= 0.995
+
+
+def test_what_is_given_up_for_other_views(bases: list[Basis]) -> None:
+    rng = np.random.default_rng(5)
+    views = [(basis, painting(basis, rng.uniform(0, 2, (4, 3)), "x")) for basis in bases]
+    for (basis, target), solution in zip(views, solve_views(views), strict=True):
+        told, alone = diagnose(basis, target, solution), solve(basis, target)
+        parts = told.unreachable + told.forbidden + told.compromise + told.noise
+        assert parts == pytest.approx(told.total)
+        gap = sum(solution.quality.objective) - sum(alone.quality.objective)
+        assert told.compromise == pytest.approx(gap, rel=1e-3)
+        assert told.compromise > 0.1 * told.total
+        # Each is met by itself, so that nothing else can be in the way.
+        assert told.forbidden < 1e-3 * told.total
+
+
+def test_bases_share_the_memory_of_the_joint_one(bases: list[Basis]) -> None:
+    whole, parts = joint_basis(bases)
+    for part, basis in zip(parts, bases, strict=True):
+        np.testing.assert_array_equal(part.images, basis.images)
+        np.testing.assert_array_equal(part.half_differences, basis.half_differences)
+        assert np.shares_memory(part.images, whole.images)
+    # What fills the last row is dark.
+    assert whole.images.sum() == pytest.approx(sum(b.images.sum() for b in bases), rel=1e-5)
+
+
+def test_views_share_no_random_numbers(tmp_path: Path) -> None:
+    # Two sensors at one place see one picture, and their noise is not the same.
+    room = write_room(tmp_path, lights=LIGHTS["sky"], sensors=SAME)
+    a, b = (render_basis(load_scene(room, sensor=k), spp=16) for k in (0, 1))
+    x, y = np.sign(a.half_differences.ravel()), np.sign(b.half_differences.ravel())
+    noisy = (x != 0) & (y != 0)
+    assert noisy.sum() > 300
+    # Channels go together, so that a third of them counts: 5 standard errors.
+    assert abs((x * y)[noisy].mean()) < 5 / np.sqrt(noisy.sum() / 3)

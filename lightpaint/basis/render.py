@@ -9,7 +9,7 @@ from lightpaint.basis.budget import Budget, Keeper, passes
 from lightpaint.basis.separate import LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
-from lightpaint.scene.render import SAMPLES_PER_PASS
+from lightpaint.scene.render import SAMPLES_PER_PASS, view_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 
@@ -168,7 +168,8 @@ def _render_together(
 
     height, width = scene.size
     sums = HalfSums(len(scene.lights), scene.size) if start is None else HalfSums.of(start)
-    tracer = Tracer(scene, seed, start.learned if start is not None else None)
+    numbers = view_seed(seed, scene.sensor)
+    tracer = Tracer(scene, numbers, start.learned if start is not None else None)
 
     def basis(*, is_last: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
@@ -226,7 +227,8 @@ def _render_one_by_one(
         origin = replace(nothing, **sums.counts())
         return Basis(basis_lights(scene), images, half_differences, seen, origin)
 
+    numbers = view_seed(seed, scene.sensor)
     render_separately(
-        scene, budget, seed=seed, sums=sums, basis=basis, keeper=keeper, progress=progress
+        scene, budget, seed=numbers, sums=sums, basis=basis, keeper=keeper, progress=progress
     )
     return basis()

@@ -80,6 +80,7 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
         "only light below zero could"
         if not d.is_constrained
         else "what is asked of the lights, or zero, forbids": d.forbidden,
+        "is given up for the other views": d.compromise,
         "is noise of the basis": d.noise,
     }
     told = [

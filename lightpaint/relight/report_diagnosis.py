@@ -49,15 +49,14 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     ]
     more = int((errors > 0).sum()) - len(rows)
     others = f" {more} lights that matter less are left out." if more > 0 else ""
-    norm2 = max(float(solution.equations.target_norm2.sum()), np.finfo(np.float64).tiny)
-    excess = float(np.sqrt(uncertainty.excess.sum() / norm2))
     return (
         '<section><h2>How sure</h2><div class="explained">'
         f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
         "<p>The table shows the brightness of each light, and between which values many samples "
         "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
         "yet make up for each other in the picture: together these errors miss about "
-        f"{spoken_percent(excess)} of the painted light (RMS).{others}</p>{_steps(solution)}</div>"
+        f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).{others}</p>"
+        f"{_steps(solution)}</div>"
         '<table><thead><tr><th scope="col">light</th><th scope="col">solved</th>'
         '<th scope="col">95 % between</th><th scope="col">of it</th>'
         f'<th scope="col">of the picture</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
@@ -105,6 +104,8 @@ def _shares(diagnosis: Diagnosis) -> str:
         (f"forbidden: {by_what}", d.forbidden),
         ("noise of the basis", d.noise),
     ]
+    if d.compromise > 0:
+        parts.insert(2, ("given up for the other views", d.compromise))
     rows = [
         f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(d.share(part))}'
         '</span><div class="bar" aria-hidden="true">'
@@ -130,7 +131,8 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: f
         (
             "Forbidden",
             diagnosis.forbidden_map,
-            "What only light below zero, or beyond what is asked, would mend.",
+            "What only light below zero, or beyond what is asked, would mend."
+            + " So is what other views ask for." * (diagnosis.compromise > 0),
         ),
     ]
     counted = solution.importance > 0
@@ -140,7 +142,7 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: f
     grey = unpainted_look(current, stops=stops)
     figures = []
     for name, image, caption in parts:
-        if name == "Forbidden" and diagnosis.share(diagnosis.forbidden) < SMALLEST_GAIN:
+        if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:
             continue  # an empty picture
         # As in the residual's map: predicted − painted, so that bright is too bright.
         colours = diverging(-luminance(image) / limit)

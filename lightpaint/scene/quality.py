@@ -35,21 +35,16 @@ class Preset:
 PRESETS: dict[Quality, Preset] = {"preview": Preset(64, 2**15), "final": Preset(512)}
 
 
-def with_quality(
-    scene: Scene,
-    quality: Quality | None,
-    *,
-    spp: int | None = None,
-    time_s: float | None = None,
-    resolution: str | None = None,
-) -> tuple[Scene, int | None]:
-    """The scene to render a basis of, and its samples per pixel: the preset's where none is given.
+def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Scene:
+    """`scene` on the film that a basis is rendered on: `resolution`, else the preset's.
 
-    With `time_s` there is no number of samples. Raises SceneError for a resolution that does
-    not divide the film.
+    Raises SceneError for a resolution that does not divide the film.
     """
-    if quality is not None:
-        preset = PRESETS[quality]
-        resolution = resolution or f"1/{preset.reduction(scene.view)}"
-        spp = preset.spp if spp is None and time_s is None else spp
-    return (scene if resolution is None else scene.reduced(resolution)), spp
+    if resolution is None and quality is not None:
+        resolution = f"1/{PRESETS[quality].reduction(scene.view)}"
+    return scene if resolution is None else scene.reduced(resolution)
+
+
+def samples(quality: Quality | None, *, spp: int | None, time_s: float | None) -> int | None:
+    """Samples per pixel of a basis: the preset's where neither they nor a time are given."""
+    return PRESETS[quality].spp if quality is not None and spp is None and time_s is None else spp

@@ -29,11 +29,17 @@ class Stream(IntEnum):
     NUMBERS = 3
     SECOND_VERIFICATION = 4
     REFINEMENT = 5
+    VIEW = 6
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:
     """The 32-bit seed of pass `index`: unrelated for any other seed, stream or index."""
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
+
+
+def view_seed(seed: int, sensor: int) -> int:
+    """The seed of a view: no two share random numbers, so that their noise is independent."""
+    return seed if sensor == 0 else pass_seed(seed, Stream.VIEW, sensor)
 
 
 def largest_pass(pixels: int, *, shorter: int = 1) -> int:

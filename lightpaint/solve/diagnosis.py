@@ -5,7 +5,8 @@ With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to 
     ‖Ψ − ΣwΦ‖² = ‖Ψ − ΣuΦ‖² + ‖Σ(u − w)Φ‖²
 
 exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
-noise of the prediction adds to the first is taken out of it.
+noise of the prediction adds to the first is taken out of it. Where the lighting answers several
+views, part of the second is what the best lighting for this view alone would not have missed.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from lightpaint.images.color import luminance
 from lightpaint.images.exr import Floats
 from lightpaint.solve.lighting import combine
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
-from lightpaint.solve.solve import Solution
+from lightpaint.solve.solve import Solution, solution_of
 from lightpaint.solve.solver import solve_normal_equations
 from lightpaint.solve.uncertainty import pseudo_inverse, unknown_groups
 from lightpaint.target.target import Target
@@ -67,7 +68,8 @@ class Diagnosis:
     """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and where it comes from.
 
     unreachable: what no weights of any sign can reach. forbidden: what they can and w >= 0
-    cannot. noise: what the basis' own noise adds. The three sum to `total`.
+    cannot. compromise: what the best lighting for this view alone would not miss; 0 where
+    there is one view. noise: what the basis' own noise adds. The four sum to `total`.
     ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
     norm2: ‖Ψ‖², to hold them against.
     unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
@@ -88,6 +90,12 @@ class Diagnosis:
     bounds: tuple[Bound, ...]
     place: Place | None
     is_constrained: bool = False
+    compromise: float = 0.0
+
+    @property
+    def avoidable(self) -> float:
+        """Energy of `forbidden_map`: what some weights of any sign would not miss."""
+        return self.forbidden + self.compromise
 
     def share(self, part: float) -> float:
         """`part` of what is missed, 0 to 1."""
@@ -118,20 +126,32 @@ def diagnose(basis: Basis, target: Target, solution: Solution) -> Diagnosis:
     # Where nothing was painted no colour is missed either.
     uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
     outside = target.image.astype(np.float64) - predicted.image
+    is_simple = not (solution.constraints or solution.is_one_of_several)
+    compromise = min(_given_up(basis, solution, weights), total - out_of_reach)
     return Diagnosis(
         total=total,
         unreachable=out_of_reach - noise,
-        forbidden=total - out_of_reach,
+        forbidden=total - out_of_reach - compromise,
+        compromise=compromise,
         noise=noise,
         ignored=float((uncounted[..., None] * np.square(outside)).sum()),
         norm2=float((D * np.square(solution.image, dtype=np.float64)).sum()),
         unreachable_map=unreachable,
         forbidden_map=forbidden,
         ignored_map=uncounted * luminance(outside),
-        bounds=() if solution.constraints else _bounds(basis, solution, weights),
+        bounds=_bounds(basis, solution, weights) if is_simple else (),
         is_constrained=bool(solution.constraints),
         place=_place(solution, unreachable) if out_of_reach > noise else None,
     )
+
+
+def _given_up(basis: Basis, solution: Solution, weights: Doubles) -> float:
+    """By how much the objective of this view exceeds that of the best lighting for it alone."""
+    if not solution.is_one_of_several:
+        return 0.0
+    alone = solution_of(basis, solution, start=weights)
+    gap = sum(solution.quality.objective) - sum(alone.quality.objective)
+    return max(gap, 0.0)
 
 
 def of_any_sign(basis: Basis, solution: Solution) -> Doubles:

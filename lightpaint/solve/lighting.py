@@ -14,7 +14,7 @@ from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.photometry import Photometry, photometry
-from lightpaint.solve.normal_equations import Doubles
+from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
@@ -88,6 +88,12 @@ class Quality:
     converged: bool
     unreached: tuple[str, ...] = ()
     curve: tuple[tuple[int, float], ...] = ()
+
+    def of(self, equations: NormalEquations, weights: Doubles) -> "Quality":
+        """With the objective that `weights` (n, 3) have in `equations`."""
+        objective = equations.objective(weights)
+        norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
+        return replace(self, objective=_rgb(objective), relative_objective=_rgb(objective / norm))
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,10 @@
 """From basis and painting to lighting, in one call."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import BasisError
 from lightpaint.images.exr import Floats
 from lightpaint.solve.constrained import preferring, pulled, solve_constrained, solve_sparse
 from lightpaint.solve.constraints import Constraints
@@ -46,6 +44,8 @@ class Solution:
     constraints: what was asked of the lights beside being not negative.
     noise_removed: the part of the noise in `equations` that is not in `solved`.
     refinement: the last step by which the answer was improved, if it was.
+    is_one_of_several: whether the lighting answers other views too, so that it need not be the
+    best for this one.
     """
 
     lighting: Lighting
@@ -57,6 +57,7 @@ class Solution:
     constraints: Constraints | None = None
     noise_removed: float = 0.0
     refinement: Refinement | None = None
+    is_one_of_several: bool = False
 
     @property
     def quality(self) -> Quality:
@@ -85,55 +86,19 @@ def solve(
     Raises SizeError if basis and target differ in size, TargetError if nothing counts,
     ConstraintError if a constraint does not fit the lights.
     """
-    [solution] = solve_views(
-        [(basis, target)], constraints=constraints, unpainted=unpainted, start=start
-    )
-    return solution
+    problem = problem_of(basis, target, constraints=constraints, unpainted=unpainted)
+    begin = basis.present_weights if start is None else start.weights_for(basis)
+    return solution_of(basis, problem, start=begin)
 
 
-def solve_views(
-    views: Sequence[tuple[Basis, Target]],
+def problem_of(
+    basis: Basis,
+    target: Target,
     *,
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
-    start: Lighting | None = None,
-) -> list[Solution]:
-    """Find the one lighting that comes closest to the targets of several views together.
-
-    views: basis and target of each, the bases all of the same lights. The normal equations of
-    the views add, so that a pixel counts the same in whichever view it is.
-    Returns a solution for each view, all with the same lighting, whose quality is that of all
-    views together. Other arguments and errors as of `solve`, and BasisError for other lights.
-    """
-    first = views[0][0]
-    for basis, _ in views[1:]:
-        check_same_lights(first, basis)
-    problems = [_problem(basis, target, constraints, unpainted) for basis, target in views]
-    together = problems[0].equations
-    for problem in problems[1:]:
-        together += problem.equations
-    begin = first.present_weights if start is None else start.weights_for(first)
-    joint = replace(problems[0], equations=together, solved=together)
-    lighting = solution_of(first, joint, start=begin).lighting
-    names = [target.name for _, target in views]
-    lighting = replace(lighting, target=" + ".join(names))
-    return [replace(problem, lighting=lighting) for problem in problems]
-
-
-def check_same_lights(a: Basis, b: Basis) -> None:
-    """Raise BasisError unless two bases have the same lights in the same units."""
-    told = [[(x.name, x.unit, x.members, x.is_fixed) for x in basis.lights] for basis in (a, b)]
-    if told[0] != told[1]:
-        raise BasisError(
-            f"the bases of {a.origin.sensor} and {b.origin.sensor} have other lights, "
-            f"{', '.join(a.names)} and {', '.join(b.names)}: make both of one scene"
-        )
-
-
-def _problem(
-    basis: Basis, target: Target, constraints: Constraints | None, unpainted: float
 ) -> Solution:
-    """What is to be solved, with the present lighting for an answer."""
+    """What is to be solved, with the present lighting for an answer. As of `solve`."""
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     counted = np.where(importance > 0, importance, 1)
@@ -160,20 +125,19 @@ def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
         result = _solve_free(problem.solved, basis, start)
     weights = result.weights
 
-    objective = equations.objective(weights)
     norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
     unreached = tuple(name for name, ok in zip(basis.names, result.reached, strict=True) if not ok)
     quality = Quality(
         kkt_residual=_rgb(result.kkt_residual),
-        objective=_rgb(objective),
-        relative_objective=_rgb(objective / norm),
+        objective=(0, 0, 0),
+        relative_objective=(0, 0, 0),
         sweeps=result.sweeps,
         converged=result.converged,
         unreached=unreached,
         curve=tuple(
             (count, float(np.sqrt(equations.objective(w).sum() / norm.sum()))) for count, w in tried
         ),
-    )
+    ).of(equations, weights)
     target = problem.lighting.target
     lighting = Lighting.of_weights(basis, weights, asked=asked, target=target, quality=quality)
     return replace(problem, lighting=lighting)

@@ -43,7 +43,8 @@ class Uncertainty:
     objective_error: (3,), standard deviation of the objective; objective_noise: (3,), what
     the prediction's own noise adds to it.
     excess: (3,), by how much the objective of these weights, were they rendered without
-    noise, may be expected to exceed the least possible.
+    noise, may be expected to exceed the least possible. target_norm2: (3,), ‖Ψ‖², to hold
+    it against.
     """
 
     weights: Doubles
@@ -52,6 +53,13 @@ class Uncertainty:
     objective_error: Doubles
     objective_noise: Doubles
     excess: Doubles
+    target_norm2: Doubles
+
+    @property
+    def relative_excess(self) -> float:
+        """What these errors miss of the painting, root mean square."""
+        norm2 = float(self.target_norm2.sum())
+        return float(np.sqrt(self.excess.sum() / norm2)) if norm2 > 0 else 0.0
 
     @property
     def standard_error(self) -> Doubles:
@@ -116,7 +124,15 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
         for c in {c for _, cs in unknowns for c in cs}:
             excess[c] += spread / len({c for _, cs in unknowns for c in cs})
     excess += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
-    return Uncertainty(weights, scatter, bias, noise.objective_error, noise.objective_noise, excess)
+    return Uncertainty(
+        weights,
+        scatter,
+        bias,
+        noise.objective_error,
+        noise.objective_noise,
+        excess,
+        equations.target_norm2,
+    )
 
 
 def _constrained_error_bars(
@@ -143,7 +159,13 @@ def _constrained_error_bars(
     excess = np.array([(M[c] * by_channel[c, :, c]).sum() for c in range(3)])
     excess += np.einsum("ic,cij,jc->c", bias, M, bias)
     return Uncertainty(
-        weights, scatter, np.asarray(bias), noise.objective_error, noise.objective_noise, excess
+        weights,
+        scatter,
+        np.asarray(bias),
+        noise.objective_error,
+        noise.objective_noise,
+        excess,
+        solution.equations.target_norm2,
     )
 
 

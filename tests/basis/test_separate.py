@@ -11,10 +11,10 @@ from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_roo
 
 import lightpaint.scene.render
 from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.obtain import obtain_basis
 from lightpaint.basis.render import ONE_PASS, SEPARATE, render_basis
 from lightpaint.basis.separate import BLACK, WHITE
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.pipeline import obtain_basis
 from lightpaint.progress import Interrupted
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene, load_scene

@@ -7,9 +7,9 @@ import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
 from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.obtain import obtain_basis
 from lightpaint.basis.render import SEPARATE, is_of, render_basis
 from lightpaint.basis.separate import BLACK, WHITE
-from lightpaint.pipeline import obtain_basis
 from lightpaint.scene.emitters import MULTIPLE
 from lightpaint.scene.scene import Scene, load_scene
 

@@ -40,7 +40,7 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
         basis = lp.render_basis(scene, spp=16, seed=seed)
         plain = solve(basis, target)
         found = {"plain": plain, "corrected": correct_noise(basis, plain)}
-        found["refined"] = refine_by_rendering(scene, basis, plain, rounds=1, seed=seed)
+        found["refined"] = refine_by_rendering([(scene, basis)], basis, plain, rounds=1, seed=seed)
         for name, solution in found.items():
             low, high = error_bars(basis, solution).interval
             inside = (low <= truth + 1e-12) & (truth <= high + 1e-12)

@@ -1,0 +1,167 @@
+"""What a solve leaves in its folder, and what is read back from there."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import ImageError, OutputError
+from lightpaint.files import write_text
+from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
+from lightpaint.progress import Progress, silent
+from lightpaint.relight.comparison import write_comparison
+from lightpaint.relight.report import report_page
+from lightpaint.relight.verify import Verification, verify
+from lightpaint.scene.render import Stream
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.solve.diagnosis import Diagnosis
+from lightpaint.solve.indistinguishable import Ambiguity
+from lightpaint.solve.lighting import Lighting
+from lightpaint.solve.solve import Solution
+from lightpaint.solve.uncertainty import Uncertainty
+from lightpaint.target.target import Target
+
+#: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
+VIEW_KEY = "lightpaint.view"
+
+#: What every solve writes.
+ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html")
+
+#: What each view has where there are several.
+VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html")
+
+#: What a solve and a relight write, and the next solve replaces.
+RESULTS = (
+    "lighting.json",
+    "predicted.exr",
+    "verified.exr",
+    "comparison.png",
+    "report.html",
+    "relit.xml",
+    "relit.png",
+    "relit.exr",
+    "relit.*.exr",
+)
+
+
+@dataclass(frozen=True)
+class Look:
+    """One painting and its answer.
+
+    relit and verification are None where there was only a saved basis and no scene.
+    uncertainty: how sure the lights are; diagnosis: why the painting is not met; ambiguities:
+    lights that it cannot tell apart, of several views in none of them.
+    """
+
+    target: Target
+    basis: Basis
+    solution: Solution
+    predicted: Estimate
+    relit: Scene | None
+    verification: Verification | None
+    uncertainty: Uncertainty
+    diagnosis: Diagnosis
+    ambiguities: tuple[Ambiguity, ...] = ()
+
+    @property
+    def lighting(self) -> Lighting:
+        """The lighting that comes closest to the target."""
+        return self.solution.lighting
+
+
+def earlier_results(folder: Path) -> list[Path]:
+    """What an earlier solve left in `folder`: results of two never stand together."""
+    if not (folder / "lighting.json").is_file():
+        return []  # somebody else's files, whatever they are called
+    return [file for pattern in RESULTS for file in folder.glob(pattern)]
+
+
+def result_folders(folder: Path) -> list[Path]:
+    """`folder` itself, or where it holds several views the folders of these."""
+    if (folder / "predicted.exr").is_file() or not (folder / "relit.xml").is_file():
+        return [folder]
+    return sorted(file.parent for file in folder.glob("*/predicted.exr")) or [folder]
+
+
+def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -> None:
+    """predicted.exr, with a note of how to see the relit scene as the basis saw it."""
+    write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
+
+
+def show_look(look: Look, folder: Path, *, command: str) -> None:
+    """Write the pictures people look at: comparison.png and report.html."""
+    verified = look.verification.verified.image if look.verification else None
+    write_comparison(
+        folder / "comparison.png",
+        basis=look.basis,
+        target=look.target,
+        solution=look.solution,
+        predicted=look.predicted.image,
+        verified=verified,
+    )
+    page = report_page(
+        basis=look.basis,
+        target=look.target,
+        solution=look.solution,
+        predicted=look.predicted,
+        verification=look.verification,
+        command=command,
+        uncertainty=look.uncertainty,
+        diagnosis=look.diagnosis,
+    )
+    write_text(folder / "report.html", page)
+
+
+def verify_result(
+    folder: str | Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Verification:
+    """Render the relit.xml of a result folder anew and compare it with its predicted.exr.
+
+    spp: samples per pixel (those that predicted.exr was solved with by default).
+    Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
+    """
+    folder = Path(folder)
+    relit_xml = folder / "relit.xml"
+    if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
+        relit_xml = folder.parent / "relit.xml"  # one of several views
+    missing = [file.name for file in (folder / "predicted.exr", relit_xml) if not file.is_file()]
+    if missing:
+        raise OutputError(
+            f"{folder} is no result folder with a relit scene: it has no "
+            f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
+        )
+    path = folder / "predicted.exr"
+    predicted, attributes = read_estimate_with_attributes(path)
+    sensor, solved_spp = _read_view(path, attributes.get(VIEW_KEY, "{}"))
+    relit = load_scene(relit_xml, sensor=sensor, use_lights_file=False)
+    return verify(
+        predicted,
+        relit,
+        spp=solved_spp if spp is None else spp,
+        seed=seed,
+        stream=Stream.SECOND_VERIFICATION,
+        progress=progress,
+    )
+
+
+def _read_view(path: Path, text: str) -> tuple[str | None, int | None]:
+    """Sensor and samples per pixel that `path` notes under VIEW_KEY; None for what it lacks."""
+    try:
+        view = json.loads(text)
+        if not isinstance(view, dict):
+            raise TypeError(f"{view!r} is not an object")
+        sensor, spp = view.get("sensor"), view.get("spp")
+        if not (sensor is None or isinstance(sensor, str)):
+            raise TypeError(f"sensor is a name, not {sensor!r}")
+        # A type and no isinstance: true would pass for the number 1.
+        if not (spp is None or (type(spp) is int and spp > 0)):
+            raise TypeError(f"spp is a whole number > 0, not {spp!r}")
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ImageError(
+            f"{path} is damaged in its attribute {VIEW_KEY}: {error}; solve again"
+        ) from None
+    return sensor, spp

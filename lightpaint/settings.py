@@ -1,0 +1,54 @@
+"""What can be asked of a solve beside scene and painting."""
+
+from dataclasses import dataclass
+
+from lightpaint.scene.quality import Quality
+from lightpaint.solve.constraints import Constraints
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a painting is to be answered.
+
+    What is solved:
+    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
+    unpainted: weight of unpainted pixels against the current look.
+    resize: whether a target of another size is resampled.
+
+    What is rendered:
+    spp, seed: of the basis and, with other random numbers, of the verification.
+    time_s: instead of spp, seconds in which the basis is rendered, of all views together.
+    resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
+    verification has the whole film.
+    quality: preset of spp and resolution, where these are not given. With a time or a preset
+    the verification has about as many samples as the basis, whatever the resolution.
+    use_cache: whether a basis from an earlier run is taken, and this one kept.
+
+    What is done against noise:
+    noise_correction: whether the noise's power, or part of it, is taken out of the equations.
+    refine: how often to render the scene as solved, with as many samples as the basis, and
+    improve the answer by what that shows; needs a scene.
+
+    What is said:
+    cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
+    command: the shell command that asks for this, for the report.
+    """
+
+    constraints: Constraints | None = None
+    unpainted: float = 0.0
+    resize: bool = False
+    spp: int | None = None
+    time_s: float | None = None
+    seed: int = 0
+    resolution: str | None = None
+    quality: Quality | None = None
+    use_cache: bool = True
+    noise_correction: bool = False
+    refine: int = 0
+    cd_per_unit: float | None = None
+    command: str = ""
+
+    @property
+    def checks_as_basis(self) -> bool:
+        """Whether the verification has as many samples as the basis, whatever their films."""
+        return self.spp is None and (self.time_s is not None or self.quality is not None)

@@ -1,0 +1,150 @@
+"""Several views of a scene as one long picture, so that what holds for one holds for all.
+
+A pixel counts the same in whichever view it is, and neither the normal equations nor the noise
+in them asks where a pixel lies. Put behind each other, the pixels of all views are one picture,
+and the solve, its error bars and its refinement need not know of views at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import BasisError
+from lightpaint.images.estimate import Estimate
+from lightpaint.solve.constraints import Constraints
+from lightpaint.solve.lighting import Lighting
+from lightpaint.solve.solve import Solution, problem_of, solution_of
+from lightpaint.target.target import Target
+
+#: Pixels in a row of the long picture. The last row is filled with pixels that count nothing.
+ROW = 2**10
+
+
+def solve_views(
+    views: Sequence[tuple[Basis, Target]],
+    *,
+    constraints: Constraints | None = None,
+    unpainted: float = 0.0,
+    start: Lighting | None = None,
+) -> list[Solution]:
+    """Find the one lighting that comes closest to the targets of several views together.
+
+    views: basis and target of each, the bases all of the same lights. The normal equations of
+    the views add, so that a pixel counts the same in whichever view it is.
+    Returns a solution for each view, all with the same lights. Other arguments and errors as
+    of `solve`, and BasisError for other lights.
+    """
+    basis, bases = joint_basis([basis for basis, _ in views])
+    problems = [
+        problem_of(basis, target, constraints=constraints, unpainted=unpainted)
+        for basis, (_, target) in zip(bases, views, strict=True)
+    ]
+    begin = basis.present_weights if start is None else start.weights_for(basis)
+    return parted(solution_of(basis, joint_problem(problems), start=begin), problems)
+
+
+def check_same_lights(a: Basis, b: Basis) -> None:
+    """Raise BasisError unless two bases have the same lights in the same units."""
+    told = [[(x.name, x.unit, x.members, x.is_fixed) for x in basis.lights] for basis in (a, b)]
+    if told[0] != told[1]:
+        raise BasisError(
+            f"the bases of {a.origin.sensor} and {b.origin.sensor} have other lights, "
+            f"{', '.join(a.names)} and {', '.join(b.names)}: make both of one scene"
+        )
+
+
+def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, list[Basis]]:
+    """The basis of all views together, n long pictures, and the bases again.
+
+    Those returned look at the memory of the joint one, so that whoever lets go of those given
+    holds every pixel once. Raises BasisError if their lights are not the same.
+    """
+    first = bases[0]
+    if len(bases) == 1:
+        return first, [first]
+    for basis in bases[1:]:
+        check_same_lights(first, basis)
+    ends = np.cumsum([0, *(basis.emitters_seen.size for basis in bases)])
+    rows = -(-int(ends[-1]) // ROW)
+    planes = np.zeros((2, len(first.lights), rows * ROW, 3), np.float32)
+    for basis, (start, end) in zip(bases, pairwise(ends), strict=True):
+        for plane, images in zip(planes, (basis.images, basis.half_differences), strict=True):
+            plane[:, start:end] = images.reshape(len(plane), -1, 3)
+    images, half_differences = planes.reshape(2, -1, rows, ROW, 3)
+    joint = replace(
+        first,
+        images=images,
+        half_differences=half_differences,
+        emitters_seen=_in_rows([basis.emitters_seen for basis in bases]),
+        learned=None,
+    )
+    views = [
+        replace(
+            basis,
+            images=planes[0, :, start:end].reshape(basis.images.shape),
+            half_differences=planes[1, :, start:end].reshape(basis.images.shape),
+        )
+        for basis, (start, end) in zip(bases, pairwise(ends), strict=True)
+    ]
+    return joint, views
+
+
+def joint_problem(problems: Sequence[Solution]) -> Solution:
+    """The problem of all views together, for their joint basis; itself if there is one."""
+    first = problems[0]
+    if len(problems) == 1:
+        return first
+    names = [problem.lighting.target for problem in problems]
+    equations = first.equations
+    for problem in problems[1:]:
+        equations += problem.equations
+    return replace(
+        first,
+        lighting=replace(first.lighting, target=" + ".join(names)),
+        image=_in_rows([problem.image for problem in problems]),
+        importance=_in_rows([problem.importance for problem in problems]),
+        current_share=_in_rows([problem.current_share for problem in problems]),
+        equations=equations,
+        solved=equations,
+    )
+
+
+def joint_estimate(estimates: Sequence[Estimate]) -> Estimate:
+    """Renders of all views, in the shape of their joint basis."""
+    if len(estimates) == 1:
+        return estimates[0]
+    return Estimate(
+        _in_rows([estimate.image for estimate in estimates]),
+        _in_rows([estimate.half_difference for estimate in estimates]),
+    )
+
+
+def parted(joint: Solution, problems: Sequence[Solution]) -> list[Solution]:
+    """Of each view its own problem, with the lighting that solves all of them.
+
+    The quality says what that lighting misses of the view; its optimality is the joint one's.
+    """
+    if len(problems) == 1:
+        return [joint]
+    weights = np.array([light.weight for light in joint.lighting.lights])
+    views = []
+    for problem in problems:
+        lighting = replace(
+            joint.lighting,
+            target=problem.lighting.target,
+            quality=joint.quality.of(problem.equations, weights),
+        )
+        views.append(replace(problem, lighting=lighting, is_one_of_several=True))
+    return views
+
+
+def _in_rows(images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """(rows, ROW, …) of images (h, w, …), zero where the last row is filled."""
+    pixels = np.concatenate([x.reshape(-1, *x.shape[2:]) for x in images])
+    fill = np.zeros((-len(pixels) % ROW, *pixels.shape[1:]), pixels.dtype)
+    return np.concatenate([pixels, fill]).reshape(-1, ROW, *pixels.shape[1:])

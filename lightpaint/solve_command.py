@@ -1,0 +1,165 @@
+"""`lightpaint solve`: from what was painted, in one view or several, to results in folders."""
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from lightpaint import console, tables
+from lightpaint.basis.basis import is_basis_file, read_basis
+from lightpaint.basis.render import basis_lights
+from lightpaint.errors import BasisError, TargetError
+from lightpaint.files import check_writable
+from lightpaint.given import constraints_of, folders_of, load, render_or_find
+from lightpaint.pipeline import (
+    all_constraints,
+    command_line,
+    paint_views_with_light,
+    paint_with_light,
+)
+from lightpaint.relight.relight import check_relightable
+from lightpaint.scene.quality import on_film
+from lightpaint.scene.scene import Scene
+from lightpaint.solve.constraints_file import read_constraints
+from lightpaint.solve.reduction import reduce_to
+from lightpaint.target.target import Target, read_target
+
+
+def solve(options: Namespace, given: list[str]) -> int:
+    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`"""
+    if options.views and options.targets:
+        raise TargetError("TARGET and --target at once: give every painting with its sensor")
+    paths = options.targets or [path for _, path in options.views]
+    if not paths:
+        raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
+    # Everything a user gave is looked at before the first sample is taken.
+    masks = _one_for_each(options.masks or [None], paths)
+    targets = [read_target(t, mask=m) for t, m in zip(paths, masks, strict=True)]
+    if options.views:
+        return _solve_views(options, targets, given)
+    return _solve_each(options, targets, given)
+
+
+def _solve_each(options: Namespace, targets: list[Target], given: list[str]) -> int:
+    """One lighting for each painting, all of one view."""
+    folders = folders_of(options.output, [Path(path).stem for path in options.targets])
+    constraints = constraints_of(options)
+    scene, made = None, None
+    source = Path(options.source)
+    if is_basis_file(source):
+        _check_nothing_to_render(options)
+        made = read_basis(source)
+        if options.lights_file:
+            constraints = read_constraints(options.lights_file).and_then(constraints)
+        reduce_to(constraints, made.lights)
+        size = made.size
+    else:
+        scene = on_film(load(options, path=source), options.quality, options.resolution)
+        reduce_to(all_constraints(scene, constraints), basis_lights(scene))
+        size = scene.size
+    targets = [_fitted(target, size, options) for target in targets]
+    for folder in folders:
+        check_writable(folder)
+        if scene is not None:
+            check_relightable(scene, folder / "relit.xml")
+    for target, folder in zip(targets, folders, strict=True):
+        if made is None and scene is not None:
+            made = render_or_find(scene, options)
+        with console.progress() as progress:
+            look = paint_with_light(
+                scene,
+                target,
+                folder,
+                basis=made,
+                constraints=constraints,
+                progress=progress,
+                **_settings(options, given),
+            )
+        tables.show_look(look, folder)
+    if scene is None:
+        console.say("solved from a saved basis: no render was made; lightpaint relight makes one")
+    return 0
+
+
+def _solve_views(options: Namespace, targets: list[Target], given: list[str]) -> int:
+    """One lighting for the paintings of several views."""
+    if options.sensor:
+        raise TargetError("-s cannot be had with --target, which names the sensors: leave it out")
+    if is_basis_file(Path(options.source)):
+        raise BasisError("a basis has one view only: give the scene, to solve for several")
+    scenes: list[Scene] = []
+    for sensor, _ in options.views:
+        options.sensor = sensor
+        scene = load(options, path=Path(options.source), is_first=not scenes)
+        scenes.append(on_film(scene, options.quality, options.resolution))
+    constraints = constraints_of(options)
+    reduce_to(all_constraints(scenes[0], constraints), basis_lights(scenes[0]))
+    folder = Path(options.output or targets[0].name)
+    targets = [_fitted(t, s.size, options) for t, s in zip(targets, scenes, strict=True)]
+    check_writable(folder)
+    check_relightable(scenes[0], folder / "relit.xml")
+    share_s = None if options.time_s is None else options.time_s / len(scenes)
+    made = [render_or_find(scene, options, time_s=share_s) for scene in scenes]
+    with console.progress() as progress:
+        looks = paint_views_with_light(
+            scenes,
+            targets,
+            folder,
+            bases=made,
+            constraints=constraints,
+            progress=progress,
+            **_settings(options, given),
+        )
+    for look in looks:
+        console.write(f"\n{look.basis.origin.sensor}:")
+        tables.show_look(look, folder / look.basis.origin.sensor)
+    return 0
+
+
+def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
+    """What the options say of `Settings`, but for constraints and what is done already."""
+    return {
+        "unpainted": options.unpainted,
+        "spp": options.spp,
+        "time_s": options.time_s,
+        "seed": options.seed,
+        "quality": options.quality,
+        "noise_correction": options.noise_correction,
+        "refine": options.refine,
+        "cd_per_unit": options.cd_per_unit,
+        "command": command_line(given),
+    }
+
+
+def _fitted(target: Target, size: tuple[int, int], options: Namespace) -> Target:
+    """`target` at the size of the basis. Says so where nobody has asked for another size."""
+    fitted = target.fitted_to(size, resize=options.resize)
+    if target.not_finite:
+        console.say(f"{target.name}: {target.not_finite} pixels hold NaN or Inf and count nothing")
+    if fitted.size != target.size and not (options.resize or options.resolution or options.quality):
+        console.say(
+            f"{target.name}: {target.size[1]}x{target.size[0]} pixels averaged to the basis's "
+            f"{size[1]}x{size[0]}"
+        )
+    return fitted
+
+
+def _check_nothing_to_render(options: Namespace) -> None:
+    asked = {"-s": options.sensor, "-D": options.parameters, "-m": options.variant}
+    asked |= {"--lights": options.lights, "--group": options.groups}
+    asked |= {"--spp": options.spp, "--time": options.time_s}
+    asked |= {"--quality": options.quality}
+    asked |= {"--resolution": options.resolution, "--refine": options.refine}
+    if idle := [name for name, value in asked.items() if value]:
+        raise BasisError(
+            f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"
+        )
+
+
+def _one_for_each(masks: list[str | None], targets: list[str]) -> list[str | None]:
+    if len(masks) == 1:
+        return masks * len(targets)
+    if len(masks) != len(targets):
+        raise TargetError(
+            f"{len(masks)} masks for {len(targets)} targets: give one for all, or one for each"
+        )
+    return masks
