@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint import pipeline
+from lightpaint import results
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.exr import Part, rgb_channels, write_parts
@@ -74,8 +74,8 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     expected: tuple[str | None, int | None],
 ):
     used: list[Any] = []
-    monkeypatch.setattr(pipeline, "load_scene", lambda _path, sensor, **_: used.append(sensor))
-    monkeypatch.setattr(pipeline, "verify", lambda *_args, spp, **_options: used.append(spp))
+    monkeypatch.setattr(results, "load_scene", lambda _path, sensor, **_: used.append(sensor))
+    monkeypatch.setattr(results, "verify", lambda *_args, spp, **_options: used.append(spp))
     folder = _result(tmp_path, None if view is None else json.dumps(view))
     verify_result(folder, spp=given)
     assert tuple(used) == expected
