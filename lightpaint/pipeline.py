@@ -72,10 +72,10 @@ def paint_with_light(
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
     """
     asked = Settings(**settings)
-    if scene is None and basis is None:
-        raise LightpaintError("give a scene, a basis, or both")
     if asked.refine and scene is None:
         raise LightpaintError("refining renders the scene: give it, and not only its basis")
+    if scene is None and basis is None:
+        raise LightpaintError("give a scene, a basis, or both")
     if isinstance(scene, str | Path):
         scene = load_scene(
             scene, sensor=sensor, parameters=parameters, lights=lights, groups=groups

@@ -1,14 +1,16 @@
-"""Paint the two targets of the stage over a render of it as it is now.
+"""Paint the targets of the stage over renders of it as it is now.
 
     lightpaint template scenes/stage/scene.xml -o targets/stage/template.exr
-    python targets/stage/paint.py [template.exr]
+    lightpaint template scenes/stage/scene.xml -s box -o targets/stage/box-template.exr
+    python targets/stage/paint.py
 
 Writes, beside this file:
 
     moonlight.exr                 night, a lantern, a house still awake; its alpha says where
     sunset.exr, sunset.mask.exr   the sun goes down behind the house; the mask says where
+    moonlight-box.exr             that night as it is to be seen from the box at the side
 
-The template is a linear RGB EXR of 640 x 360; by default `template.exr` beside this file. The
+The templates are linear RGB EXRs of 640 x 360, beside this file. The
 strokes are placed by eye; no pixel comes from a render of one light alone.
 """
 
@@ -147,6 +149,52 @@ def paint_moonlight(template: Path) -> Canvas:
     return canvas
 
 
+def paint_moonlight_from_the_box(template: Path) -> Canvas:
+    """The same night from the side, where the lantern is near and the velvet is in the way."""
+    canvas = Canvas.read_template(template)
+    night, moon = (0.30, 0.50, 1.0), (0.60, 0.82, 1.0)
+    candle, ember = (1.0, 0.38, 0.09), (1.0, 0.32, 0.06)
+    sky = Area(
+        [
+            (0.17, 0),
+            (0.41, 0),
+            (0.40, 0.59),
+            (0.30, 0.63),
+            (0.12, 0.57),
+            (0.02, 0.55),
+            (0.06, 0.25),
+        ],
+        feather=0.02,
+    )
+    boards = Area([(0, 0.82), (0.22, 0.72), (0.72, 0.68), (0.94, 0.74), (0.5, 1), (0, 1)], 0.05)
+    doorway = Area([(0.475, 0.53), (0.475, 0.30), (0.50, 0.24), (0.55, 0.28), (0.555, 0.53)], 0.015)
+
+    canvas.glaze(Everywhere(), night, stops=-1.6)
+    canvas.glaze(Outside(sky), (0.66, 0.76, 1.0), stops=-0.4)
+    canvas.weight[:] = 0.2
+    # The moon is out of sight; what it does to the sky and along the boards is not.
+    canvas.glaze(Within(Stroke([(0.10, 0.55), (0.40, 0.58)], size=0.24), sky), moon, stops=0.9)
+    canvas.glaze(Within(Stroke([(0.10, 0.90), (0.30, 0.76)], size=0.16), boards), moon, stops=1.3)
+    canvas.glaze(Stroke([(0.43, 0.10), (0.43, 0.40)], size=0.04), moon, stops=0.9)
+    # The lantern: on the cloth, up her gown and sleeve, over the boards around the table.
+    canvas.glaze(Stroke([(0.355, 0.60)], size=0.30), candle, stops=1.7)
+    canvas.glaze(Area([(0.30, 0.69), (0.42, 0.70), (0.43, 0.86), (0.29, 0.87)], 0.02), candle,
+                 stops=2.0)  # fmt: skip
+    canvas.glaze(Stroke([(0.495, 0.58), (0.485, 0.80)], size=0.06), candle, stops=2.4)
+    canvas.glaze(Within(Stroke([(0.25, 0.90), (0.50, 0.88)], size=0.12), boards), candle, stops=1.0)
+    # Its flame is the same flame.
+    canvas.paint(Stroke([(0.3585, 0.670)], size=0.019, hardness=0.8), (24.0, 11.0, 2.8))
+    # The house is awake.
+    canvas.glaze(doorway, ember, stops=1.6)
+    # And the velvet keeps to itself.
+    for velvet in (
+        Area([(0.78, 0), (1, 0), (1, 0.68), (0.86, 0.74)], feather=0.03),
+        Area([(0, 0), (0.17, 0), (0.06, 0.26), (0, 0.30)], feather=0.03),
+    ):
+        canvas.glaze(velvet, (0.8, 0.7, 1.0), stops=-1.2)
+    return canvas
+
+
 def paint_sunset(template: Path) -> Canvas:
     """The last of the sun, low behind the house; she has come out to see it."""
     canvas = Canvas.read_template(template)
@@ -200,12 +248,14 @@ def paint_sunset(template: Path) -> Canvas:
 
 
 def main() -> None:
-    """Paint both over the template named on the command line."""
-    template = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "template.exr"
+    """Paint all of them over the templates beside this file."""
+    template = HERE / "template.exr"
     paint_moonlight(template).write_with_alpha(HERE / "moonlight.exr")
     sunset = paint_sunset(template)
     sunset.write(HERE / "sunset.exr")
     sunset.write_mask(HERE / "sunset.mask.exr")
+    box = paint_moonlight_from_the_box(HERE / "box-template.exr")
+    box.write_with_alpha(HERE / "moonlight-box.exr")
 
 
 if __name__ == "__main__":
