@@ -30,6 +30,7 @@ class Stream(IntEnum):
     SECOND_VERIFICATION = 4
     REFINEMENT = 5
     VIEW = 6
+    SURFACES = 7
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:

@@ -1,0 +1,99 @@
+"""What the camera sees first: colour, direction and distance of surfaces, and whose they are."""
+
+import gc
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.images.exr import Floats
+from lightpaint.progress import Progress, interruptible_between_pieces, silent
+from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.scene import Scene
+
+#: Samples of a pixel, each by itself: an index of a shape must not be averaged.
+SAMPLES = 16
+
+#: Depth where there is nothing, as compositing programs have it.
+NOTHING = 1e10
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """The first surfaces behind each pixel, averaged over its area.
+
+    albedo: (h, w, 3) float32 in [0, 1], share of light that is reflected diffusely, as the
+    materials say it. normal: (h, w, 3), shading normal in world space, of unit length; 0 where
+    there is nothing. depth: (h, w), distance from the camera in scene units, of the nearest
+    sample; NOTHING where there is none. coverage: by name of shape, (h, w) in [0, 1], how much
+    of the pixel it fills. Shapes out of sight are left out.
+    """
+
+    albedo: Floats
+    normal: Floats
+    depth: Floats
+    coverage: Mapping[str, Floats]
+
+
+def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent) -> Surfaces:
+    """Look at `scene` without its light."""
+    import mitsuba as mi
+
+    loaded = scene.load()
+    try:
+        integrator = mi.load_dict(
+            {"type": "aov", "aovs": "a:albedo,n:sh_normal,d:depth,i:shape_index"}
+        )
+        samples = []
+        with interruptible_between_pieces() as let_interrupts_through:
+            for k in range(SAMPLES):
+                image = mi.render(
+                    loaded,
+                    sensor=scene.camera(loaded),
+                    integrator=integrator,
+                    spp=1,
+                    seed=pass_seed(seed, Stream.SURFACES, k),
+                )
+                samples.append(np.array(image))
+                progress("surfaces", k + 1, SAMPLES)
+                let_interrupts_through()
+        return _averaged(np.stack(samples), _names_by_index(loaded))
+    finally:
+        del loaded
+        gc.collect()
+
+
+def _averaged(samples: npt.NDArray[np.float32], names: Mapping[int, str]) -> Surfaces:
+    """samples: (k, h, w, 8): albedo, normal, depth, index of shape, 0 where there is none."""
+    indices = samples[..., 7].astype(np.int64)
+    there = indices > 0
+    # Of materials whose reflection is no share, as of metals, the number has no bound.
+    albedo = np.clip(samples[..., :3], 0, 1) * there[..., None]
+    normal = (samples[..., 3:6] * there[..., None]).sum(axis=0)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    depth = np.where(there, samples[..., 6], NOTHING).min(axis=0)
+    coverage: dict[str, Floats] = {}
+    for index in np.unique(indices[there]).tolist():
+        name = names.get(index, f"shape {index}")
+        share = (indices == index).mean(axis=0, dtype=np.float32)
+        coverage[name] = coverage.get(name, np.float32(0)) + share
+    return Surfaces(
+        albedo=albedo.mean(axis=0, dtype=np.float32),
+        normal=(normal / np.where(length > 0, length, 1)).astype(np.float32),
+        depth=depth.astype(np.float32),
+        coverage=dict(sorted(coverage.items())),
+    )
+
+
+def _names_by_index(loaded: Any) -> dict[int, str]:
+    """Name of each shape by the index that the integrator writes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    shapes = loaded.shapes()
+    if not dr.is_jit_v(mi.Float):
+        return {k + 1: shape.id() for k, shape in enumerate(shapes)}
+    indices = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
+    return {index: shape.id() for index, shape in zip(indices, shapes, strict=True)}
