@@ -87,9 +87,7 @@ def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
     layers = colour_layers(parts)
     if not layers:
         channels = dict.fromkeys(name for part in parts for name in part.channels)
-        raise ImageError(
-            f"is no RGB image: no channel R, G, B nor Y; it has {', '.join(channels)}"
-        )
+        raise ImageError(f"is no RGB image: no channel R, G, B nor Y; it has {', '.join(channels)}")
     if wanted is None:
         plain = [layer for layer in layers if not layer.prefix] or layers
         if len(plain) > 1:

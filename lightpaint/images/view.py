@@ -16,7 +16,6 @@ Display values lie in [0, 1]. Encoding clips what the display cannot show: what 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -40,8 +39,9 @@ AGX_INSET = 0.8 * np.eye(3) + 0.2 * np.array([0.211994645, 0.392150825, 0.395854
 class Transform(Protocol):
     """Linear Rec.709 to display values and back, without exposure. Arrays are (..., 3)."""
 
-    #: Light of the grey that is display white.
-    white: float
+    @property
+    def white(self) -> float:
+        """Light of the grey that is display white."""
 
     def encode(self, image: Floats) -> Floats:
         """Display values in [0, 1] of linear light."""
@@ -88,16 +88,16 @@ class View:
     @property
     def white(self) -> float:
         """Linear light of the grey at which the display is white: it shows nothing brighter."""
-        return _transform(self.name).white / 2.0**self.stops
+        return _transform(self.name).white / float(2.0**self.stops)
 
     def encode(self, image: Floats) -> Floats:
         """Display values in [0, 1] of a linear Rec.709 image (..., 3)."""
         return _transform(self.name).encode(image * 2.0**self.stops)
 
     def decode(self, image_display: Floats) -> Floats:
-        """Linear Rec.709 of display values in [0, 1], (..., 3). Undoes `encode` but for clipping."""
+        """Linear Rec.709 of display values in [0, 1], (..., 3). Does not undo clipping."""
         linear = _transform(self.name).decode(np.clip(image_display, 0, 1))
-        return linear / 2.0**self.stops
+        return np.asarray(linear / 2.0**self.stops)
 
     def jacobian(self, image: Floats) -> Floats:
         """Derivatives of `encode` at a linear image (..., 3).
@@ -106,7 +106,7 @@ class View:
         `agx` and `ocio:` mix channels.
         """
         scale = 2.0**self.stops
-        return _transform(self.name).jacobian(image * scale) * scale
+        return np.asarray(_transform(self.name).jacobian(image * scale) * scale)
 
 
 @dataclass(frozen=True)
@@ -126,14 +126,14 @@ class _Curve:
         light = self.inverse(image_display)
         if self.matrix is None:
             return light
-        return light @ np.linalg.inv(self.matrix).T.astype(light.dtype)
+        return np.asarray(light @ np.linalg.inv(self.matrix).T.astype(light.dtype))
 
     def jacobian(self, image: Floats) -> Floats:
         light = self._mixed(image)
         shown = (light >= 0) & (light <= self.white)
         slope = np.where(shown, self.slope(np.clip(light, 0, self.white)), 0)
         matrix = np.eye(3) if self.matrix is None else self.matrix
-        return slope[..., None] * matrix.astype(slope.dtype)
+        return np.asarray(slope[..., None] * matrix.astype(slope.dtype))
 
     def _mixed(self, image: Floats) -> Floats:
         return image if self.matrix is None else image @ self.matrix.T.astype(image.dtype)
@@ -162,7 +162,7 @@ def _filmic_inverse(display: Floats) -> Floats:
     root = np.sqrt(linear**2 + 4 * square * constant)
     rising = (linear + root) / (2 * square)
     falling = 2 * constant / np.where(linear < 0, root - linear, 1)
-    return np.where(linear < 0, falling, rising)
+    return np.asarray(np.where(linear < 0, falling, rising))
 
 
 def _filmic_slope(light: Floats) -> Floats:
@@ -170,7 +170,7 @@ def _filmic_slope(light: Floats) -> Floats:
     above = light * (_A * light + _B)
     toned = above / below
     steep = ((2 * _A * light + _B) * below - above * (2 * _C * light + _D)) / below**2
-    return _srgb_slope(toned) * steep
+    return np.asarray(_srgb_slope(toned) * steep)
 
 
 class _Sigmoid:
@@ -204,15 +204,15 @@ class _Sigmoid:
             self.contrast * (1 + (self.contrast * away / s) ** p) ** (-1 / p - 1)
             for s, p in zip(self.scales, self.powers, strict=True)
         )
-        return np.where(x < self.pivot[0], toe, shoulder)
+        return np.asarray(np.where(x < self.pivot[0], toe, shoulder))
 
     def _rise(self, away: Floats, scale: float, power: float) -> Floats:
         u = self.contrast * away / scale
-        return scale * u / (1 + u**power) ** (1 / power)
+        return np.asarray(scale * u / (1 + u**power) ** (1 / power))
 
     def _run(self, away: Floats, scale: float, power: float) -> Floats:
         h = away / scale
-        return scale / self.contrast * h / (1 - h**power) ** (1 / power)
+        return np.asarray(scale / self.contrast * h / (1 - h**power) ** (1 / power))
 
     def _by_side(
         self, v: Floats, start: float, end: float, side: Callable[[Floats, float, float], Floats]
@@ -228,7 +228,9 @@ _AGX_RANGE = _AGX_HIGH - _AGX_LOW
 
 
 def _agx_log(light: Floats) -> Floats:
-    return np.clip((np.log2(np.maximum(light, 2.0**_AGX_LOW)) - _AGX_LOW) / _AGX_RANGE, 0, 1)
+    return np.asarray(
+        np.clip((np.log2(np.maximum(light, 2.0**_AGX_LOW)) - _AGX_LOW) / _AGX_RANGE, 0, 1)
+    )
 
 
 def _agx(light: Floats) -> Floats:
@@ -255,12 +257,11 @@ _BUILT_IN = {
 }
 
 
-@cache
 def _transform(name: str) -> Transform:
     if name.lower().startswith("ocio:"):
-        from lightpaint.images.view_ocio import OcioTransform
+        from lightpaint.images.view_ocio import transform
 
-        return OcioTransform(name[len("ocio:") :])
+        return transform(name[len("ocio:") :])
     if name not in _BUILT_IN:
         raise ViewError(
             f"no view transform {name!r}: expected {', '.join(_BUILT_IN)}, ocio or "

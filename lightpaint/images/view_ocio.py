@@ -5,6 +5,7 @@ default. Its displays' values are taken as sRGB-like code values of the picture.
 """
 
 import os
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,17 +33,27 @@ STEP = 1e-2
 
 def default_name() -> str:
     """Name of the view that the configuration shows first: `ocio:DISPLAY/VIEW`."""
-    _, config = _library_and_config()
+    _, config = _library_and_config(os.environ.get("OCIO", ""))
     display = config.getDefaultDisplay()
     return f"ocio:{display}/{config.getDefaultView(display)}"
+
+
+def transform(display_and_view: str) -> "OcioTransform":
+    """The view `DISPLAY/VIEW` of the configuration. Raises ViewError."""
+    return _transform(display_and_view, os.environ.get("OCIO", ""))
+
+
+@cache
+def _transform(display_and_view: str, source: str) -> "OcioTransform":
+    return OcioTransform(display_and_view, source)
 
 
 class OcioTransform:
     """One display and view. Raises ViewError where there is none, or no way back from it."""
 
-    def __init__(self, display_and_view: str) -> None:
+    def __init__(self, display_and_view: str, source: str) -> None:
         self._name = f"ocio:{display_and_view}"
-        ocio, config = _library_and_config()
+        ocio, config = _library_and_config(source)
         display, view = _named(display_and_view, config)
         try:
             self._to_display = _processors(ocio, config, display, view)
@@ -85,14 +96,14 @@ class OcioTransform:
             )
 
 
-def _library_and_config() -> tuple[Any, Any]:
+def _library_and_config(source: str) -> tuple[Any, Any]:
     try:
-        import PyOpenColorIO as ocio
+        import PyOpenColorIO
     except ImportError:
         raise ViewError(
             "views of OpenColorIO need an extra package: pip install 'lightpaint[ocio]'"
         ) from None
-    source = os.environ.get("OCIO", "")
+    ocio: Any = PyOpenColorIO
     try:
         if source:
             config = ocio.Config.CreateFromFile(source)
