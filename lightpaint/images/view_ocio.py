@@ -57,11 +57,11 @@ class OcioTransform:
         display, view = _named(display_and_view, config)
         try:
             self._to_display = _processors(ocio, config, display, view)
-        except ocio.Exception as error:
+        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
             raise ViewError(f"{self._name} cannot be used: {_first_line(error)}") from error
         try:
             self._to_light = _processors(ocio, config, display, view, inverse=True)
-        except ocio.Exception as error:
+        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
             raise ViewError(
                 f"{self._name} cannot be undone, which reading paintings takes: "
                 f"{_first_line(error)}"
@@ -104,15 +104,20 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
             "views of OpenColorIO need an extra package: pip install 'lightpaint[ocio]'"
         ) from None
     ocio: Any = PyOpenColorIO
+    # What it would print comes as an error, or is about roles that are not used here.
+    loudness = ocio.GetLoggingLevel()
+    ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
     try:
         if source:
             config = ocio.Config.CreateFromFile(source)
         else:
             config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
         config.validate()
-    except ocio.Exception as error:
+    except (ocio.Exception, ocio.ExceptionMissingFile) as error:
         named = f"OCIO={source}" if source else "the built-in configuration"
         raise ViewError(f"{named} is no OpenColorIO configuration: {_first_line(error)}") from error
+    finally:
+        ocio.SetLoggingLevel(loudness)
     return ocio, config
 
 
