@@ -256,6 +256,9 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
     alpha: Floats | None = None
     if bitmap.alpha is not None:
         alpha = np.asarray(bitmap.alpha / np.float32(bitmap.codes or 1), np.float32)
+    notes: tuple[str, ...] = ()
+    if bitmap.kind == "psd" and alpha is not None:
+        alpha, notes = _without_partial(alpha)
     if bitmap.codes is None:
         image = _light_of_floats(bitmap, alpha)
         saturated, used = None, None
@@ -278,7 +281,24 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
         codes=bitmap.codes,
         mantissa=floats.get(bitmap.values.dtype),
         lossy=bitmap.lossy,
+        notes=notes,
     )
+
+
+def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Alpha without what is partly transparent, and a note if there was any.
+
+    Photoshop blends its merged picture with white there and Krita does not; nothing in the file
+    says which, so those colours are not known.
+    """
+    partial = (alpha > 0) & (alpha < 1)
+    if not partial.any():
+        return alpha, ()
+    note = (
+        f"{partial.sum()} partly transparent pixels are left out: Photoshop files do not say what "
+        "colour is there; flatten it, or export a PNG or TIFF"
+    )
+    return np.where(partial, np.float32(0), alpha), (note,)
 
 
 def _view_of(bitmap: Bitmap) -> View:
