@@ -4,6 +4,7 @@
     ├── BackendError     Mitsuba or LLVM cannot run here
     ├── SceneError       the scene XML, a sensor, a light
     ├── ImageError       an image file that cannot be read as what it should be
+    │   └── ViewError    … or a view transform, to decode it by, that there is none of
     ├── ColorError       a colour that means nothing: hexadecimal digits, a temperature
     ├── BasisError       a basis file, or one that does not fit what it is used with
     ├── TargetError      a painting or mask that cannot be solved for
@@ -28,6 +29,7 @@ __all__ = [
     "SceneError",
     "SizeError",
     "TargetError",
+    "ViewError",
 ]
 
 
@@ -45,6 +47,10 @@ class SceneError(LightpaintError):
 
 class ImageError(LightpaintError):
     """An image file that is missing, damaged, or of a kind that is not supported."""
+
+
+class ViewError(ImageError):
+    """A view transform that there is none of, or that cannot be undone."""
 
 
 class ColorError(LightpaintError):

@@ -1,12 +1,14 @@
 """From linear light to what a display shows, and PNG files."""
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from lightpaint.files import write_bytes
 from lightpaint.images.exr import Floats
@@ -45,10 +47,13 @@ def to_8_bit(image_display: Floats) -> npt.NDArray[np.uint8]:
     return np.asarray(np.round(image_display * 255), dtype=np.uint8)
 
 
-def png_bytes(image_8_bit: npt.NDArray[Any]) -> bytes:
-    """An (h, w, 3) or (h, w, 4) uint8 image as a PNG file."""
+def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = None) -> bytes:
+    """An (h, w, 3) or (h, w, 4) uint8 image as a PNG file, with these Latin-1 texts in it."""
+    said = PngInfo()
+    for key, text in (texts or {}).items():
+        said.add_text(key, text)
     buffer = io.BytesIO()
-    Image.fromarray(image_8_bit).save(buffer, "PNG")
+    Image.fromarray(image_8_bit).save(buffer, "PNG", pnginfo=said)
     return buffer.getvalue()
 
 

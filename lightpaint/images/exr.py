@@ -13,7 +13,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,10 @@ from lightpaint.files import replacing
 
 Floats = npt.NDArray[np.floating[Any]]
 
-#: Above this many values in one file, reading is refused before any pixel is decoded.
-MAX_VALUES = 2**31
+#: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
+#: is refused before any is decoded. Pictures compress to less only where they are empty.
+MAX_BYTES = 2**30
+MAX_COMPRESSION = 64
 
 #: How other files begin that people take for paintings.
 MAGICS = {
@@ -50,6 +52,7 @@ class Part:
     display: (height, width) of the display window, the picture; None if it is `size`.
     offset: (y, x) of the first stored pixel in it: programs crop what is empty or keep a margin.
     primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
+    views: names of the views whose channels the part holds, the one without prefix first.
     """
 
     name: str
@@ -58,6 +61,7 @@ class Part:
     display: tuple[int, int] | None = None
     offset: tuple[int, int] = (0, 0)
     primaries: tuple[float, ...] | None = None
+    views: tuple[str, ...] = ()
 
     @property
     def size(self) -> tuple[int, int]:
@@ -78,7 +82,7 @@ class Part:
             stored = pixels[top - y :, left - x :][: max(height - top, 0), : max(width - left, 0)]
             canvas[top : top + stored.shape[0], left : left + stored.shape[1]] = stored
             placed[name] = canvas
-        return Part(self.name, placed, self.attributes, primaries=self.primaries)
+        return replace(self, channels=placed, display=None, offset=(0, 0))
 
     def rgb(self, layer: str = "") -> Floats:
         """The R, G and B channels of `layer` as (height, width, 3) float32."""
@@ -124,8 +128,9 @@ def _check_is_exr(path: Path) -> None:
 def read_parts(path: Path) -> list[Part]:
     """All parts of the EXR file at `path`.
 
-    Raises ImageError if the file is missing, no EXR, cut off, deep, or larger than
-    MAX_VALUES pixel values.
+    Channels that are stored at a part of the resolution, as chroma is, are interpolated. Of
+    mip maps the largest is read. Raises ImageError if the file is missing, no EXR, cut off,
+    deep, or declares more pixels than its length makes likely.
     """
     path = Path(path)
     _check_is_exr(path)
@@ -146,15 +151,47 @@ def read_parts(path: Path) -> list[Part]:
             f"{path} is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
             "read; export it again"
         )
-    result = []
-    for part in parts:
-        channels = {name: channel.pixels for name, channel in part.channels.items()}
-        if not channels:
-            raise ImageError(f"{path} has a part without channels")
-        attributes = {k: v for k, v in part.header.items() if isinstance(v, str)}
-        display, offset = _windows(part.header)
-        primaries = _primaries(part.header)
-        result.append(Part(part.name() or "", channels, attributes, display, offset, primaries))
+    return [_part(path, part) for part in parts]
+
+
+def _part(path: Path, part: Any) -> Part:
+    """What is kept of a part as the library reads it."""
+    if not part.channels:
+        raise ImageError(f"{path} has a part without channels")
+    (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in part.header["dataWindow"])
+    size = y1 - y0 + 1, x1 - x0 + 1
+    channels = {}
+    for name, channel in part.channels.items():
+        pixels = channel.pixels
+        if (channel.ySampling, channel.xSampling) != (1, 1):
+            pixels = _interpolated(pixels, size, (channel.ySampling, channel.xSampling))
+        if pixels.shape != size:
+            raise ImageError(f"{path} is damaged: channel {name} has another size than the file")
+        channels[name] = pixels
+    display, offset = _windows(part.header)
+    views = part.header.get("multiView")
+    return Part(
+        part.name() or "",
+        channels,
+        {k: v for k, v in part.header.items() if isinstance(v, str)},
+        display,
+        offset,
+        _primaries(part.header),
+        tuple(map(str, views)) if isinstance(views, list) else (),
+    )
+
+
+def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:
+    """A channel stored for every so-manieth pixel, linearly between those and constant beyond."""
+    result = pixels.astype(np.float32)
+    for axis, (length, step) in enumerate(zip(size, sampling, strict=True)):
+        last = result.shape[axis] - 1
+        at = np.minimum(np.arange(length) / step, last)
+        below = at.astype(int)
+        share = (at - below).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
+        above = np.minimum(below + 1, last)
+        low, high = result.take(below, axis), result.take(above, axis)
+        result = low * (1 - share) + high * share
     return result
 
 
@@ -210,7 +247,7 @@ def _primaries(header: Mapping[str, Any]) -> tuple[float, ...] | None:
 
 
 def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]) -> None:
-    values = 0
+    size = 0
     for name, header in declared:
         kind = header.get("type")
         if kind in (OpenEXR.deepscanline, OpenEXR.deeptile):
@@ -223,9 +260,13 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
             raise ImageError(f"{path} declares an empty image of {width}x{height} pixels")
         (height_shown, width_shown), _ = _windows(header)
         pixels = max(width * height, width_shown * height_shown)
-        values += pixels * max(len(header.get("channels", ())), 1)
-    if values > MAX_VALUES:
-        raise ImageError(f"{path} declares {values:.2g} pixel values: too many to read")
+        # Half is read as half; what is made of it later, in float32, is counted here.
+        size += pixels * 4 * max(len(header.get("channels", ())), 1)
+    if size > max(MAX_BYTES, MAX_COMPRESSION * path.stat().st_size):
+        raise ImageError(
+            f"{path} declares {size:.2g} bytes of pixels, in a file of {path.stat().st_size:.2g}: "
+            "too many to read"
+        )
 
 
 def _first_line(error: BaseException) -> str:

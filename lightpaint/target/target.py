@@ -7,15 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from lightpaint.errors import ImageError, SizeError, TargetError
-from lightpaint.images.blocks import block_mean, whole_factor
-from lightpaint.images.exr import Floats, Part, read_parts
-
-#: Channel that holds importance in a file whose RGB is not premultiplied.
-WEIGHT_CHANNEL = "W"
-
-#: CIE xy of red, green, blue and white of Rec.709, the colours of every image here.
-REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+from lightpaint.errors import SizeError, TargetError
+from lightpaint.images.blocks import block_any, block_mean, whole_factor
+from lightpaint.images.exr import Floats
+from lightpaint.images.picture import read_mask, read_picture
+from lightpaint.images.view import View
 
 
 @dataclass(frozen=True)
@@ -26,6 +22,8 @@ class Target:
     importance: (h, w) float32 >= 0, the weight of each pixel's squared residual.
     everything: whether nobody said what was painted, so that every pixel counts 1.
     not_finite: number of pixels with NaN or Inf, which have no importance.
+    at_least: (h, w, 3) bool, where the painting was at the top of what its file can say, so that
+        this or anything brighter was meant; None if it can say everything.
     """
 
     name: str
@@ -33,12 +31,18 @@ class Target:
     importance: Floats
     everything: bool
     not_finite: int = 0
+    at_least: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
             raise SizeError(
                 f"target {self.name}: image {self.image.shape} and importance "
                 f"{self.importance.shape} differ in size"
+            )
+        if self.at_least is not None and self.at_least.shape != self.image.shape:
+            raise SizeError(
+                f"target {self.name}: image {self.image.shape} and at_least {self.at_least.shape} "
+                "differ in size"
             )
         if not np.isfinite(self.image).all():
             raise TargetError(f"target {self.name} holds NaN or Inf")
@@ -76,7 +80,7 @@ class Target:
         ]
         *rgb, importance = (np.asarray(p) for p in planes)
         image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
-        return replace(self, image=image, importance=importance)
+        return replace(self, image=image, importance=importance, at_least=self._at_least(size))
 
     def reduced(self, factor: int) -> "Target":
         """One pixel for each block of factor x factor: their mean, weighted by importance.
@@ -89,7 +93,24 @@ class Target:
         importance = block_mean(self.importance, factor)
         weighted = block_mean(self.image * self.importance[..., None].astype(np.float64), factor)
         image = weighted / np.where(importance > 0, importance, 1)[..., None]
-        return replace(self, image=image.astype(np.float32), importance=importance)
+        at_least = None if self.at_least is None else block_any(self._counted(), factor)
+        return replace(
+            self, image=image.astype(np.float32), importance=importance, at_least=at_least
+        )
+
+    def _counted(self) -> npt.NDArray[np.bool_]:
+        """`at_least` where it counts: elsewhere it says nothing about the means over blocks."""
+        assert self.at_least is not None
+        return self.at_least & (self.importance > 0)[..., None]
+
+    def _at_least(self, size: tuple[int, int]) -> npt.NDArray[np.bool_] | None:
+        """Resampled: whether any pixel that overlaps, or is interpolated from, is at least."""
+        if self.at_least is None:
+            return None
+        rows, columns = (_overlap(n, m) for n, m in zip(self.size, size, strict=True))
+        counted = self._counted().astype(np.float32)
+        touched = np.einsum("Hh,hwc,Ww->HWc", rows, counted, columns, optimize=True)
+        return np.asarray(touched > 0)
 
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """This target at `size` (height, width) of the basis.
@@ -114,90 +135,56 @@ class Target:
         return self.resized(size)
 
 
-def read_target(path: str | Path, *, mask: str | Path | None = None) -> Target:
-    """Read a painted EXR: R, G, B in linear Rec.709.
+def read_target(
+    path: str | Path,
+    *,
+    mask: str | Path | None = None,
+    layer: str | None = None,
+    view: View | None = None,
+) -> Target:
+    """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
 
-    What counts is, in this order: `mask` (its Y, W, A or R channel); the file's W channel;
-    its alpha, by which RGB is then taken to be premultiplied, as OpenEXR prescribes;
-    without any of them, every pixel alike. Where such an alpha is 0 no colour was painted,
-    and a mask does not make one.
+    What counts is, in this order: `mask`; an EXR's W channel; alpha; without any of them, every
+    pixel alike. Where alpha is 0 no colour was painted, and a mask does not make one.
 
-    Raises ImageError for files that cannot be read or declare other primaries, TargetError
-    for what cannot be solved for, SizeError if target and mask differ in size.
+    layer: which layer, part or view of an EXR. view: what 8 and 16 bits were encoded by (see
+    `read_picture`). Raises ImageError for files that cannot be read, TargetError for what
+    cannot be solved for, SizeError if target and mask differ in size.
     """
     path = Path(path)
-    stored = _single_part(path)
-    part = stored.in_display_window()
-    try:
-        image = part.rgb()
-    except ImageError as error:
-        raise ImageError(f"{path} is no RGB image: {error}") from None
-    _check_primaries(path, part)
-    importance, alpha = None, part.channels.get("A")
+    picture = read_picture(path, layer=layer, view=view)
+    importance = picture.alpha if picture.weight is None else picture.weight
     if mask is not None:
-        importance = _read_mask(Path(mask))
-        if importance.shape != part.size:
+        importance = read_mask(mask)
+        if importance.shape != picture.size:
             raise SizeError(
                 f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
-                f"is {part.size[1]}x{part.size[0]}: export both at one size"
+                f"is {picture.size[1]}x{picture.size[0]}: export both at one size"
             )
-    elif WEIGHT_CHANNEL in part.channels:
-        importance = part.channels[WEIGHT_CHANNEL].astype(np.float32)
-    elif alpha is not None:
-        importance = alpha.astype(np.float32)
-    if alpha is not None and WEIGHT_CHANNEL not in part.channels:
-        image = _unpremultiplied(image, alpha.astype(np.float32))
-        if mask is not None and importance is not None:
-            # Premultiplied black over nothing is the absence of a colour, not black.
-            importance = np.where(alpha > 0, importance, np.float32(0))
-
-    finite = np.asarray(np.isfinite(image).all(axis=-1))
+        if picture.alpha is not None and picture.weight is None:
+            importance = np.where(picture.alpha > 0, importance, np.float32(0))
     # Pixels that the file does not store were not painted.
-    stored_ones = replace(stored, channels={"Y": np.ones(stored.size, np.float32)})
-    everywhere = stored_ones.in_display_window().channels["Y"]
-    weights = everywhere if importance is None else importance
+    stored = np.ones(picture.size, bool) if picture.stored is None else picture.stored
+    weights = stored if importance is None else importance
     return Target(
         name=path.stem,
-        image=np.where(finite[..., None], image, 0).astype(np.float32),
-        importance=np.where(finite, weights, 0).astype(np.float32),
+        image=picture.image,
+        importance=np.where(picture.finite, weights, 0).astype(np.float32),
         everything=importance is None,
-        not_finite=int(finite.size - finite.sum()),
+        not_finite=int(picture.finite.size - picture.finite.sum()),
+        at_least=picture.saturated,
     )
 
 
-def _check_primaries(path: Path, part: Part) -> None:
-    # Files round the numbers: to three decimals, or to float16.
-    if part.primaries is None or np.allclose(part.primaries, REC709, rtol=0, atol=1e-3):
-        return
-    xy = [f"({x:.4g}, {y:.4g})" for x, y in zip(*[iter(part.primaries)] * 2, strict=True)]
-    raise ImageError(
-        f"{path} declares the primaries {', '.join(xy[:3])} and the white {xy[3]} (chromaticities "
-        "in CIE xy), but linear Rec.709 is expected: convert it and export it again"
-    )
+def _overlap(old: int, new: int) -> Floats:
+    """(new, old): 1 where an old pixel is part of a new one, in one direction of an image.
 
-
-def _unpremultiplied(image: Floats, alpha: Floats) -> Floats:
-    safe = np.where(alpha > 0, alpha, 1)
-    # Over next to no alpha a colour may become infinite, and is then counted as such.
-    with np.errstate(over="ignore"):
-        return image / safe[..., None]
-
-
-def _read_mask(path: Path) -> npt.NDArray[np.float32]:
-    part = _single_part(path).in_display_window()
-    for name in ("Y", WEIGHT_CHANNEL, "A", "R"):
-        if name in part.channels:
-            return part.channels[name].astype(np.float32)
-    raise ImageError(
-        f"mask {path} has none of the channels Y, W, A, R: it has {', '.join(part.channels)}"
-    )
-
-
-def _single_part(path: Path) -> Part:
-    parts = read_parts(path)
-    if len(parts) > 1:
-        raise ImageError(
-            f"{path} has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of "
-            "them is the painting cannot be told: export a single image"
-        )
-    return parts[0]
+    A new pixel that is narrower than an old one is interpolated from the two nearest.
+    """
+    reach = max(old / new / 2, 1.0)
+    centres = (np.arange(new) + 0.5) * old / new
+    if new <= old:
+        # Boxes touch pixels that they overlap: half a pixel more than to the centres.
+        reach += 0.5
+    distance = np.abs(np.arange(old) + 0.5 - centres[:, None])
+    return (distance < reach - 1e-9).astype(np.float32)

@@ -2,16 +2,23 @@
 
 from pathlib import Path
 
-from lightpaint.images.display import choose_exposure, write_png
+from lightpaint.files import write_bytes
+from lightpaint.images.bitmap import VIEW_KEY
+from lightpaint.images.display import choose_exposure, png_bytes, to_8_bit
 from lightpaint.images.exr import Floats, write_rgb
+from lightpaint.images.view import View
 
 
-def write_template(path: Path, image: Floats) -> Path:
-    """Write a linear image (h, w, 3) to `path` and, display-encoded, to a PNG beside it.
+def write_template(path: Path, image: Floats, *, view: View | None = None) -> Path:
+    """Write a linear image (h, w, 3) to `path` and, through `view`, to a PNG beside it.
 
-    Returns the path of the PNG.
+    Without a view it is shown as sRGB, at an exposure that shows something. The PNG says how;
+    paint programs may drop that when they save, and `read_target` is then to be told. Returns
+    the path of the PNG.
     """
     write_rgb(path, image)
+    shown = view or View("srgb", choose_exposure(image))
     picture = path.with_suffix(".png")
-    write_png(picture, image, stops=choose_exposure(image))
+    pixels = to_8_bit(shown.encode(image))
+    write_bytes(picture, png_bytes(pixels, {VIEW_KEY: f"{shown.name} {shown.stops!r}"}))
     return picture

@@ -1,14 +1,16 @@
 """Targets: what they refuse, and resampling in linear light under importance."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.display import encode_display
+from lightpaint.images.display import choose_exposure, encode_display
 from lightpaint.images.exr import read_parts
-from lightpaint.target.target import Target
+from lightpaint.images.view import View
+from lightpaint.target.target import Target, read_target
 from lightpaint.target.template import write_template
 
 # Resampling runs in float32.
@@ -164,3 +166,51 @@ def test_template(tmp_path: Any):
     with Image.open(picture) as png:
         # Rounding to 8 bits.
         np.testing.assert_allclose(np.asarray(png) / 255, encode_display(image), atol=0.5001 / 255)
+
+
+@pytest.mark.parametrize("view", [None, View("agx", 1.5), View("filmic", -0.25)])
+def test_a_painted_template_is_read_through_its_own_view(tmp_path: Any, view: View | None):
+    image = np.exp2(np.random.default_rng(0).uniform(-4, 2, (9, 7, 1))) * [[[0.8, 0.9, 1]]] / 64
+    picture = write_template(tmp_path / "a.template.exr", image, view=view)
+    target = read_target(picture)
+    shown = (view or View("srgb", choose_exposure(image))).encode(image)
+    np.testing.assert_array_equal(target.at_least, shown >= 254.5 / 255)
+    # What 8 bits round away in display values, at the curves' slopes.
+    again = (view or View("srgb", choose_exposure(image))).encode(target.image)
+    np.testing.assert_allclose(again, shown, atol=0.5001 / 255)
+
+
+def test_at_least_follows_resampling():
+    """A block of which any counted pixel means this or brighter means at least its mean."""
+    rng = np.random.default_rng(3)
+    at_least = rng.random((12, 18, 3)) < 0.05
+    importance = rng.choice([0.0, 1.0], (12, 18))
+    target = replace(_target(rng.random((12, 18, 3)), importance), at_least=at_least)
+    counted = at_least & (importance > 0)[..., None]
+    for factor in (2, 3):
+        blocks = counted.reshape(12 // factor, factor, 18 // factor, factor, 3).any(axis=(1, 3))
+        size = (12 // factor, 18 // factor)
+        np.testing.assert_array_equal(target.fitted_to(size, resize=False).at_least, blocks)
+        np.testing.assert_array_equal(target.resized(size).at_least, blocks)
+    assert target.reduced(1).at_least is at_least
+
+
+@pytest.mark.parametrize("size", [(24, 36), (5, 7), (8, 12), (12, 18), (13, 19), (1, 1)])
+def test_what_resampling_takes_in_is_at_least(size: tuple[int, int]):
+    """Wherever a marked pixel has a share in the resampled image, the mark is there too."""
+    for y, x in ((0, 0), (5, 9), (11, 17), (6, 3)):
+        at_least = np.zeros((12, 18, 3), bool)
+        at_least[y, x, 1] = True
+        image = at_least.astype(np.float32)
+        target = replace(_target(image, np.ones((12, 18))), at_least=at_least).resized(size)
+        assert target.at_least is not None
+        assert not target.at_least[..., [0, 2]].any()
+        touched = target.image[..., 1] > 1e-6
+        assert (target.at_least[..., 1] | ~touched).all()
+        # And no further than a pixel more.
+        assert target.at_least[..., 1].sum() <= max(9, 16 * touched.sum())
+
+
+def test_at_least_has_the_images_size():
+    with pytest.raises(SizeError, match="at_least"):
+        replace(_random(4, 5), at_least=np.zeros((4, 5), bool))

@@ -1,0 +1,383 @@
+"""A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
+
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.errors import ImageError
+from lightpaint.images.bitmap import Bitmap, read_bitmap
+from lightpaint.images.display import encode_display
+from lightpaint.images.exr import Floats, read_parts
+from lightpaint.images.layers import Layer, choose_layer
+from lightpaint.images.primaries import converted
+from lightpaint.images.view import View
+
+Mask = npt.NDArray[np.bool_]
+
+#: How the files begin that can be read.
+MAGICS = {
+    b"\x76\x2f\x31\x01": "exr",
+    b"\x89PNG\r\n\x1a\n": "png",
+    b"\xff\xd8\xff": "jpeg",
+    b"II*\0": "tiff",
+    b"MM\0*": "tiff",
+    b"II+\0": "tiff",
+    b"MM\0+": "tiff",
+    b"8BPS\0\x01": "psd",
+    b"PK\x03\x04": "zip",
+}
+
+#: And some that cannot, to name them.
+OTHERS = {
+    b"#?": "Radiance HDR",
+    b"RIFF": "WebP",
+    b"8BPS": "large Photoshop (PSB)",
+    b"gimp xcf": "GIMP",
+    b"GIF8": "GIF",
+    b"BM": "BMP",
+}
+
+#: What a layered zip says it is, and where its merged picture lies.
+ZIPS = {b"image/openraster": "ora", b"application/x-krita": "kra"}
+MERGED = "mergedimage.png"
+
+#: Longest merged picture that is unpacked, in bytes.
+MAX_MERGED = 2**30
+
+#: JPEG's rounding keeps white within so many codes of the top.
+JPEG_WHITE = 2
+
+#: Pixels that are converted at once.
+STRIP = 2**18
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture in linear Rec.709.
+
+    kind: `exr`, `png`, `tiff`, `jpeg`, `psd`, `ora` or `kra`.
+    image: (h, w, 3) float32, not premultiplied, 0 where it is not finite.
+    finite: (h, w), where the file holds numbers and neither NaN nor Inf.
+    alpha: (h, w) float32, None if there is none or all of an integer file is opaque.
+    weight: (h, w) float32, an EXR's channel W; RGB is then taken as it is.
+    stored: (h, w), where the file has a pixel; None if everywhere.
+    saturated: (h, w, 3), where the file cannot say more: the light is at least that of `image`.
+    view: what the numbers were decoded by; None if the file holds light.
+    codes: largest integer of the file's numbers; None for floats.
+    mantissa: bits to which floats are rounded, the leading one included; None for integers.
+    lossy: whether compression changed the numbers beyond that rounding.
+    notes: what a person should know, a line each.
+    """
+
+    kind: str
+    image: Floats
+    finite: Mask
+    alpha: Floats | None = None
+    weight: Floats | None = None
+    stored: Mask | None = None
+    saturated: Mask | None = None
+    view: View | None = None
+    codes: int | None = None
+    mantissa: int | None = None
+    lossy: bool = False
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self.image.shape[0], self.image.shape[1]
+
+    def half_step(self) -> Floats:
+        """(h, w, 3): how far rounding to the file's numbers alone may have moved the light.
+
+        Half a code through the view, or half a unit in the last place. What a lossy
+        compression adds is not known from the file.
+        """
+        if self.codes is None or self.view is None:
+            rounding = 2.0 ** -(self.mantissa or 24)
+            return np.asarray(np.abs(self.image) * rounding + 2.0**-25, np.float32)
+        display, half = self.view.encode(self.image), 0.5 / self.codes
+        up, down = self.view.decode(display + half), self.view.decode(display - half)
+        # At the ends of the range one side is cut off.
+        return np.asarray(np.maximum(up - self.image, self.image - down), np.float32)
+
+
+def read_picture(
+    path: str | Path, *, layer: str | None = None, view: View | None = None
+) -> Picture:
+    """Read a picture of any kind that paint programs write.
+
+    layer: of an EXR, the layer, part or view to take; needed if there are several. view: what
+    integers were encoded by; if None, what a PNG of lightpaint's own says, else sRGB. Files of
+    floats hold light, and no view applies to them.
+
+    Raises ImageError, with one line that names the file, for all that cannot be read as what
+    it should be.
+    """
+    path = Path(path)
+    kind = file_kind(path)
+    try:
+        if kind == "exr":
+            return _of_layer(choose_layer(read_parts(path), layer))
+        if layer is not None:
+            raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
+        return _of_bitmap(_bitmap(path, kind), view)
+    except ImageError as error:
+        raise ImageError(_naming(path, error)) from error
+    except MemoryError:
+        raise ImageError(f"{path} takes more memory than there is") from None
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
+    """Importance from a file: (h, w) float32.
+
+    Of an EXR the first that there is of the channels Y, W, A and R. Of other files the numbers
+    themselves, from 0 to 1 and not decoded to light: the brightest channel, times alpha.
+    """
+    path = Path(path)
+    kind = file_kind(path)
+    try:
+        if kind != "exr":
+            return _mask_of(_bitmap(path, kind))
+        parts = read_parts(path)
+        if len(parts) > 1:
+            raise ImageError(
+                f"has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of them "
+                "is the mask cannot be told: export a single image"
+            )
+        part = parts[0].in_display_window()
+        for name in ("Y", "W", "A", "R"):
+            if name in part.channels:
+                return part.channels[name].astype(np.float32)
+        raise ImageError(f"has none of the channels Y, W, A, R: it has {', '.join(part.channels)}")
+    except ImageError as error:
+        raise ImageError(f"mask {_naming(path, error)}") from error
+    except OSError as error:
+        raise ImageError(f"cannot read mask {path}: {error.strerror or error}") from error
+
+
+def file_kind(path: Path) -> str:
+    """Which of the kinds of pictures a file is, by how it begins. Raises ImageError if none."""
+    if path.is_dir():
+        raise ImageError(f"{path} is a folder, not an image file")
+    if not path.is_file():
+        raise ImageError(f"no such image file: {path}")
+    try:
+        with path.open("rb") as file:
+            head = file.read(128)
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror}") from error
+    for magic, kind in MAGICS.items():
+        if head.startswith(magic):
+            return kind if kind != "zip" else _zip_kind(path, head)
+    found = next((kind for mark, kind in OTHERS.items() if head.startswith(mark)), None)
+    raise ImageError(
+        f"{path} is {f'a {found} file' if found else 'no picture that can be read'}: export it as "
+        "OpenEXR, or as PNG or TIFF with 16 bits"
+    )
+
+
+def _zip_kind(path: Path, head: bytes) -> str:
+    """OpenRaster and Krita name themselves in their first member, which is not compressed."""
+    length = int.from_bytes(head[26:28], "little") + int.from_bytes(head[28:30], "little")
+    said = head[30 + length :]
+    for mark, kind in ZIPS.items():
+        if said.startswith(mark):
+            return kind
+    raise ImageError(f"{path} is a zip archive, but neither of OpenRaster nor of Krita")
+
+
+def _bitmap(path: Path, kind: str) -> Bitmap:
+    if kind not in ZIPS.values():
+        return read_bitmap(path, kind)
+    try:
+        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
+            member = archive.getinfo(MERGED)
+            if member.file_size > MAX_MERGED:
+                raise ImageError("declares a merged picture that is too large to unpack")
+            merged = Path(folder) / MERGED
+            with archive.open(member) as packed, merged.open("wb") as unpacked:
+                _copy(packed, unpacked, member.file_size)
+            if file_kind(merged) != "png":
+                raise ImageError("has a merged picture that is no PNG")
+            return replace(read_bitmap(merged, "png"), kind=kind)
+    except KeyError:
+        raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
+        raise ImageError(f"is damaged: {error}") from error
+
+
+def _copy(source: object, target: object, length: int) -> None:
+    """Copy what the archive declares, and see that it is no more."""
+    copied = 0
+    while chunk := source.read(2**20):  # type: ignore[attr-defined]
+        copied += len(chunk)
+        if copied > length:
+            raise ImageError("is damaged: its merged picture is longer than declared")
+        target.write(chunk)  # type: ignore[attr-defined]
+
+
+def _of_layer(layer: Layer) -> Picture:
+    stored_part = layer.part
+    layer = replace(layer, part=stored_part.in_display_window())
+    image = layer.rgb()
+    alpha, weight = layer.channel("A"), layer.channel("W")
+    notes: tuple[str, ...] = ()
+    if alpha is not None and weight is None:
+        if _looks_straight(image, alpha):
+            notes = (
+                "there is colour where alpha is 0: if it is not premultiplied, as OpenEXR "
+                "prescribes, edges of strokes are read too bright",
+            )
+        image = _unpremultiplied(image, alpha)
+    is_half = any(c.dtype == np.float16 for c in stored_part.channels.values())
+    ones = replace(stored_part, channels={"Y": np.ones(stored_part.size, np.bool_)})
+    finite = np.asarray(np.isfinite(image).all(axis=-1))
+    return Picture(
+        kind="exr",
+        image=np.where(finite[..., None], image, np.float32(0)),
+        finite=finite,
+        alpha=alpha,
+        weight=weight,
+        stored=ones.in_display_window().channels["Y"],
+        mantissa=11 if is_half else 24,
+        notes=notes,
+    )
+
+
+def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
+    alpha: Floats | None = None
+    if bitmap.alpha is not None:
+        alpha = np.asarray(bitmap.alpha / np.float32(bitmap.codes or 1), np.float32)
+    notes: tuple[str, ...] = ()
+    if bitmap.kind == "psd" and alpha is not None:
+        alpha, notes = _without_partial(alpha)
+    if bitmap.codes is None:
+        image = _light_of_floats(bitmap, alpha)
+        saturated, used = None, None
+    else:
+        used = view or _view_of(bitmap)
+        image = _decoded(bitmap, alpha, used)
+        top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
+        saturated = bitmap.values >= top
+    finite = np.asarray(np.isfinite(image).all(axis=-1))
+    if not finite.all():
+        image = np.where(finite[..., None], image, np.float32(0))
+    floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
+    return Picture(
+        kind=bitmap.kind,
+        image=image,
+        finite=finite,
+        alpha=alpha,
+        saturated=saturated,
+        view=used,
+        codes=bitmap.codes,
+        mantissa=floats.get(bitmap.values.dtype),
+        lossy=bitmap.lossy,
+        notes=notes,
+    )
+
+
+def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Alpha without what is partly transparent, and a note if there was any.
+
+    Photoshop blends its merged picture with white there and Krita does not; nothing in the file
+    says which, so those colours are not known.
+    """
+    partial = (alpha > 0) & (alpha < 1)
+    if not partial.any():
+        return alpha, ()
+    note = (
+        f"{partial.sum()} partly transparent pixels are left out: Photoshop files do not say what "
+        "colour is there; flatten it, or export a PNG or TIFF"
+    )
+    return np.where(partial, np.float32(0), alpha), (note,)
+
+
+def _view_of(bitmap: Bitmap) -> View:
+    if bitmap.shown is None:
+        return View()
+    name, _, stops = bitmap.shown.rpartition(" ")
+    try:
+        return View(name, float(stops))
+    except ValueError:
+        raise ImageError(f"says that it was shown through {bitmap.shown!r}, no view") from None
+
+
+def _light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
+    image = bitmap.values.astype(np.float32)
+    if bitmap.profile is not None:
+        if not bitmap.profile.is_linear:
+            raise ImageError(
+                f"holds floats of the profile {bitmap.profile.name!r}, which is not linear: "
+                "convert it to linear light and export it again"
+            )
+        image = converted(image, bitmap.profile.matrix)
+    if alpha is not None and bitmap.premultiplied:
+        image = _unpremultiplied(image, alpha)
+    return image
+
+
+def _decoded(bitmap: Bitmap, alpha: Floats | None, view: View) -> Floats:
+    """Linear Rec.709 of the integers, strip by strip."""
+    assert bitmap.codes is not None
+    profile = bitmap.profile
+    if profile is not None and profile.is_srgb:
+        profile = None
+    image = np.empty(bitmap.values.shape, np.float32)
+    rows = max(1, STRIP // bitmap.values.shape[1])
+    for top in range(0, len(image), rows):
+        strip = slice(top, top + rows)
+        display = bitmap.values[strip] / np.float32(bitmap.codes)
+        if bitmap.premultiplied and alpha is not None:
+            display = np.clip(_unpremultiplied(display, alpha[strip]), 0, 1)
+        if profile is None:
+            image[strip] = view.decode(display)
+            continue
+        curved = [curve(display[..., k]) for k, curve in enumerate(profile.curves)]
+        shown = converted(np.stack(curved, axis=-1), profile.matrix)
+        image[strip] = _through(view, shown, is_linear=profile.is_linear, name=profile.name)
+    return image
+
+
+def _through(view: View, shown: Floats, *, is_linear: bool, name: str) -> Floats:
+    """Scene light of what a display is to show, in linear Rec.709."""
+    scale = np.float32(2.0**view.stops)
+    if view.name == "srgb" or (view.name == "linear" and is_linear):
+        return shown / scale  # Beyond Rec.709 as well, for which display values have no room.
+    if view.name == "linear":
+        raise ImageError(f"has the colour profile {name!r}, but its numbers are said to be linear")
+    return view.decode(encode_display(shown))
+
+
+def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
+    scale = np.float32(bitmap.codes or 1)
+    mask = bitmap.values.max(axis=-1) / scale
+    if bitmap.alpha is not None and not bitmap.premultiplied:
+        mask = mask * (bitmap.alpha / scale)
+    return np.asarray(mask, np.float32)
+
+
+def _unpremultiplied(image: Floats, alpha: Floats) -> Floats:
+    safe = np.where(alpha > 0, alpha, 1)
+    # Over next to no alpha a colour may become infinite, and is then counted as such.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return image / safe[..., None]
+
+
+def _looks_straight(image: Floats, alpha: Floats) -> bool:
+    """Whether most of what is transparent has a colour, which premultiplied light rarely has."""
+    clear = alpha == 0
+    return bool(clear.any() and (image[clear] != 0).any(axis=-1).mean() > 0.5)
+
+
+def _naming(path: Path, error: ImageError) -> str:
+    """The message, beginning with the file unless it is named already."""
+    return str(error) if str(path) in str(error) else f"{path} {error}"

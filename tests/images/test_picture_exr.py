@@ -1,0 +1,196 @@
+"""EXR files in every shape that programs give them, by what they must mean."""
+
+from pathlib import Path
+from typing import Any
+
+import colour
+import numpy as np
+import OpenEXR
+import OpenImageIO
+import pytest
+from picture_files import luminance_chroma
+
+from lightpaint.errors import ImageError
+from lightpaint.images.picture import Picture, read_picture
+
+SIZE = (9, 7)
+
+
+def _exr(path: Path, channels: Any, **header: Any) -> Path:
+    head = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, **header}
+    channels = {n: np.ascontiguousarray(c) for n, c in channels.items()}
+    OpenEXR.File(head, channels).write(str(path))
+    return path
+
+
+def _rgb(dtype: Any = np.float32, seed: int = 0) -> Any:
+    values = np.random.default_rng(seed).random((*SIZE, 3)) * (1 if dtype != np.uint32 else 99)
+    return values.astype(dtype)
+
+
+def _named(image: Any, prefix: str = "", names: Any = "RGB") -> Any:
+    return {prefix + name: image[..., k] for k, name in enumerate(names)}
+
+
+@pytest.mark.parametrize(("dtype", "mantissa"), [("f2", 11), ("f4", 24), ("u4", 24)])
+@pytest.mark.parametrize("kind", ["scanlineimage", "tiledimage"])
+@pytest.mark.parametrize(
+    "compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB"]
+)
+def test_exr(tmp_path: Path, dtype: str, mantissa: int, kind: str, compression: str):
+    image = _rgb(np.dtype(dtype).type)
+    header: dict[str, Any] = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
+    if kind == "tiledimage":
+        header["tiles"] = OpenEXR.TileDescription()
+    path = _exr(tmp_path / "a.exr", _named(image), type=getattr(OpenEXR, kind), **header)
+    picture = read_picture(path)
+    assert (picture.kind, picture.codes, picture.mantissa) == ("exr", None, mantissa)
+    # Lossy compressions are of half (B44, DWA) or of 24 bits (PXR24).
+    rtol = {"PXR24": 2**-15}.get(compression, 0.2 if compression[:3] in ("B44", "DWA") else 0)
+    np.testing.assert_allclose(picture.image, image, rtol=rtol, atol=rtol / 10)
+
+
+def test_mip_maps(tmp_path: Path):
+    image = _rgb()
+    source = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(SIZE[1], SIZE[0], 3, OpenImageIO.FLOAT))
+    source.set_pixels(OpenImageIO.ROI(), image)
+    spec = OpenImageIO.ImageSpec()
+    spec.tile_width = spec.tile_height = 16
+    OpenImageIO.ImageBufAlgo.make_texture(
+        OpenImageIO.MakeTxTexture, source, str(tmp_path / "a.exr"), spec
+    )
+    header = OpenEXR.File(str(tmp_path / "a.exr"), header_only=True).parts[0].header
+    assert "MIPMAP" in str(header["tiles"])
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.exr").image, image)
+
+
+def test_layers_by_name(tmp_path: Path):
+    colours = {"": _rgb(seed=1), "Combined_key": _rgb(seed=2), "ViewLayer.Combined": _rgb(seed=3)}
+    channels = {}
+    for name, image in colours.items():
+        channels |= _named(image, f"{name}." if name else "")
+    channels |= {"Normal.X": colours[""][..., 0], "Normal.Y": colours[""][..., 1]}
+    path = _exr(tmp_path / "a.exr", channels)
+    np.testing.assert_array_equal(read_picture(path).image, colours[""])
+    for name in ("Combined_key", "ViewLayer.Combined"):
+        np.testing.assert_array_equal(read_picture(path, layer=name).image, colours[name])
+    with pytest.raises(ImageError, match=r"no layer 'Normal': it has one without a name, Combined"):
+        read_picture(path, layer="Normal")
+    del channels["R"], channels["G"], channels["B"]
+    with pytest.raises(ImageError, match=r"2 layers \(Combined_key, View.*--layer"):
+        read_picture(_exr(path, channels))
+
+
+@pytest.mark.parametrize("names", ["rgb", ["red", "green", "blue"]])
+def test_other_names_of_channels(tmp_path: Path, names: Any):
+    image = _rgb()
+    path = _exr(tmp_path / "a.exr", _named(image, "paint.", names))
+    np.testing.assert_array_equal(read_picture(path).image, image)
+
+
+def test_views_of_one_part(tmp_path: Path):
+    left, right = _rgb(seed=1), _rgb(seed=2)
+    channels = _named(left) | _named(right, "right.")
+    path = _exr(tmp_path / "a.exr", channels, multiView=["left", "right"])
+    np.testing.assert_array_equal(read_picture(path).image, left)
+    np.testing.assert_array_equal(read_picture(path, layer="left").image, left)
+    np.testing.assert_array_equal(read_picture(path, layer="right").image, right)
+
+
+def test_views_in_parts(tmp_path: Path):
+    images = {"left": _rgb(seed=1), "right": _rgb(seed=2)}
+    parts = [
+        OpenEXR.Part({"view": view}, {n: c.copy() for n, c in _named(image).items()}, f"rgb.{view}")
+        for view, image in images.items()
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    with pytest.raises(ImageError, match=r"2 layers \(rgb\.left, rgb\.right\)"):
+        read_picture(tmp_path / "a.exr")
+    for view, image in images.items():
+        for name in (view, f"rgb.{view}"):
+            np.testing.assert_array_equal(read_picture(tmp_path / "a.exr", layer=name).image, image)
+
+
+def _chroma(tmp_path: Path, *planes: Any) -> Picture:
+    (tmp_path / "yc.exr").write_bytes(luminance_chroma(*planes))
+    return read_picture(tmp_path / "yc.exr")
+
+
+def test_luminance_and_chroma(tmp_path: Path):
+    """One hue at many brightnesses: chroma is constant then, however it is interpolated."""
+    y = np.random.default_rng(0).random((8, 10)).astype(np.float16).astype(np.float64)
+    hue = np.array([0.9, 0.4, 0.2])
+    hue /= hue @ [0.2126, 0.7152, 0.0722]
+    planes = [np.full((4, 5), hue[k] - 1) for k in (0, 2)]
+    picture = _chroma(tmp_path, y, *planes)
+    # Chroma is rounded to half, and the luminance of green to four digits.
+    np.testing.assert_allclose(picture.image, y[..., None] * hue, rtol=2e-3, atol=1e-6)
+    # Its means are those of the primaries that are declared.
+    acescg = colour.RGB_COLOURSPACES["ACEScg"]
+    hue = np.array([0.9, 0.4, 0.2])
+    hue /= hue @ acescg.matrix_RGB_to_XYZ[1]
+    planes = [np.full((4, 5), hue[k] - 1) for k in (0, 2)]
+    primaries = (*acescg.primaries.ravel(), *acescg.whitepoint)
+    picture = _chroma(tmp_path, y, *planes, primaries)
+    rec709 = colour.RGB_COLOURSPACES["ITU-R BT.709"]
+    expected = y[..., None] * colour.RGB_to_RGB(hue, acescg, rec709, "Bradford")
+    np.testing.assert_allclose(picture.image, expected, rtol=4e-3, atol=1e-5)
+
+
+def test_chroma_between_its_samples(tmp_path: Path):
+    """It lies on every other pixel, and halfway between on the others."""
+    ramp = np.linspace(-0.3, 0.3, 5)[None].repeat(4, axis=0)
+    picture = _chroma(tmp_path, np.ones((8, 10)), ramp, 0 * ramp)
+    expected = 1 + np.interp(np.arange(10), np.arange(0, 10, 2), ramp[0])
+    np.testing.assert_allclose(picture.image[..., 0], expected[None].repeat(8, axis=0), atol=3e-4)
+    np.testing.assert_allclose(picture.image[..., 2], 1, atol=1e-6)
+
+
+def test_xyz_is_not_adapted(tmp_path: Path):
+    xyz = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
+    path = _exr(tmp_path / "a.exr", _named(_rgb()), chromaticities=xyz)
+    expected = colour.algebra.vecmul(
+        np.linalg.inv(colour.RGB_COLOURSPACES["ITU-R BT.709"].matrix_RGB_to_XYZ), _rgb()
+    )
+    # The matrix of the standard has four digits.
+    np.testing.assert_allclose(read_picture(path).image, expected, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "primaries", [(0.0,) * 8, (0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3), (np.nan,) * 8]
+)
+def test_chromaticities_that_mean_nothing(tmp_path: Path, primaries: Any):
+    path = _exr(tmp_path / "a.exr", _named(_rgb()), chromaticities=primaries)
+    with pytest.raises(ImageError, match=r"a\.exr declares chromaticities that span no colours"):
+        read_picture(path)
+
+
+def test_alpha_and_weight_of_a_layer(tmp_path: Path):
+    image, alpha = _rgb(), np.full(SIZE, 0.5, np.float32)
+    alpha[0] = 0
+    layer = _named(image * alpha[..., None], "paint.") | {"paint.A": alpha}
+    picture = read_picture(_exr(tmp_path / "a.exr", layer | {"A": alpha * 0}))
+    np.testing.assert_array_equal(picture.alpha, alpha)
+    np.testing.assert_array_equal(picture.image[1:], image[1:])
+    assert picture.notes == ()
+    weighted = layer | {"paint.W": alpha * 3}
+    picture = read_picture(_exr(tmp_path / "a.exr", weighted))
+    np.testing.assert_array_equal(picture.weight, alpha * 3)
+    np.testing.assert_array_equal(picture.image, image * alpha[..., None])
+
+
+def test_straight_alpha_is_pointed_out(tmp_path: Path):
+    alpha = np.random.default_rng(0).random(SIZE).astype(np.float32)
+    alpha[:3] = 0
+    picture = read_picture(_exr(tmp_path / "a.exr", _named(_rgb()) | {"A": alpha}))
+    assert "if it is not premultiplied" in picture.notes[0]
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+def test_half_a_step_of_floats(tmp_path: Path, dtype: Any):
+    light = np.exp2(np.random.default_rng(0).uniform(-9, 9, (30, 30, 3)))
+    picture = read_picture(_exr(tmp_path / "a.exr", _named(light.astype(dtype))))
+    missed = np.abs(picture.image - light)
+    assert (missed <= picture.half_step() * 1.001).all()
+    # The step of a binade is that of its upper end.
+    assert missed.max() > 0.45 * picture.half_step().max()
