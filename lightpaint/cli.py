@@ -72,7 +72,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_scene(template)
     _add_sampling(template)
     _add_resolution(template)
-    _add_output(template, "F.exr", "file to write, a PNG beside it (default: template.exr)")
+    _add_view_transform(template)
+    _add_output(
+        template, "DIR|F.exr", "folder to write, or only an EXR and a PNG (default: template/)"
+    )
     template.add_argument(
         "--force", action="store_true", help="replace an existing file (default: refuse)"
     )
@@ -246,6 +249,21 @@ def _add_constraints(parser: argparse.ArgumentParser) -> None:
         type=_at_least(1),
         metavar="K",
         help="use the K lights that serve best, besides locked ones; the others are off",
+    )
+
+
+def _add_view_transform(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--view",
+        metavar="VIEW",
+        help="view transform of pictures of 8 or 16 bits: srgb, linear, filmic, agx, ocio or "
+        "ocio:DISPLAY/VIEW (default: what the template or the picture says, else srgb)",
+    )
+    parser.add_argument(
+        "--exposure",
+        type=float,
+        metavar="STOPS",
+        help="exposure of that view (default: what the template or the picture says, else 0)",
     )
 
 

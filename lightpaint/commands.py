@@ -3,6 +3,7 @@
 import json
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
@@ -12,14 +13,15 @@ from lightpaint.basis.basis import write_basis
 from lightpaint.doctor import examine
 from lightpaint.errors import OutputError
 from lightpaint.files import check_writable
-from lightpaint.given import folders_of, load, render_or_find
-from lightpaint.pipeline import relight_look, render_template
+from lightpaint.given import folders_of, load, render_or_find, view_of
+from lightpaint.pipeline import relight_look, render_look, render_template
 from lightpaint.relight.relight import scene_of
 from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.variant import use_variant
 from lightpaint.solve.lighting import read_lighting
 from lightpaint.solve_command import solve
+from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
 
 __all__ = ["basis", "cache", "doctor", "lights", "relight", "solve", "template", "verify"]
 
@@ -52,25 +54,35 @@ def basis(options: Namespace, _given: list[str]) -> int:
 
 
 def template(options: Namespace, _given: list[str]) -> int:
-    """`lightpaint template SCENE -o F.exr`"""
-    output = Path(options.output or "template.exr")
-    _check_suffix(output)
-    for file in (output, output.with_suffix(".png")):
+    """`lightpaint template SCENE -o DIR`"""
+    output = Path(options.output or "template")
+    only_look = output.suffix.lower() == ".exr"
+    painted_on = [output, output.with_suffix(".png")] if only_look else earlier_files(output)
+    for file in painted_on:
         if file.exists() and not options.force:
             raise OutputError(
                 f"{file} exists and may have been painted on: choose another name with -o, or "
                 "pass --force"
             )
-    check_writable(output.parent)
-    scene = load(options, is_to_solve=False)
+    if not only_look and output.is_file():
+        raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
+    check_writable(output.parent if only_look else output)
+    view = view_of(options)
+    scene = load(options, is_to_solve=False, with_lights_file=not only_look)
     if options.resolution:
         scene = scene.reduced(options.resolution)
+    how: dict[str, Any] = {"view": view, "spp": options.spp, "seed": options.seed}
     with console.progress() as progress:
-        picture = render_template(
-            scene, output, spp=options.spp, seed=options.seed, progress=progress
-        )
-    console.write(f"{output}: paint over it in linear light, and save with alpha where it matters")
-    console.write(f"{picture}: the same as a picture")
+        if only_look:
+            picture = render_look(scene, output, progress=progress, **how)
+        else:
+            render_template(scene, output, progress=progress, **how)
+            picture = output / SHOWN
+    linear = output if only_look else output / LIGHT
+    console.write(f"{linear}: paint over it in linear light, in a program that knows EXR")
+    console.write(f"{picture}: the same in 16 bits, for any program: paint over it and save as PNG")
+    if not only_look:
+        console.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
     return 0
 
 

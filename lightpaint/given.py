@@ -11,6 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.obtain import obtain_basis
 from lightpaint.basis.render import memory_needed, why_not_one_pass
 from lightpaint.errors import OutputError
+from lightpaint.images.view import View
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
@@ -23,13 +24,15 @@ def load(
     path: Path | None = None,
     is_to_solve: bool = True,
     is_first: bool = True,
+    with_lights_file: bool = False,
 ) -> Scene:
     """The scene that was asked for, and what is worth knowing of it.
 
     is_to_solve: whether its lights are looked at, and not only their sum. is_first: whether
-    anything is to be said that would be said again of another view.
+    anything is to be said that would be said again of another view. with_lights_file: whether
+    the one beside the scene ties lights that no option does.
     """
-    chosen: dict[str, Any] = {"use_lights_file": False}
+    chosen: dict[str, Any] = {"use_lights_file": with_lights_file}
     if is_to_solve:
         chosen = {
             "lights": options.lights,
@@ -99,6 +102,13 @@ def render_or_find(scene: Scene, options: Namespace, *, time_s: float | None = N
             "(--no-cache renders it anew)"
         )
     return made
+
+
+def view_of(options: Namespace) -> View | None:
+    """The view that --view and --exposure ask for, if they do."""
+    if options.view is None and options.exposure is None:
+        return None
+    return View.parse(options.view or "srgb", options.exposure or 0.0)
 
 
 def constraints_of(options: Namespace) -> Constraints:

@@ -8,11 +8,12 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.obtain import check_same_view, obtain_basis
-from lightpaint.basis.render import basis_lights
+from lightpaint.basis.render import basis_lights, render_basis
 from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.files import check_writable, restoring
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import write_estimate
+from lightpaint.images.view import View
 from lightpaint.progress import Progress, silent
 from lightpaint.relight.refine import refine_by_rendering
 from lightpaint.relight.relight import check_relightable, relight
@@ -26,9 +27,10 @@ from lightpaint.results import (
     show_look,
     write_predicted,
 )
-from lightpaint.scene.quality import on_film, samples
+from lightpaint.scene.quality import Preset, on_film, samples
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.surfaces import render_surfaces
 from lightpaint.settings import Settings
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.constraints_file import read_constraints
@@ -40,7 +42,10 @@ from lightpaint.solve.solve import Solution, problem_of, solution_of
 from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.solve.views import joint_basis, joint_problem, parted
 from lightpaint.target.target import Target, read_target
-from lightpaint.target.template import write_template
+from lightpaint.target.template import Template, write_look, write_template
+
+#: Rendering of what each light does alone, to recognise it by.
+THUMBNAIL = Preset(32, 2**14)
 
 #: Samples per pixel of a verification that has a large film for a small basis, at least.
 FEWEST = 4
@@ -86,7 +91,7 @@ def paint_with_light(
         check_same_view(scene, basis)
     if not isinstance(target, Target):
         target = read_target(target, mask=mask)
-    view = View(scene, target, Path(folder), basis)
+    view = PaintedView(scene, target, Path(folder), basis)
     [look] = _paint([view], Path(folder), asked, progress)
     return look
 
@@ -115,14 +120,14 @@ def paint_views_with_light(
             raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
     made = [None] * len(scenes) if bases is None else bases
     views = [
-        View(scene, target, Path(folder) / name, basis)
+        PaintedView(scene, target, Path(folder) / name, basis)
         for scene, target, name, basis in zip(scenes, targets, names, made, strict=True)
     ]
     return _paint(views, Path(folder), Settings(**settings), progress)
 
 
 @dataclass(frozen=True)
-class View:
+class PaintedView:
     """What is seen through one sensor: its painting, and where its results go.
 
     scene: None where there is only a basis; basis: None where it is still to be rendered.
@@ -134,7 +139,9 @@ class View:
     basis: Basis | None = None
 
 
-def _paint(views: list[View], folder: Path, settings: Settings, progress: Progress) -> list[Look]:
+def _paint(
+    views: list[PaintedView], folder: Path, settings: Settings, progress: Progress
+) -> list[Look]:
     """One lighting for all views, into `folder`; pictures into the folders of the views."""
     scene = views[0].scene
     constraints = all_constraints(scene, settings.constraints)
@@ -162,7 +169,7 @@ def _paint(views: list[View], folder: Path, settings: Settings, progress: Progre
         ]
 
 
-def _to_be_written(views: list[View], folder: Path) -> list[Path]:
+def _to_be_written(views: list[PaintedView], folder: Path) -> list[Path]:
     """All files that are about to be replaced. Raises what keeps the scene from being relit."""
     written = [*earlier_results(folder), folder / "lighting.json"]
     for view in views:
@@ -176,7 +183,7 @@ def _to_be_written(views: list[View], folder: Path) -> list[Path]:
     return written
 
 
-def _fitted(views: list[View], settings: Settings) -> list[View]:
+def _fitted(views: list[PaintedView], settings: Settings) -> list[PaintedView]:
     """The views on the films that are to be rendered, with targets of their sizes."""
     fitted = []
     for view in views:
@@ -191,7 +198,9 @@ def _fitted(views: list[View], settings: Settings) -> list[View]:
     return fitted
 
 
-def _with_basis(view: View, settings: Settings, count: int, progress: Progress) -> View:
+def _with_basis(
+    view: PaintedView, settings: Settings, count: int, progress: Progress
+) -> PaintedView:
     """`view` with its basis, one of `count` that share the time there is."""
     if view.basis is not None or view.scene is None:
         return view
@@ -207,7 +216,11 @@ def _with_basis(view: View, settings: Settings, count: int, progress: Progress) 
 
 
 def _improved(
-    whole: Basis, solution: Solution, views: list[View], settings: Settings, progress: Progress
+    whole: Basis,
+    solution: Solution,
+    views: list[PaintedView],
+    settings: Settings,
+    progress: Progress,
 ) -> tuple[Solution, Uncertainty]:
     """What can be done against noise is done, and said how much of it is left."""
     if settings.noise_correction:
@@ -223,7 +236,7 @@ def _improved(
 
 
 def _finished(
-    view: View,
+    view: PaintedView,
     solution: Solution,
     uncertainty: Uncertainty,
     alike: tuple[Ambiguity, ...],
@@ -262,7 +275,7 @@ def _finished(
     return look
 
 
-def _basis(view: View) -> Basis:
+def _basis(view: PaintedView) -> Basis:
     assert view.basis is not None
     return view.basis
 
@@ -277,20 +290,55 @@ def all_constraints(scene: Scene | None, given: Constraints | None) -> Constrain
 
 def render_template(
     scene: Scene,
+    folder: Path,
+    *,
+    view: View | None = None,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> list[Path]:
+    """Render something to paint on into `folder`, and return its files (docs/targets.md).
+
+    view: how the look becomes a picture; sRGB by default, at an exposure that shows something.
+    """
+    look = render(
+        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
+    ).image
+    surfaces = render_surfaces(scene, seed=seed, progress=progress)
+    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.view)}")
+    lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
+    template = Template(
+        look,
+        view or View("srgb", choose_exposure(look)),
+        scene=scene.path.name,
+        content=scene.content,
+        sensor=scene.sensor_names[scene.sensor],
+        albedo=surfaces.albedo,
+    )
+    return write_template(
+        folder,
+        template,
+        normals=surfaces.normal,
+        depth=surfaces.depth,
+        mattes=surfaces.coverage,
+        lights=dict(zip(lights.names, lights.images, strict=True)),
+    )
+
+
+def render_look(
+    scene: Scene,
     path: Path,
     *,
+    view: View | None = None,
     spp: int | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Path:
-    """Render the current look of `scene` to an EXR, to be painted over.
-
-    Returns the path of the display-encoded PNG beside it.
-    """
+    """Only the look to paint on, as EXR at `path`; returns the PNG beside it."""
     look = render(
         scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
-    )
-    return write_template(path, look.image)
+    ).image
+    return write_look(path, look, view or View("srgb", choose_exposure(look)))
 
 
 def relight_look(

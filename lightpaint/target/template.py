@@ -1,24 +1,177 @@
-"""Something to paint on: the current look, as linear EXR and as a picture to look at."""
+"""Something to paint on: the current look, what helps to select in it, and what it was made of."""
 
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.files import write_bytes
+import numpy as np
+
+from lightpaint.errors import ImageError, TargetError, ViewError
+from lightpaint.files import restoring, write_bytes, write_text
 from lightpaint.images.bitmap import VIEW_KEY
-from lightpaint.images.display import choose_exposure, png_bytes, to_8_bit
-from lightpaint.images.exr import Floats, write_rgb
+from lightpaint.images.display import png_bytes, to_8_bit
+from lightpaint.images.exr import Floats, Part, read_parts, write_parts, write_rgb
+from lightpaint.images.png import write_png_16
 from lightpaint.images.view import View
 
+FORMAT = "lightpaint-template 1"
 
-def write_template(path: Path, image: Floats, *, view: View | None = None) -> Path:
-    """Write a linear image (h, w, 3) to `path` and, through `view`, to a PNG beside it.
+#: The files of a template: what says how it was made, what is painted on, what helps.
+ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
+NORMALS, DEPTH, MATTES, LIGHTS = "normals.exr", "depth.exr", "mattes", "lights"
 
-    Without a view it is shown as sRGB, at an exposure that shows something. The PNG says how;
-    paint programs may drop that when they save, and `read_target` is then to be told. Returns
-    the path of the PNG.
+
+@dataclass(frozen=True)
+class Template:
+    """The look that is painted over.
+
+    image: (h, w, 3) linear Rec.709. view: how template.png shows it. scene: name of the file,
+    content: its hash (see `Scene.content`), sensor: what it is seen through.
+    albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
     """
+
+    image: Floats
+    view: View
+    scene: str = ""
+    content: str = ""
+    sensor: str = ""
+    albedo: Floats | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self.image.shape[0], self.image.shape[1]
+
+    @property
+    def shown(self) -> Floats:
+        """The values in [0, 1] that template.png holds, rounded to its 16 bits."""
+        return np.round(self.view.encode(self.image) * 65535) / 65535
+
+
+def write_template(
+    folder: Path,
+    template: Template,
+    *,
+    normals: Floats,
+    depth: Floats,
+    mattes: Mapping[str, Floats],
+    lights: Mapping[str, Floats],
+) -> list[Path]:
+    """Write a template into `folder`, in place of an earlier one, wholly or not at all.
+
+    Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
+    [0, 1]; lights: by name, (h', w', 3) linear, what each does alone.
+    """
+    matte_files = [folder / MATTES / f"{name}.png" for name in file_names(mattes)]
+    light_files = [folder / LIGHTS / f"{name}.png" for name in file_names(lights)]
+    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    written = [*plain, *matte_files, *light_files]
+    with restoring(folder, [*written, *earlier_files(folder)]):
+        write_look(folder / LIGHT, template.image, template.view)
+        if template.albedo is not None:
+            write_rgb(folder / ALBEDO, template.albedo)
+        write_rgb(folder / NORMALS, normals)
+        write_parts(folder / DEPTH, [Part("depth", {"Y": depth.astype(np.float32)})])
+        for file, matte in zip(matte_files, mattes.values(), strict=True):
+            write_bytes(file, png_bytes(to_8_bit(matte)))
+        for file, look in zip(light_files, lights.values(), strict=True):
+            write_bytes(file, _thumbnail(look, template.view.name))
+        # Last: a folder without it is no template.
+        write_text(folder / ABOUT, _about(template))
+    return written
+
+
+def _thumbnail(look: Floats, view: str) -> bytes:
+    """A linear picture as PNG, whatever its brightness."""
+    bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
+    shown = View(view, float(np.clip(-np.log2(bright), -60, 60)))
+    return png_bytes(to_8_bit(shown.encode(look)))
+
+
+def _about(template: Template) -> str:
+    about = {
+        "format": FORMAT,
+        "scene": template.scene,
+        "content": template.content,
+        "sensor": template.sensor,
+        "size": [template.size[1], template.size[0]],
+        "view": {"name": template.view.name, "stops": template.view.stops},
+    }
+    return json.dumps(about, indent=2, ensure_ascii=False) + "\n"
+
+
+def earlier_files(folder: Path) -> list[Path]:
+    """Those of a template that stands in `folder`; none if it is somebody else's."""
+    if not (folder / ABOUT).is_file():
+        return []
+    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
+
+
+def write_look(path: Path, image: Floats, view: View) -> Path:
+    """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG."""
     write_rgb(path, image)
-    shown = view or View("srgb", choose_exposure(image))
     picture = path.with_suffix(".png")
-    pixels = to_8_bit(shown.encode(image))
-    write_bytes(picture, png_bytes(pixels, {VIEW_KEY: f"{shown.name} {shown.stops!r}"}))
+    write_png_16(picture, view.encode(image), texts=_texts(view))
     return picture
+
+
+def read_template(folder: Path) -> Template:
+    """Read what `write_template` wrote. Raises TargetError for anything else."""
+    about = folder / ABOUT
+    try:
+        data = json.loads(about.read_text(encoding="utf-8"))
+        if data["format"] != FORMAT:
+            raise ValueError(f"its format is {data['format']!r}, expected {FORMAT!r}")
+        view = View(str(data["view"]["name"]), float(data["view"]["stops"]))
+        scene, content, sensor = (data[key] for key in ("scene", "content", "sensor"))
+        if not all(isinstance(name, str) for name in (scene, content, sensor)):
+            raise TypeError("scene, content and sensor are to be texts")
+        image = read_parts(folder / LIGHT)[0].rgb()
+        albedo = read_parts(folder / ALBEDO)[0].rgb() if (folder / ALBEDO).is_file() else None
+        if albedo is not None and albedo.shape != image.shape:
+            raise ValueError(f"{ALBEDO} and {LIGHT} differ in size")
+        if not np.isfinite(image).all():
+            raise ValueError(f"{LIGHT} holds NaN or Inf")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, ImageError, ViewError) as e:
+        raise TargetError(
+            f"{folder} is no template: {_one_line(e)}; make one with lightpaint template"
+        ) from None
+    return Template(image, view, scene, content, sensor, albedo)
+
+
+def find_template(painting: Path) -> Path | None:
+    """The folder of the template that `painting` was most likely painted on.
+
+    Its own folder, `template/` in it, or `template/` where the command is given.
+    """
+    places = (painting.parent, painting.parent / "template", Path("template"))
+    return next((place for place in places if (place / ABOUT).is_file()), None)
+
+
+def file_names(names: Iterable[str]) -> list[str]:
+    """A name for a file for each name, on any system, no two the same even without case."""
+    made: list[str] = []
+    taken: set[str] = set()
+    for name in names:
+        stem = re.sub(r"[^\w.+-]", "_", name).strip("._")[:80] or "_"
+        unique, k = stem, 2
+        while unique.lower() in taken:
+            unique, k = f"{stem}-{k}", k + 1
+        taken.add(unique.lower())
+        made.append(unique)
+    return made
+
+
+def _texts(view: View) -> dict[str, str]:
+    return {VIEW_KEY: f"{view.name} {view.stops!r}"}
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, FileNotFoundError):
+        return f"it has no {Path(error.filename or '').name}"
+    if isinstance(error, KeyError):
+        return f"{ABOUT} lacks {error}"
+    return " ".join(str(error).split())

@@ -1,0 +1,99 @@
+"""What was painted: where a picture differs from the template it was painted on.
+
+A file that comes back from a paint program was rounded to its format, and maybe compressed; all
+that differs by more is paint. Faint paint counts for less, so that a soft brush leaves a soft
+importance.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.errors import SizeError
+from lightpaint.images.estimate import box_mean
+from lightpaint.images.exr import Floats
+from lightpaint.images.picture import Picture
+from lightpaint.target.template import Template
+
+#: Difference at which paint counts fully, of the display's range or, in linear light, of the
+#: brighter of both.
+FULL = 0.04
+
+#: Codes by which programs differ in rounding: half a code each, and dithering.
+ROUNDING = 1.6
+
+#: Pixels on either side over which what a lossy compression did to single ones averages out, and
+#: what is left of it then.
+LOSSY_RADIUS, LOSSY = 4, 2.5 / 255
+
+#: Light below this share of display white is compared as if it were that: deep shadows are noise.
+DARK = 0.002
+
+
+def painted_where(picture: Picture, template: Template) -> npt.NDArray[np.float32]:
+    """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
+
+    Raises SizeError if they differ in size.
+    """
+    if picture.size != template.size:
+        raise SizeError(
+            f"the painting is {picture.size[1]}x{picture.size[0]} but its template is "
+            f"{template.size[1]}x{template.size[0]}: export it at that size, or say by alpha or "
+            "--mask what was painted"
+        )
+    difference, tolerance = (
+        _difference_of_light(picture, template)
+        if picture.codes is None
+        else _difference_of_codes(picture, template)
+    )
+    # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.
+    share = np.clip((difference - tolerance) / (FULL - tolerance), 0, 1)
+    return _without_pinholes((share * share * (3 - 2 * share)).astype(np.float32))
+
+
+def _difference_of_light(picture: Picture, template: Template) -> tuple[Floats, float]:
+    """Relative difference of linear light, largest of the channels, and what rounding makes."""
+    tolerance = 4 * 2.0 ** -(picture.mantissa or 24)
+    # It may have been painted on the EXR, or on the PNG and saved as light.
+    decoded = template.view.decode(template.shown)
+    looks = [(template.image, tolerance), (decoded, tolerance + 1e-4)]
+    found = []
+    for look, allowed in looks:
+        dark = DARK * template.view.white
+        size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), dark)
+        relative = np.max(np.abs(picture.image - look) / size, axis=-1)
+        found.append((relative, allowed))
+    return min(found, key=lambda pair: float(np.median(np.minimum(pair[0], FULL))))
+
+
+def _difference_of_codes(picture: Picture, template: Template) -> tuple[Floats, float]:
+    """Difference of display values, largest of the channels, and what rounding makes."""
+    assert picture.codes is not None
+    view = picture.view or template.view
+    mine, its = view.encode(picture.image), view.encode(template.image)
+    difference = np.asarray(mine - its, np.float64)
+    if picture.lossy:
+        smooth = box_mean(difference, LOSSY_RADIUS)
+        return np.abs(smooth).max(axis=-1), LOSSY
+    codes = 255 if _is_8_bit(mine) else picture.codes
+    # Some programs reckon in 15 bits when they say 16.
+    return np.abs(difference).max(axis=-1), ROUNDING / min(codes, 2**15)
+
+
+def _is_8_bit(display: Floats) -> bool:
+    """Whether all values are those of 8 bits, whatever the file has."""
+    values = display * 255
+    return bool(np.abs(values - np.round(values)).max() < 0.02)
+
+
+def _without_pinholes(share: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Single pixels that paint happened to leave as they were are part of what is around them."""
+    return -_largest_around(-_largest_around(share))
+
+
+def _largest_around(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Maximum over the pixel and its eight neighbours."""
+    height, width = values.shape
+    padded = np.pad(values, 1, mode="edge")
+    return np.asarray(
+        np.max([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
+    )
