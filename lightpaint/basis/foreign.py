@@ -1,0 +1,268 @@
+"""A basis from another renderer's light groups: layers of an EXR file that add up to the picture.
+
+A weight multiplies what was rendered, so that 1, 1, 1 is the light as it is. What the groups
+lack of the beauty becomes one more light, `rest`, that stays as it is.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import FORMAT_KEY, Basis, BasisLight, Origin
+from lightpaint.basis.layers import Layer, read_layers
+from lightpaint.basis.naming import Choice, choose_files, choose_layers, is_known
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.color import LUMINANCE
+from lightpaint.images.exr import Floats, read_headers
+
+#: What one unit of weight is.
+AS_RENDERED = "× as rendered"
+
+#: Name of what the groups lack of the beauty, with underscores added should a light have it.
+REST = "rest"
+
+#: Share of the beauty that the groups may lack beyond rounding before it counts as missing.
+NOTHING = 1e-5
+
+#: Share of the beauty by which they may exceed it before that is a warning.
+EXCEEDING = 1e-3
+
+#: Largest relative error of one rounding to float16, absolute error below its normal range, and
+#: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
+HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
+
+
+@dataclass(frozen=True)
+class LightGroups:
+    """What `read_light_groups` found.
+
+    basis: a light for each group, and `rest` last if something is missing. layers: those of the
+    groups, in the order of the lights, without `rest`. beauty: None if the file has none.
+    missing, exceeding: luminance that the groups lack of the beauty and have too much, as shares
+    of it, pixel by pixel; None without a beauty.
+    holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the basis,
+    so that they count nothing in any sum.
+    remarks: what is worth knowing, one sentence each.
+    """
+
+    basis: Basis
+    path: Path
+    renderer: str
+    layers: tuple[Layer, ...]
+    beauty: Layer | None
+    missing: float | None
+    exceeding: float | None
+    holes: npt.NDArray[np.bool_]
+    remarks: tuple[str, ...]
+
+    @property
+    def has_rest(self) -> bool:
+        """Whether the last light of the basis is what the groups lack."""
+        return len(self.basis.lights) > len(self.layers)
+
+    @property
+    def is_half(self) -> bool:
+        """Whether the file holds no more than float16."""
+        return all(layer.is_half for layer in self.layers)
+
+
+def is_light_groups(path: Path) -> bool:
+    """Whether `path` is a folder with an EXR, or an EXR that is no basis of lightpaint's own."""
+    path = Path(path)
+    if path.is_dir():
+        return any(file.suffix.lower() == ".exr" for file in path.iterdir())
+    if path.suffix.lower() != ".exr" or not path.is_file():
+        return False
+    try:
+        headers, _ = read_headers(path)
+    except ImageError:
+        return False
+    return not any(FORMAT_KEY in header for header in headers)
+
+
+def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightGroups:
+    """Read the light groups of an EXR file, or of a folder with a file for each.
+
+    pattern: `Light_{name}`, which layers, parts or files are lights; by default the names that
+    known renderers give them (naming.py).
+
+    Raises ImageError for a file that cannot be read or is not linear Rec.709, BasisError where
+    the lights cannot be told from other layers, or differ in size.
+    """
+    path = Path(path)
+    layers = {layer.name: layer for layer in read_layers(path)}
+    choice = _choose(path, layers, pattern)
+    beauty = layers[choice.beauty] if choice.beauty is not None else None
+    names, lights = list(choice.lights), [layers[name] for name in choice.lights.values()]
+    used = {id(layer) for layer in lights}
+    others = [layer for layer in layers.values() if id(layer) not in used]
+    if beauty is None:
+        beauty = _beauty_by_sum(others, lights)
+    if beauty is None and choice.renderer == "one file per light" and len(lights) > 2:
+        # One of them may be the picture under a name of its own.
+        beauty = next((x for x in lights if _adds_up(x, [y for y in lights if y is not x])), None)
+        kept = [(n, x) for n, x in zip(names, lights, strict=True) if x is not beauty]
+        names, lights = [n for n, _ in kept], [x for _, x in kept]
+    for name, layer in choice.beside.items():
+        here = layers[layer]
+        # Whether a renderer counts these among its groups depends on version and settings.
+        if beauty is None or _lacking(beauty, [*lights, here]) < _lacking(beauty, lights):
+            names.append(name)
+            lights.append(here)
+    return _light_groups(path, choice, names, lights, beauty)
+
+
+def _choose(path: Path, layers: dict[str, Layer], pattern: str | None) -> Choice:
+    by_file: dict[Path, int] = {}
+    for layer in layers.values():
+        by_file[layer.file] = by_file.get(layer.file, 0) + 1
+    if pattern is None and len(by_file) == len(layers) > 1 and not any(map(is_known, layers)):
+        return choose_files(layers)
+    others = {name: layer.others for name, layer in layers.items()}
+    return choose_layers(others, pattern=pattern, where=str(path))
+
+
+def _light_groups(
+    path: Path, choice: Choice, names: list[str], lights: list[Layer], beauty: Layer | None
+) -> LightGroups:
+    if not lights:
+        raise BasisError(f"{path} has no light group beside its beauty {beauty and beauty.name!r}")
+    read = [*lights, beauty] if beauty is not None else lights
+    holes = ~np.logical_and.reduce([np.isfinite(x.image).all(axis=-1) for x in read])
+    if holes.all():
+        raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
+    images = np.stack([_filled(layer.image, holes) for layer in lights])
+    remarks = [f"light groups as of {choice.renderer}: {', '.join(names)}", *choice.remarks]
+    rest, missing, exceeding = None, None, None
+    if beauty is None:
+        remarks.append(
+            "no beauty among the layers, so that nothing tells whether the groups are all of it"
+        )
+    else:
+        whole = _filled(beauty.image, holes)
+        rest = whole.astype(np.float64) - images.sum(axis=0, dtype=np.float64)
+        missing, exceeding = _shares(rest, whole)
+        sentence, is_missing = _spoken_sum(rest, whole, [*lights, beauty], missing, exceeding)
+        remarks.append(sentence)
+        rest = rest if is_missing else None
+    if holes.any():
+        remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
+    made = [
+        _light(name, layer.name, "light group") for name, layer in zip(names, lights, strict=True)
+    ]
+    if rest is not None:
+        made.append(_light(_free(REST, names), "beauty less the groups", "rest", is_fixed=True))
+        images = np.concatenate([images, rest[None].astype(np.float32)])
+    basis = Basis(
+        lights=tuple(made),
+        images=images,
+        half_differences=np.zeros_like(images),
+        emitters_seen=np.zeros(images.shape[1:3], dtype=bool),
+        origin=_origin(path, choice, images, names),
+    )
+    return LightGroups(
+        basis,
+        path,
+        choice.renderer,
+        tuple(lights),
+        beauty,
+        missing,
+        exceeding,
+        holes,
+        tuple(remarks),
+    )
+
+
+def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> BasisLight:
+    form = layer if layer != name else ""
+    return BasisLight(name, plugin, "", AS_RENDERED, (1.0, 1.0, 1.0), form, is_fixed=is_fixed)
+
+
+def _origin(path: Path, choice: Choice, images: Floats, names: Sequence[str]) -> Origin:
+    """Of samples nothing is known: no half has any, and so there are no error bars."""
+    digest = hashlib.sha256(repr((names, images.shape)).encode())
+    for image in images:
+        digest.update(np.ascontiguousarray(image).data)
+    return Origin(
+        scene=path.name,
+        scene_identity=digest.hexdigest()[:32],
+        sensor=choice.view or "as rendered",
+        seed=0,
+        method=f"light groups of {choice.renderer}",
+        halves=(0, 0),
+        passes=(0, 0),
+    )
+
+
+def _filled(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+    return np.where(holes[..., None], np.float32(0), image.astype(np.float32))
+
+
+def _shares(rest: Floats, whole: Floats) -> tuple[float, float]:
+    """Luminance that is missing, and that is too much, over that of the beauty."""
+    total = float((np.abs(whole) @ LUMINANCE).sum())
+    if total == 0:
+        return 0.0, float(bool(rest.any()))
+    lacking, excess = np.maximum(rest, 0), np.maximum(-rest, 0)
+    return float((lacking @ LUMINANCE).sum()) / total, float((excess @ LUMINANCE).sum()) / total
+
+
+def rounding(layers: Sequence[Layer]) -> Floats:
+    """By how much the sum of the layers may be off its true value for rounding, (h, w, 3)."""
+    bound: Floats = np.zeros(layers[0].image.shape)
+    for layer in layers:
+        size = np.abs(np.nan_to_num(layer.image.astype(np.float64), posinf=0, neginf=0))
+        bound = bound + (size * HALF + SUBNORMAL if layer.is_half else 0) + size * SUMMED
+    return bound
+
+
+def _spoken_sum(
+    rest: Floats, whole: Floats, layers: Sequence[Layer], missing: float, exceeding: float
+) -> tuple[str, bool]:
+    """A sentence on the sum of the groups, and whether what they lack is more than rounding."""
+    beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
+    truly_missing, truly_exceeding = _shares(beyond, whole)
+    if truly_missing + truly_exceeding <= NOTHING:
+        off = missing + exceeding
+        return f"the groups add up to the beauty (to {off:.1g} of its light)", False
+    told = f"the groups lack {_percent(missing)} of the light of the beauty: it stays, as {REST}"
+    if truly_exceeding > EXCEEDING:
+        told += (
+            f"; WARNING: elsewhere they exceed it by {_percent(exceeding)}, which {REST} takes "
+            "away again: is the beauty denoised or clamped, or a light in two groups?"
+        )
+    return told, True
+
+
+def _lacking(beauty: Layer, lights: Sequence[Layer]) -> float:
+    """Σ |beauty − Σ lights|, where both are finite."""
+    total = sum(layer.image.astype(np.float64) for layer in lights)
+    return float(np.nan_to_num(np.abs(beauty.image - total), posinf=0, neginf=0).sum())
+
+
+def _adds_up(beauty: Layer, lights: Sequence[Layer]) -> bool:
+    """Whether the lights add up to just that picture, which then is not black."""
+    size = np.nan_to_num(np.abs(beauty.image.astype(np.float64)), posinf=0, neginf=0)
+    total = sum(layer.image.astype(np.float64) for layer in lights)
+    off = np.nan_to_num(np.abs(beauty.image - total), posinf=0, neginf=0)
+    beyond = np.maximum(off - rounding([*lights, beauty]), 0)
+    return bool(size.sum() > 0 and beyond.sum() <= NOTHING * size.sum())
+
+
+def _beauty_by_sum(others: Sequence[Layer], lights: Sequence[Layer]) -> Layer | None:
+    """The layer that the lights add up to, where it has a name that nobody knows."""
+    return next((layer for layer in others if _adds_up(layer, lights)), None)
+
+
+def _free(name: str, taken: Sequence[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

@@ -1,0 +1,174 @@
+"""The RGB layers of an EXR file, or of a folder of them, whoever has written it.
+
+A layer is three channels that share all but the last part of their names, `key.R`, `key.G` and
+`key.B`; in a part of its own it may have plain `R`, `G`, `B` and the part its name.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.basis.naming import is_known, short_names
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.exr import Floats, Part, read_parts
+
+#: The last part of the names of red, green and blue, in lower case, and of alpha.
+COLOURS = (("r", "g", "b"), ("red", "green", "blue"))
+ALPHAS = ("a", "alpha")
+
+#: CIE xy of red, green, blue and white of Rec.709.
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+#: Text attribute in which Blender and others name the colour space.
+COLOR_SPACE = "colorInteropID"
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Three channels of a file.
+
+    name: what it is chosen by. part, channels: where it stands; part is "" where a file has one.
+    others: other names that a pattern may meet it by.
+    image: (h, w, 3) in the display window, linear Rec.709, float16 or float32 as stored.
+    alpha: (h, w), or None.
+    """
+
+    name: str
+    file: Path
+    part: str
+    channels: tuple[str, str, str]
+    others: tuple[str, ...]
+    image: Floats
+    alpha: Floats | None = None
+
+    @property
+    def is_half(self) -> bool:
+        return bool(self.image.dtype == np.float16)
+
+    @property
+    def place(self) -> str:
+        """File and layer, for messages."""
+        return f"{self.file}{f' ({self.name})' if self.name else ''}"
+
+
+def read_layers(path: Path) -> list[Layer]:
+    """The RGB layers of the file or of the files in the folder at `path`, in their order.
+
+    In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
+    names share. Raises ImageError for files that cannot be read, BasisError if there are none,
+    if they differ in size or if names repeat.
+    """
+    path = Path(path)
+    layers = _of_folder(path) if path.is_dir() else _of_file(path)
+    if not layers:
+        raise BasisError(f"{path} has no RGB layers: give the multi-layer EXR, or a folder of them")
+    first = layers[0]
+    for layer in layers[1:]:
+        if layer.image.shape != first.image.shape:
+            raise BasisError(
+                f"{layer.place} is {_size(layer)} but {first.place} is {_size(first)}: light "
+                "groups need one size"
+            )
+    names = [layer.name for layer in layers]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise BasisError(
+            f"{path} has the layers {', '.join(name or 'R, G, B' for name in twice)} more than "
+            "once: is it a sequence of frames, or several views? give one file of one view"
+        )
+    return layers
+
+
+def _of_folder(folder: Path) -> list[Layer]:
+    files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".exr" and f.is_file())
+    if not files:
+        raise BasisError(f"{folder} holds no .exr file: give the one with the light groups")
+    if len(files) == 1:
+        return _of_file(files[0])
+    read = {file: _of_file(file) for file in files}
+    plain = [file.stem for file, layers in read.items() if [x.name for x in layers] == [""]]
+    short = short_names(plain)
+    made = []
+    for file, layers in read.items():
+        for x in layers:
+            name = x.name or file.stem
+            # What a renderer calls a file is a better name than what is left of it.
+            if not x.name and not is_known(name):
+                name = short.get(name, name)
+            made.append(replace(x, name=name, others=(file.stem, file.name, *x.others)))
+    return made
+
+
+def _of_file(path: Path) -> list[Layer]:
+    parts = read_parts(path)
+    layers = []
+    for part in parts:
+        shown = part.in_display_window()
+        for prefix, channels in _triples(shown.channels).items():
+            alone = prefix == "" and len(parts) > 1
+            name = part.name if alone else prefix
+            alpha = _alpha(shown.channels, channels)
+            others = [part.name, f"{part.name}.{prefix}", path.stem, path.name]
+            layers.append(
+                Layer(
+                    name,
+                    path,
+                    part.name if len(parts) > 1 else "",
+                    channels,
+                    # In a file of one layer its part and the file say something of it.
+                    tuple(others if len(parts) == 1 and not prefix else others[:2]),
+                    _linear_rec709(path, part, shown, channels),
+                    alpha,
+                )
+            )
+    return layers
+
+
+def _triples(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
+    """Prefix → its channels of red, green and blue, of those that have all three."""
+    by_layer: dict[str, dict[str, str]] = {}
+    for name in names:
+        prefix, _, last = name.rpartition(".")
+        by_layer.setdefault(prefix, {})[last.casefold()] = name
+    found = {}
+    for prefix, channels in by_layer.items():
+        for r, g, b in COLOURS:
+            if r in channels and g in channels and b in channels:
+                found[prefix] = (channels[r], channels[g], channels[b])
+    return found
+
+
+def _alpha(channels: Mapping[str, Floats], rgb: tuple[str, str, str]) -> Floats | None:
+    prefix, _, _ = rgb[0].rpartition(".")
+    for name, pixels in channels.items():
+        layer, _, last = name.rpartition(".")
+        if layer == prefix and last.casefold() in ALPHAS:
+            return pixels
+    return None
+
+
+def _linear_rec709(path: Path, part: Part, shown: Part, channels: tuple[str, str, str]) -> Floats:
+    """The three channels as (h, w, 3) linear Rec.709. Raises ImageError for other colours."""
+    space = part.attributes.get(COLOR_SPACE, "")
+    known = ("", "data", "unknown")
+    if not (space in known or space.startswith(("lin_rec709", "lin_srgb"))):
+        raise ImageError(
+            f"{path} is in the colour space {space!r}, but linear Rec.709 is expected: convert it "
+            "and export it again"
+        )
+    declared = part.primaries
+    # Files round the numbers: to three decimals, or to float16.
+    if declared is not None and not np.allclose(declared, REC709, rtol=0, atol=1e-3):
+        xy = ", ".join(f"{v:.4g}" for v in declared)
+        raise ImageError(
+            f"{path} declares the chromaticities {xy} (CIE xy of red, green, blue, white), but "
+            "linear Rec.709 is expected: convert it and export it again"
+        )
+    pixels = [shown.channels[name] for name in channels]
+    kind = np.float16 if all(p.dtype == np.float16 for p in pixels) else np.float32
+    return np.stack(pixels, axis=-1).astype(kind, copy=False)
+
+
+def _size(layer: Layer) -> str:
+    return f"{layer.image.shape[1]}x{layer.image.shape[0]}"
