@@ -68,7 +68,6 @@ def without_holes(target: Target, groups: LightGroups) -> Target:
         target,
         importance=np.where(groups.holes, np.float32(0), target.importance),
         not_finite=target.not_finite + int(lost.sum()),
-        everything=False,
     )
 
 

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import FORMAT_KEY, Basis, BasisLight, Origin
+from lightpaint.basis.beauty import adds_up, beauty_by_sum, lacking, shares, spoken_sum
 from lightpaint.basis.layers import Layer, read_layers
 from lightpaint.basis.naming import Choice, choose_files, choose_layers, is_known
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.color import LUMINANCE
 from lightpaint.images.exr import Floats, read_headers
 
 #: What one unit of weight is.
@@ -24,16 +24,6 @@ AS_RENDERED = "× as rendered"
 
 #: Name of what the groups lack of the beauty, with underscores added should a light have it.
 REST = "rest"
-
-#: Share of the beauty that the groups may lack beyond rounding before it counts as missing.
-NOTHING = 1e-5
-
-#: Share of the beauty by which they may exceed it before that is a warning.
-EXCEEDING = 1e-3
-
-#: Largest relative error of one rounding to float16, absolute error below its normal range, and
-#: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
-HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
 
 
 @dataclass(frozen=True)
@@ -101,16 +91,16 @@ def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightG
     used = {id(layer) for layer in lights}
     others = [layer for layer in layers.values() if id(layer) not in used]
     if beauty is None:
-        beauty = _beauty_by_sum(others, lights)
+        beauty = beauty_by_sum(others, lights)
     if beauty is None and choice.renderer == "one file per light" and len(lights) > 2:
         # One of them may be the picture under a name of its own.
-        beauty = next((x for x in lights if _adds_up(x, [y for y in lights if y is not x])), None)
+        beauty = next((x for x in lights if adds_up(x, [y for y in lights if y is not x])), None)
         kept = [(n, x) for n, x in zip(names, lights, strict=True) if x is not beauty]
         names, lights = [n for n, _ in kept], [x for _, x in kept]
     for name, layer in choice.beside.items():
         here = layers[layer]
         # Whether a renderer counts these among its groups depends on version and settings.
-        if beauty is None or _lacking(beauty, [*lights, here]) < _lacking(beauty, lights):
+        if beauty is None or lacking(beauty, [*lights, here]) < lacking(beauty, lights):
             names.append(name)
             lights.append(here)
     return _light_groups(path, choice, names, lights, beauty)
@@ -145,10 +135,15 @@ def _light_groups(
     else:
         whole = _filled(beauty.image, holes)
         rest = whole.astype(np.float64) - images.sum(axis=0, dtype=np.float64)
-        missing, exceeding = _shares(rest, whole)
-        sentence, is_missing = _spoken_sum(rest, whole, [*lights, beauty], missing, exceeding)
+        missing, exceeding = shares(rest, whole)
+        sentence, is_missing = spoken_sum(rest, whole, [*lights, beauty], missing, exceeding)
         remarks.append(sentence)
         rest = rest if is_missing else None
+    if lights[0].primaries is not None:
+        remarks.append(
+            "the file has other primaries than Rec.709: multipliers are of its channels in linear "
+            "Rec.709, which a renderer that works in other primaries meets nearly, not quite"
+        )
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
     made = [
@@ -202,67 +197,7 @@ def _filled(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float
     return np.where(holes[..., None], np.float32(0), image.astype(np.float32))
 
 
-def _shares(rest: Floats, whole: Floats) -> tuple[float, float]:
-    """Luminance that is missing, and that is too much, over that of the beauty."""
-    total = float((np.abs(whole) @ LUMINANCE).sum())
-    if total == 0:
-        return 0.0, float(bool(rest.any()))
-    lacking, excess = np.maximum(rest, 0), np.maximum(-rest, 0)
-    return float((lacking @ LUMINANCE).sum()) / total, float((excess @ LUMINANCE).sum()) / total
-
-
-def rounding(layers: Sequence[Layer]) -> Floats:
-    """By how much the sum of the layers may be off its true value for rounding, (h, w, 3)."""
-    bound: Floats = np.zeros(layers[0].image.shape)
-    for layer in layers:
-        size = np.abs(np.nan_to_num(layer.image.astype(np.float64), posinf=0, neginf=0))
-        bound = bound + (size * HALF + SUBNORMAL if layer.is_half else 0) + size * SUMMED
-    return bound
-
-
-def _spoken_sum(
-    rest: Floats, whole: Floats, layers: Sequence[Layer], missing: float, exceeding: float
-) -> tuple[str, bool]:
-    """A sentence on the sum of the groups, and whether what they lack is more than rounding."""
-    beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
-    truly_missing, truly_exceeding = _shares(beyond, whole)
-    if truly_missing + truly_exceeding <= NOTHING:
-        off = missing + exceeding
-        return f"the groups add up to the beauty (to {off:.1g} of its light)", False
-    told = f"the groups lack {_percent(missing)} of the light of the beauty: it stays, as {REST}"
-    if truly_exceeding > EXCEEDING:
-        told += (
-            f"; WARNING: elsewhere they exceed it by {_percent(exceeding)}, which {REST} takes "
-            "away again: is the beauty denoised or clamped, or a light in two groups?"
-        )
-    return told, True
-
-
-def _lacking(beauty: Layer, lights: Sequence[Layer]) -> float:
-    """Σ |beauty − Σ lights|, where both are finite."""
-    total = sum(layer.image.astype(np.float64) for layer in lights)
-    return float(np.nan_to_num(np.abs(beauty.image - total), posinf=0, neginf=0).sum())
-
-
-def _adds_up(beauty: Layer, lights: Sequence[Layer]) -> bool:
-    """Whether the lights add up to just that picture, which then is not black."""
-    size = np.nan_to_num(np.abs(beauty.image.astype(np.float64)), posinf=0, neginf=0)
-    total = sum(layer.image.astype(np.float64) for layer in lights)
-    off = np.nan_to_num(np.abs(beauty.image - total), posinf=0, neginf=0)
-    beyond = np.maximum(off - rounding([*lights, beauty]), 0)
-    return bool(size.sum() > 0 and beyond.sum() <= NOTHING * size.sum())
-
-
-def _beauty_by_sum(others: Sequence[Layer], lights: Sequence[Layer]) -> Layer | None:
-    """The layer that the lights add up to, where it has a name that nobody knows."""
-    return next((layer for layer in others if _adds_up(layer, lights)), None)
-
-
 def _free(name: str, taken: Sequence[str]) -> str:
     while name in taken:
         name += "_"
     return name
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

@@ -13,16 +13,23 @@ import numpy as np
 from lightpaint.basis.naming import is_known, short_names
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import Floats, Part, read_parts
+from lightpaint.images.primaries import converted, is_rec709, to_rec709
 
 #: The last part of the names of red, green and blue, in lower case, and of alpha.
 COLOURS = (("r", "g", "b"), ("red", "green", "blue"))
 ALPHAS = ("a", "alpha")
 
-#: CIE xy of red, green, blue and white of Rec.709.
-REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-
-#: Text attribute in which Blender and others name the colour space.
+#: Text attribute in which Blender and others name the colour space, and what says nothing.
 COLOR_SPACE = "colorInteropID"
+UNSAID = ("", "data", "unknown")
+
+#: CIE xy of red, green, blue and white of those that renderers work in.
+SPACES = {
+    "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+    "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
+    "lin_rec2020_scene": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+    "lin_p3d65_scene": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+}
 
 
 @dataclass(frozen=True)
@@ -31,8 +38,9 @@ class Layer:
 
     name: what it is chosen by. part, channels: where it stands; part is "" where a file has one.
     others: other names that a pattern may meet it by.
-    image: (h, w, 3) in the display window, linear Rec.709, float16 or float32 as stored.
-    alpha: (h, w), or None.
+    image: (h, w, 3) in the display window, linear Rec.709; float16 where that loses nothing.
+    alpha: (h, w), or None. is_half: whether the file has it in float16.
+    primaries: those of the file, CIE xy of red, green, blue and white, if not Rec.709's.
     """
 
     name: str
@@ -42,10 +50,8 @@ class Layer:
     others: tuple[str, ...]
     image: Floats
     alpha: Floats | None = None
-
-    @property
-    def is_half(self) -> bool:
-        return bool(self.image.dtype == np.float16)
+    is_half: bool = False
+    primaries: tuple[float, ...] | None = None
 
     @property
     def place(self) -> str:
@@ -70,6 +76,11 @@ def read_layers(path: Path) -> list[Layer]:
             raise BasisError(
                 f"{layer.place} is {_size(layer)} but {first.place} is {_size(first)}: light "
                 "groups need one size"
+            )
+        if layer.primaries != first.primaries:
+            raise BasisError(
+                f"{layer.place} and {first.place} declare other primaries: light groups need one "
+                "colour space"
             )
     names = [layer.name for layer in layers]
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -104,22 +115,26 @@ def _of_file(path: Path) -> list[Layer]:
     parts = read_parts(path)
     layers = []
     for part in parts:
-        shown = part.in_display_window()
+        shown, primaries = part.in_display_window(), _primaries(path, part)
         for prefix, channels in _triples(shown.channels).items():
-            alone = prefix == "" and len(parts) > 1
-            name = part.name if alone else prefix
-            alpha = _alpha(shown.channels, channels)
-            others = [part.name, f"{part.name}.{prefix}", path.stem, path.name]
+            image = _rgb(shown.channels, channels)
+            is_half = bool(image.dtype == np.float16)
+            if primaries is not None:
+                image = converted(image, to_rec709(primaries))
+            others = [part.name, f"{part.name}.{prefix}"]
+            if len(parts) == 1 and not prefix:
+                others += [path.stem, path.name]  # of a file of one layer, it is that one's name
             layers.append(
                 Layer(
-                    name,
-                    path,
-                    part.name if len(parts) > 1 else "",
-                    channels,
-                    # In a file of one layer its part and the file say something of it.
-                    tuple(others if len(parts) == 1 and not prefix else others[:2]),
-                    _linear_rec709(path, part, shown, channels),
-                    alpha,
+                    name=part.name if prefix == "" and len(parts) > 1 else prefix,
+                    file=path,
+                    part=part.name if len(parts) > 1 else "",
+                    channels=channels,
+                    others=tuple(others),
+                    image=image,
+                    alpha=_alpha(shown.channels, channels),
+                    is_half=is_half,
+                    primaries=primaries,
                 )
             )
     return layers
@@ -148,26 +163,26 @@ def _alpha(channels: Mapping[str, Floats], rgb: tuple[str, str, str]) -> Floats 
     return None
 
 
-def _linear_rec709(path: Path, part: Part, shown: Part, channels: tuple[str, str, str]) -> Floats:
-    """The three channels as (h, w, 3) linear Rec.709. Raises ImageError for other colours."""
+def _primaries(path: Path, part: Part) -> tuple[float, ...] | None:
+    """Those that the part declares, unless they are Rec.709's. Raises ImageError if unknown."""
     space = part.attributes.get(COLOR_SPACE, "")
-    known = ("", "data", "unknown")
-    if not (space in known or space.startswith(("lin_rec709", "lin_srgb"))):
+    if part.primaries is not None:
+        return None if is_rec709(part.primaries) else part.primaries
+    if space in UNSAID or space.startswith(("lin_rec709", "lin_srgb")):
+        return None
+    if space not in SPACES:
         raise ImageError(
             f"{path} is in the colour space {space!r}, but linear Rec.709 is expected: convert it "
             "and export it again"
         )
-    declared = part.primaries
-    # Files round the numbers: to three decimals, or to float16.
-    if declared is not None and not np.allclose(declared, REC709, rtol=0, atol=1e-3):
-        xy = ", ".join(f"{v:.4g}" for v in declared)
-        raise ImageError(
-            f"{path} declares the chromaticities {xy} (CIE xy of red, green, blue, white), but "
-            "linear Rec.709 is expected: convert it and export it again"
-        )
-    pixels = [shown.channels[name] for name in channels]
-    kind = np.float16 if all(p.dtype == np.float16 for p in pixels) else np.float32
-    return np.stack(pixels, axis=-1).astype(kind, copy=False)
+    return SPACES[space]
+
+
+def _rgb(pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:
+    """(h, w, 3), float16 where all are."""
+    planes = [pixels[name] for name in channels]
+    kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
+    return np.stack(planes, axis=-1).astype(kind, copy=False)
 
 
 def _size(layer: Layer) -> str:

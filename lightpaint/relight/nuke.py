@@ -8,8 +8,12 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from lightpaint.basis.foreign import LightGroups
 from lightpaint.basis.layers import Layer
+from lightpaint.images.exr import Floats
+from lightpaint.images.primaries import to_rec709
 from lightpaint.solve.lighting import Lighting
 
 #: What needs a backslash in a quoted word of Tcl that itself stands in braces.
@@ -32,11 +36,14 @@ def nuke_script(groups: LightGroups, lighting: Lighting) -> str:
     has_alpha = groups.beauty is not None and groups.beauty.alpha is not None
     if has_alpha:
         lines += _shuffle(groups.beauty, files, "Alpha")
+    # Multipliers are of Rec.709; what comes out has the primaries of the file again.
+    primaries = groups.layers[0].primaries
+    matrix = None if primaries is None else to_rec709(primaries)
     if groups.has_rest:
-        lines += _rest(groups, files)
+        lines += _rest(groups, files) + _matrix(matrix, "Rest_in_Rec709")
     settings = {light.name: light for light in lighting.lights}
     for k, (light, layer) in enumerate(zip(groups.basis.lights, groups.layers, strict=False)):
-        lines += _shuffle(layer, files, f"Layer_{k}")
+        lines += _shuffle(layer, files, f"Layer_{k}") + _matrix(matrix, f"Layer_{k}_in_Rec709")
         r, g, b = (f"{v:.9g}" for v in settings[light.name].weight)
         lines += _node(
             "Multiply",
@@ -47,6 +54,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting) -> str:
         )
         if k or groups.has_rest:
             lines += _node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
+    lines += _matrix(None if matrix is None else np.linalg.inv(matrix), "As_in_the_file")
     if has_alpha:
         lines += _node(
             "Copy", inputs="2", from0="rgba.alpha", to0="rgba.alpha", name="Alpha_of_beauty"
@@ -83,6 +91,13 @@ def _rest(groups: LightGroups, files: Sequence[Path]) -> list[str]:
         lines += _shuffle(layer, files, f"Without_{k}")
         lines += _node("Merge2", inputs="2", operation="minus", name=f"Rest_{k}")
     return lines
+
+
+def _matrix(matrix: Floats | None, name: str) -> list[str]:
+    if matrix is None:
+        return []
+    rows = " ".join("{" + " ".join(f"{v:.9g}" for v in row) + "}" for row in matrix)
+    return _node("ColorMatrix", matrix=f"{{{rows}}}", name=name)
 
 
 def _shuffle(layer: Layer | None, files: Sequence[Path], name: str) -> list[str]:
