@@ -16,6 +16,9 @@ NAME = "{name}"
 #: The whole picture, in the words of most renderers; names compare without regard to case.
 BEAUTIES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
 
+#: A light group of this name is all of them.
+ALL = "all"
+
 #: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
 BESIDE = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
 
@@ -178,15 +181,19 @@ def _by_convention(
             f"--pattern '{views[1]}.Combined_{NAME}' takes {views[1]}"
         )
     found = [m for m in found if (m.groupdict().get("view") or "") == view]
+    # Redshift's name for the whole beauty among its light groups.
+    whole = next((m[0] for m in found if m["name"] == ALL), None) if len(found) > 1 else None
+    found = [m for m in found if m[0] != whole]
     lights = _named([(convention.light.replace(NAME, m["name"]), m[0]) for m in found], where)
-    rest = [name for name in layers if name not in lights.values()]
-    beside = {name: name for name in rest if name.casefold() in convention.beside}
+    rest = [name for name in layers if name not in lights.values() and name != whole]
+    beside = [name for name in rest if name.casefold() in convention.beside]
     first = convention.beauty.replace("{view}", f"{view}." if view else "")
+    beauty = beauty_among((name for name in rest if name not in beside), first=first)
     return Choice(
         convention.renderer,
         lights,
-        {name: layer for name, layer in beside.items() if name not in lights},
-        beauty_among((name for name in rest if name not in beside), first=first),
+        {name: name for name in beside if name not in lights},
+        whole if beauty is None else beauty,
         view,
         tuple(remarks),
     )
@@ -210,7 +217,9 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
     # A pattern as wide as {name} also meets the beauty.
     names = [layer for layer in layers if layer not in [taken for _, taken in found]]
     first = (before + after).rstrip(JOINTS)
-    beauty = beauty_among(names, first=first) or beauty_among(layer for _, layer in found)
+    beauty = beauty_among(names, first=first)
+    if beauty is None:
+        beauty = beauty_among(layer for _, layer in found)
     found = [(name, layer) for name, layer in found if layer != beauty]
     return Choice(f"--pattern {pattern}", _named(found, where), beauty=beauty)
 

@@ -103,7 +103,7 @@ def _shares(diagnosis: Diagnosis) -> str:
     parts = [
         ("out of reach of any mix", d.unreachable),
         (f"forbidden: {by_what}", d.forbidden),
-        ("noise of the basis", d.noise),
+        *([("noise of the basis", d.noise)] if d.noise > 0 else []),
     ]
     rows = [
         f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(d.share(part))}'

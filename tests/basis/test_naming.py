@@ -93,6 +93,14 @@ def test_of_several_view_layers_the_first():
     assert (other.lights, other.beauty) == ({"a": "near.Combined_a"}, "near.Combined")
 
 
+def test_the_group_of_all_lights_is_none_of_them():
+    found = _choose("Beauty_all", "Beauty_key", "Beauty_other")
+    assert (list(found.lights), found.beauty) == (["key", "other"], "Beauty_all")
+    found = _choose("Beauty", "Beauty_all", "Beauty_key")
+    assert (list(found.lights), found.beauty) == (["key"], "Beauty")
+    assert list(_choose("Beauty", "Beauty_all").lights) == ["all"]
+
+
 def test_a_pattern_finds_what_no_convention_does():
     found = _choose("beauty", "L[1].key!", "L[1].fill!", "depth", pattern="L[1].{name}!")
     assert found.lights == {"key": "L[1].key!", "fill": "L[1].fill!"}
@@ -102,6 +110,9 @@ def test_a_pattern_finds_what_no_convention_does():
     assert found.lights == {"key": "x"}
     # So wide a pattern must not take the picture for a light.
     assert _choose("rgba", "key", "fill", pattern="{name}").beauty == "rgba"
+    # A plain R, G, B is the picture before a light that is called like one.
+    found = _choose("", "L_main", "L_key", pattern="L_{name}")
+    assert (list(found.lights), found.beauty) == (["main", "key"], "")
 
 
 @pytest.mark.parametrize(
