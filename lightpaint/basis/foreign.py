@@ -6,7 +6,7 @@ lack of the beauty becomes one more light, `rest`, that stays as it is.
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -163,7 +163,8 @@ def _light_groups(
         basis,
         path,
         choice.renderer,
-        tuple(lights),
+        # The pixels are in the basis; nobody needs them twice.
+        tuple(replace(layer, image=x) for layer, x in zip(lights, images, strict=False)),
         beauty,
         missing,
         exceeding,

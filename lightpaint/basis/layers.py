@@ -117,7 +117,7 @@ def _of_file(path: Path) -> list[Layer]:
     for part in parts:
         shown, primaries = part.in_display_window(), _primaries(path, part)
         for prefix, channels in _triples(shown.channels).items():
-            image = _rgb(shown.channels, channels)
+            image = _rgb(path, shown.channels, channels)
             is_half = bool(image.dtype == np.float16)
             if primaries is not None:
                 image = converted(image, to_rec709(primaries))
@@ -178,9 +178,11 @@ def _primaries(path: Path, part: Part) -> tuple[float, ...] | None:
     return SPACES[space]
 
 
-def _rgb(pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:
-    """(h, w, 3), float16 where all are."""
+def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:
+    """(h, w, 3), float16 where all are. Raises ImageError if they differ in size."""
     planes = [pixels[name] for name in channels]
+    if len({plane.shape for plane in planes}) > 1:
+        raise ImageError(f"{path}: channels {', '.join(channels)} differ in size: export it again")
     kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
     return np.stack(planes, axis=-1).astype(kind, copy=False)
 

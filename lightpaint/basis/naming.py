@@ -181,6 +181,7 @@ def _by_convention(
             f"--pattern '{views[1]}.Combined_{NAME}' takes {views[1]}"
         )
     found = [m for m in found if (m.groupdict().get("view") or "") == view]
+    _check_one_eye([m[0] for m in found], where)
     # Redshift's name for the whole beauty among its light groups.
     whole = next((m[0] for m in found if m["name"] == ALL), None) if len(found) > 1 else None
     found = [m for m in found if m[0] != whole]
@@ -216,12 +217,29 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
         raise BasisError(f"--pattern {pattern!r} fits no layer of {where}: {_listed(layers)}")
     # A pattern as wide as {name} also meets the beauty.
     names = [layer for layer in layers if layer not in [taken for _, taken in found]]
-    first = (before + after).rstrip(JOINTS)
-    beauty = beauty_among(names, first=first)
+    first = {
+        (before.rstrip(JOINTS) + after).casefold(),  # View.Combined.left of View.Combined_key.left
+        (before + after).strip(JOINTS).casefold(),
+    } - {""}
+    beauty = next((name for name in names if name.casefold() in first), beauty_among(names))
     if beauty is None:
         beauty = beauty_among(layer for _, layer in found)
     found = [(name, layer) for name, layer in found if layer != beauty]
     return Choice(f"--pattern {pattern}", _named(found, where), beauty=beauty)
+
+
+def _check_one_eye(names: Sequence[str], where: str) -> None:
+    """Raise BasisError for stereo: the same names once with `.left` and once with `.right`."""
+    left, right = (
+        {name.removesuffix(eye) for name in names if name.endswith(eye)}
+        for eye in (".left", ".right")
+    )
+    if both := sorted(left & right):
+        head = both[0].rpartition("_")[0]
+        raise BasisError(
+            f"{where} holds the views left and right, and a solve is of one: say which, like "
+            f"--pattern '{head}_{NAME}.left'"
+        )
 
 
 def _named(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:

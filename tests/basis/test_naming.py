@@ -93,6 +93,17 @@ def test_of_several_view_layers_the_first():
     assert (other.lights, other.beauty) == ({"a": "near.Combined_a"}, "near.Combined")
 
 
+def test_of_several_eyes_one_must_be_named():
+    names = [f"View.Combined{n}.{eye}" for n in ("", "_a", "_b") for eye in ("left", "right")]
+    with pytest.raises(BasisError, match=r"the views left and right.*_\{name\}\.left'"):
+        _choose(*names)
+    found = _choose(*names, pattern="View.Combined_{name}.left")
+    assert list(found.lights) == ["a", "b"]
+    assert found.beauty == "View.Combined.left"
+    # Names with dots are no eyes.
+    assert list(_choose("C", "C_lamp.1", "C_lamp.2", "C_key").lights) == ["lamp.1", "lamp.2", "key"]
+
+
 def test_the_group_of_all_lights_is_none_of_them():
     found = _choose("Beauty_all", "Beauty_key", "Beauty_other")
     assert (list(found.lights), found.beauty) == (["key", "other"], "Beauty_all")
