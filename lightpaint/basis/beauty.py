@@ -18,14 +18,14 @@ EXCEEDING = 1e-3
 #: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
 HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
 
-#: How much the conversion from wide primaries may add to an error: the sum of a row of its matrix.
-MIXED = 4.1
-
 
 def spoken_sum(
     rest: Floats, whole: Floats, layers: Sequence[Layer], missing: float, exceeding: float
 ) -> tuple[str, bool]:
-    """A sentence on the sum of the groups, and whether what they lack is more than rounding."""
+    """A sentence on the sum of the groups, and whether what they lack is more than rounding.
+
+    All of it in the primaries of the file: in others, light of a wide gamut is negative.
+    """
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
     truly_missing, truly_exceeding = shares(beyond, whole)
     if truly_missing + truly_exceeding <= NOTHING:
@@ -57,10 +57,7 @@ def rounding(layers: Sequence[Layer]) -> Floats:
     bound: Floats = np.zeros(layers[0].image.shape)
     for layer in layers:
         size = np.abs(np.nan_to_num(layer.image.astype(np.float64), posinf=0, neginf=0))
-        half = size * HALF + SUBNORMAL
-        if layer.primaries is not None:
-            half = half.max(axis=-1, keepdims=True) * MIXED
-        bound = bound + (half if layer.is_half else 0) + size * SUMMED
+        bound = bound + (size * HALF + SUBNORMAL if layer.is_half else 0) + size * SUMMED
     return bound
 
 

@@ -31,7 +31,8 @@ class LightGroups:
     """What `read_light_groups` found.
 
     basis: a light for each group, and `rest` last if something is missing. layers: those of the
-    groups, in the order of the lights, without `rest`. beauty: None if the file has none.
+    groups, in the order of the lights, without `rest` and without their pixels, which the basis
+    has. beauty: None if the file has none.
     missing, exceeding: luminance that the groups lack of the beauty and have too much, as shares
     of it, pixel by pixel; None without a beauty.
     holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the basis,
@@ -125,20 +126,8 @@ def _light_groups(
     holes = ~np.logical_and.reduce([np.isfinite(x.image).all(axis=-1) for x in read])
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
-    images = np.stack([_filled(layer.image, holes) for layer in lights])
-    remarks = [f"light groups as of {choice.renderer}: {', '.join(names)}", *choice.remarks]
-    rest, missing, exceeding = None, None, None
-    if beauty is None:
-        remarks.append(
-            "no beauty among the layers, so that nothing tells whether the groups are all of it"
-        )
-    else:
-        whole = _filled(beauty.image, holes)
-        rest = whole.astype(np.float64) - images.sum(axis=0, dtype=np.float64)
-        missing, exceeding = shares(rest, whole)
-        sentence, is_missing = spoken_sum(rest, whole, [*lights, beauty], missing, exceeding)
-        remarks.append(sentence)
-        rest = rest if is_missing else None
+    rest, missing, exceeding, told = _what_is_missing(lights, beauty, holes)
+    remarks = [f"light groups as of {choice.renderer}: {', '.join(names)}", *choice.remarks, told]
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are of its channels in linear "
@@ -146,30 +135,59 @@ def _light_groups(
         )
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
-    made = [
-        _light(name, layer.name, "light group") for name, layer in zip(names, lights, strict=True)
-    ]
-    if rest is not None:
-        made.append(_light(_free(REST, names), "beauty less the groups", "rest", is_fixed=True))
-        images = np.concatenate([images, rest[None].astype(np.float32)])
-    basis = Basis(
-        lights=tuple(made),
-        images=images,
-        half_differences=np.zeros_like(images),
-        emitters_seen=np.zeros(images.shape[1:3], dtype=bool),
-        origin=_origin(path, choice, images, names),
-    )
+    basis = _basis(path, choice, dict(zip(names, lights, strict=True)), rest, holes)
+    without_pixels = np.empty((0, 0, 3))
+    layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
     return LightGroups(
         basis,
         path,
         choice.renderer,
-        # The pixels are in the basis; nobody needs them twice.
-        tuple(replace(layer, image=x) for layer, x in zip(lights, images, strict=False)),
+        tuple(layers),
         beauty,
         missing,
         exceeding,
         holes,
         tuple(remarks),
+    )
+
+
+def _what_is_missing(
+    lights: list[Layer], beauty: Layer | None, holes: npt.NDArray[np.bool_]
+) -> tuple[Floats | None, float | None, float | None, str]:
+    """What the groups lack of the beauty, if that is more than rounding; its shares, in words."""
+    if beauty is None:
+        told = "no beauty among the layers, so that nothing tells whether the groups are all of it"
+        return None, None, None, told
+    whole = _filled(beauty.image, holes).astype(np.float64)
+    rest = whole - sum(_filled(layer.image, holes).astype(np.float64) for layer in lights)
+    missing, exceeding = shares(rest, whole)
+    told, is_missing = spoken_sum(rest, whole, [*lights, beauty], missing, exceeding)
+    return rest if is_missing else None, missing, exceeding, told
+
+
+def _basis(
+    path: Path,
+    choice: Choice,
+    lights: dict[str, Layer],
+    rest: Floats | None,
+    holes: npt.NDArray[np.bool_],
+) -> Basis:
+    """In linear Rec.709; `rest`, if there is one, as a light that stays as it is."""
+    made = [_light(name, layer.name, "light group") for name, layer in lights.items()]
+    height, width = holes.shape
+    images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
+    first = next(iter(lights.values()))
+    for image, layer in zip(images, lights.values(), strict=False):
+        image[:] = layer.in_rec709(_filled(layer.image, holes))
+    if rest is not None:
+        made.append(_light(_free(REST, [*lights]), "beauty less the groups", "rest", is_fixed=True))
+        images[-1] = first.in_rec709(rest)
+    return Basis(
+        lights=tuple(made),
+        images=images,
+        half_differences=np.zeros_like(images),
+        emitters_seen=np.zeros(holes.shape, dtype=bool),
+        origin=_origin(path, choice, images, [*lights]),
     )
 
 

@@ -38,9 +38,9 @@ class Layer:
 
     name: what it is chosen by. part, channels: where it stands; part is "" where a file has one.
     others: other names that a pattern may meet it by.
-    image: (h, w, 3) in the display window, linear Rec.709; float16 where that loses nothing.
-    alpha: (h, w), or None. is_half: whether the file has it in float16.
-    primaries: those of the file, CIE xy of red, green, blue and white, if not Rec.709's.
+    image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
+    alpha: (h, w), or None.
+    primaries: of the image, CIE xy of red, green, blue and white; None for Rec.709's.
     """
 
     name: str
@@ -50,8 +50,18 @@ class Layer:
     others: tuple[str, ...]
     image: Floats
     alpha: Floats | None = None
-    is_half: bool = False
     primaries: tuple[float, ...] | None = None
+
+    @property
+    def is_half(self) -> bool:
+        """Whether the file has it in float16."""
+        return bool(self.image.dtype == np.float16)
+
+    def in_rec709(self, image: Floats) -> Floats:
+        """An image of these primaries, (h, w, 3), as float32 in linear Rec.709."""
+        if self.primaries is None:
+            return image.astype(np.float32)
+        return converted(image, to_rec709(self.primaries))
 
     @property
     def place(self) -> str:
@@ -118,9 +128,6 @@ def _of_file(path: Path) -> list[Layer]:
         shown, primaries = part.in_display_window(), _primaries(path, part)
         for prefix, channels in _triples(shown.channels).items():
             image = _rgb(path, shown.channels, channels)
-            is_half = bool(image.dtype == np.float16)
-            if primaries is not None:
-                image = converted(image, to_rec709(primaries))
             others = [part.name, f"{part.name}.{prefix}"]
             if len(parts) == 1 and not prefix:
                 others += [path.stem, path.name]  # of a file of one layer, it is that one's name
@@ -133,7 +140,6 @@ def _of_file(path: Path) -> list[Layer]:
                     others=tuple(others),
                     image=image,
                     alpha=_alpha(shown.channels, channels),
-                    is_half=is_half,
                     primaries=primaries,
                 )
             )

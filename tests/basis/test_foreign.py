@@ -265,6 +265,18 @@ def test_other_primaries_are_converted(tmp_path: Path, header: dict[str, Any], k
     assert any("other primaries" in remark for remark in groups.remarks)
 
 
+def test_light_of_a_wide_gamut_is_no_excess(tmp_path: Path):
+    """Green of ACEScg is negative in Rec.709, and still light that the groups lack."""
+    images = pictures(4)
+    images[3, ..., [0, 2]] = 0
+    layers = _layers(images[:3]) | {"ViewLayer.Combined": images.sum(axis=0)}
+    header = {"chromaticities": ACESCG}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers, header=header))
+    assert (groups.basis.image("rest") < -0.01).any()
+    assert groups.exceeding == pytest.approx(0, abs=FLOAT32)
+    assert not any("WARNING" in remark for remark in groups.remarks)
+
+
 def test_encoded_colours_are_refused(tmp_path: Path):
     header = {"colorInteropID": "srgb_rec709_display"}
     path = interleaved(tmp_path / "a.exr", _layers(pictures()), header=header)
