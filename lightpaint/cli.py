@@ -81,7 +81,12 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     solve = _command(commands, "solve", "find the lighting that comes closest to a painting")
-    solve.add_argument("source", metavar="SCENE|BASIS", help="scene XML, or a *.basis.exr")
+    solve.add_argument(
+        "source",
+        metavar="SCENE|BASIS|LIGHTS",
+        help="scene XML, a *.basis.exr, or light groups of another "
+        "renderer: an EXR or a folder of them",
+    )
     solve.add_argument("targets", metavar="TARGET", nargs="*", help="painted EXR")
     solve.add_argument(
         "--target",
@@ -128,6 +133,12 @@ def _parser() -> argparse.ArgumentParser:
         "the answer by what that shows (default: %(default)s)",
     )
     _add_lights(solve)
+    solve.add_argument(
+        "--pattern",
+        metavar="'Light_{name}'",
+        help="how the layers, parts or files of light groups are named, where no renderer that "
+        "is known names them so",
+    )
     _add_constraints(solve)
     _add_budget(solve)
     _add_cache(solve)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis, read_basis
+from lightpaint.basis.foreign import LightGroups
 from lightpaint.basis.obtain import check_same_view, obtain_basis
 from lightpaint.basis.render import basis_lights, render_basis
 from lightpaint.errors import LightpaintError, SceneError
@@ -15,6 +16,7 @@ from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.view import View
 from lightpaint.progress import Progress, silent
+from lightpaint.relight.export import EXPORTS, write_exports
 from lightpaint.relight.refine import refine_by_rendering
 from lightpaint.relight.relight import check_relightable, relight
 from lightpaint.relight.verify import verify
@@ -41,6 +43,7 @@ from lightpaint.solve.reduction import reduce_to
 from lightpaint.solve.solve import Solution, problem_of, solution_of
 from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.solve.views import joint_basis, joint_problem, parted
+from lightpaint.sources import without_holes
 from lightpaint.target.target import Target, read_target
 from lightpaint.target.template import Template, write_look, write_template
 
@@ -56,7 +59,7 @@ def paint_with_light(
     target: str | Path | Target,
     folder: str | Path,
     *,
-    basis: str | Path | Basis | None = None,
+    basis: str | Path | Basis | LightGroups | None = None,
     mask: str | Path | None = None,
     sensor: int | str | None = None,
     parameters: Mapping[str, object] | None = None,
@@ -70,7 +73,8 @@ def paint_with_light(
     scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer.
     folder: receives lighting.json, predicted.exr, comparison.png and report.html and, with
     a scene, relit.xml and verified.exr.
-    basis: one made before of the same scene; taken from the cache or rendered if not given.
+    basis: one made before of the same scene; taken from the cache or rendered if not given. Of
+    light groups that another renderer made, `folder` receives the answer for other programs, too.
     sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
     settings: any of `Settings`, by name, like spp=64.
 
@@ -85,13 +89,16 @@ def paint_with_light(
         scene = load_scene(
             scene, sensor=sensor, parameters=parameters, lights=lights, groups=groups
         )
+    groups = basis if isinstance(basis, LightGroups) else None
+    if isinstance(basis, LightGroups):
+        basis = basis.basis
     if isinstance(basis, str | Path):
         basis = read_basis(Path(basis))
     if scene is not None and basis is not None:
         check_same_view(scene, basis)
     if not isinstance(target, Target):
         target = read_target(target, mask=mask)
-    view = PaintedView(scene, target, Path(folder), basis)
+    view = PaintedView(scene, target, Path(folder), basis, groups)
     [look] = _paint([view], Path(folder), asked, progress)
     return look
 
@@ -131,12 +138,14 @@ class PaintedView:
     """What is seen through one sensor: its painting, and where its results go.
 
     scene: None where there is only a basis; basis: None where it is still to be rendered.
+    groups: where the basis is of light groups from elsewhere.
     """
 
     scene: Scene | None
     target: Target
     folder: Path
     basis: Basis | None = None
+    groups: LightGroups | None = None
 
 
 def _paint(
@@ -162,6 +171,8 @@ def _paint(
     alike = () if constraints else ambiguities(whole, solution)
     with restoring(folder, written):
         write_lighting(folder / "lighting.json", solution.lighting)
+        if (groups := views[0].groups) is not None:
+            write_exports(folder, groups, solution.lighting)
         relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
         return [
             _finished(view, its, uncertainty, alike, relit, settings, progress)
@@ -175,6 +186,7 @@ def _to_be_written(views: list[PaintedView], folder: Path) -> list[Path]:
     for view in views:
         if view.folder == folder:
             written += [folder / name for name in ALWAYS]
+            written += [folder / name for name in EXPORTS if view.groups is not None]
         else:
             written += [file for pattern in RESULTS for file in view.folder.glob(pattern)]
             written += [view.folder / name for name in VIEW_RESULTS]
@@ -194,6 +206,8 @@ def _fitted(views: list[PaintedView], settings: Settings) -> list[PaintedView]:
             scene = on_film(scene, settings.quality, settings.resolution)
             size = scene.size
         target = view.target.fitted_to(size, resize=settings.resize)
+        if view.groups is not None:
+            target = without_holes(target, view.groups)
         fitted.append(replace(view, scene=scene, target=target))
     return fitted
 
@@ -221,7 +235,7 @@ def _improved(
     views: list[PaintedView],
     settings: Settings,
     progress: Progress,
-) -> tuple[Solution, Uncertainty]:
+) -> tuple[Solution, Uncertainty | None]:
     """What can be done against noise is done, and said how much of it is left."""
     if settings.noise_correction:
         solution = correct_noise(whole, solution)
@@ -238,7 +252,7 @@ def _improved(
 def _finished(
     view: PaintedView,
     solution: Solution,
-    uncertainty: Uncertainty,
+    uncertainty: Uncertainty | None,
     alike: tuple[Ambiguity, ...],
     relit: Scene | None,
     settings: Settings,

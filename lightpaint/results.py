@@ -10,6 +10,7 @@ from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relight.comparison import write_comparison
+from lightpaint.relight.export import EXPORTS
 from lightpaint.relight.report import report_page
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.render import Stream
@@ -41,6 +42,7 @@ RESULTS = (
     "relit.png",
     "relit.exr",
     "relit.*.exr",
+    *EXPORTS,
 )
 
 
@@ -49,8 +51,9 @@ class Look:
     """One painting and its answer.
 
     relit and verification are None where there was only a saved basis and no scene.
-    uncertainty: how sure the lights are; diagnosis: why the painting is not met; ambiguities:
-    lights that it cannot tell apart, of several views in none of them.
+    uncertainty: how sure the lights are, None where nothing is known of the noise; diagnosis:
+    why the painting is not met; ambiguities: lights that it cannot tell apart, of several views
+    in none of them.
     """
 
     target: Target
@@ -59,7 +62,7 @@ class Look:
     predicted: Estimate
     relit: Scene | None
     verification: Verification | None
-    uncertainty: Uncertainty
+    uncertainty: Uncertainty | None
     diagnosis: Diagnosis
     ambiguities: tuple[Ambiguity, ...] = ()
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from lightpaint import console, tables
 from lightpaint.basis.basis import is_basis_file, read_basis
+from lightpaint.basis.foreign import LightGroups
 from lightpaint.basis.render import basis_lights
 from lightpaint.errors import BasisError, TargetError
 from lightpaint.files import check_writable
@@ -16,16 +17,24 @@ from lightpaint.pipeline import (
     paint_views_with_light,
     paint_with_light,
 )
+from lightpaint.relight.export import EXPORTS
 from lightpaint.relight.relight import check_relightable
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.reduction import reduce_to
+from lightpaint.sources import light_group_source, read_source
 from lightpaint.target.target import Target, read_target
 
 
 def solve(options: Namespace, given: list[str]) -> int:
     """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`"""
+    groups = None
+    if (source := light_group_source(options)) is not None:
+        groups = read_source(source, options)
+        options.source, options.targets = str(source.path), list(source.targets)
+        for remark in groups.remarks:
+            console.say(remark)
     if options.views and options.targets:
         raise TargetError("TARGET and --target at once: give every painting with its sensor")
     paths = options.targets or [path for _, path in options.views]
@@ -36,18 +45,21 @@ def solve(options: Namespace, given: list[str]) -> int:
     targets = [read_target(t, mask=m) for t, m in zip(paths, masks, strict=True)]
     if options.views:
         return _solve_views(options, targets, given)
-    return _solve_each(options, targets, given)
+    return _solve_each(options, targets, groups, given)
 
 
-def _solve_each(options: Namespace, targets: list[Target], given: list[str]) -> int:
+def _solve_each(
+    options: Namespace, targets: list[Target], groups: LightGroups | None, given: list[str]
+) -> int:
     """One lighting for each painting, all of one view."""
     folders = folders_of(options.output, [Path(path).stem for path in options.targets])
     constraints = constraints_of(options)
     scene, made = None, None
     source = Path(options.source)
-    if is_basis_file(source):
-        _check_nothing_to_render(options)
-        made = read_basis(source)
+    if groups is not None or is_basis_file(source):
+        if groups is None:
+            _check_nothing_to_render(options)
+        made = read_basis(source) if groups is None else groups.basis
         if options.lights_file:
             constraints = read_constraints(options.lights_file).and_then(constraints)
         reduce_to(constraints, made.lights)
@@ -69,13 +81,16 @@ def _solve_each(options: Namespace, targets: list[Target], given: list[str]) -> 
                 scene,
                 target,
                 folder,
-                basis=made,
+                basis=made if groups is None else groups,
                 constraints=constraints,
                 progress=progress,
                 **_settings(options, given),
             )
         tables.show_look(look, folder)
-    if scene is None:
+        if groups is not None:
+            there = ", ".join(name for name in EXPORTS if (folder / name).is_file())
+            console.write(f"for other programs: {there}")
+    if scene is None and groups is None:
         console.say("solved from a saved basis: no render was made; lightpaint relight makes one")
     return 0
 

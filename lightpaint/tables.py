@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.markup import escape
 
 from lightpaint import console
@@ -109,7 +110,7 @@ def show_look(look: Look, folder: Path) -> None:
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
     asked = ["asked (* holds it)"] if held else []
     table = console.table(*headings, *amounts, *asked)
-    errors = relative_errors(look.uncertainty)
+    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else console.numbers(light.emission)
         if light.name in look.solution.quality.unreached and any(light.emission):
@@ -131,7 +132,8 @@ def show_look(look: Look, folder: Path) -> None:
     console.write(verdict(look.solution, look.predicted, look.verification))
     for sentence in what_is_missed(look.diagnosis):
         console.write(sentence)
-    console.write(how_sure(look.basis, look.solution, look.uncertainty))
+    if look.uncertainty is not None:
+        console.write(how_sure(look.basis, look.solution, look.uncertainty))
     console.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
     quality = look.solution.quality
     if quality.curve:

@@ -109,7 +109,7 @@ class Basis:
     images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
     half_differences: (n, h, w, 3) float32, half the difference of two independent halves
     of the samples: the noise of `images`. Where an interrupt left the halves unequal, it
-    overstates the noise a little.
+    overstates the noise a little. Zeros where nothing is known of it (see `knows_noise`).
     emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
     learned: (2, cells, emitters) float32, what the renderer found out on the way about which
     emitter matters where, or None. Going on needs it, nobody else.
@@ -151,6 +151,11 @@ class Basis:
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return self.images.shape[1], self.images.shape[2]
+
+    @property
+    def knows_noise(self) -> bool:
+        """Whether `half_differences` tell the noise: not where nobody knows of any samples."""
+        return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
     @property
     def present_weights(self) -> npt.NDArray[np.float64]:

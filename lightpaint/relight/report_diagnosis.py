@@ -102,7 +102,7 @@ def _shares(diagnosis: Diagnosis) -> str:
     parts = [
         ("out of reach of any mix", d.unreachable),
         (f"forbidden: {by_what}", d.forbidden),
-        ("noise of the basis", d.noise),
+        *([("noise of the basis", d.noise)] if d.noise > 0 else []),
     ]
     if d.compromise > 0:
         parts.insert(2, ("given up for the other views", d.compromise))

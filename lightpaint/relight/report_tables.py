@@ -144,7 +144,7 @@ def render_table(
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
-        ("Basis", f"{origin.method}, {origin.spp} samples per pixel, seed {origin.seed}"),
+        ("Basis", f"{origin.method}, {_samples(basis)}"),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
     ]
     for light in basis.lights:
@@ -155,6 +155,12 @@ def render_table(
     if target.not_finite:
         facts.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
     return _facts(facts)
+
+
+def _samples(basis: Basis) -> str:
+    if not basis.knows_noise:
+        return "which says nothing of its samples and noise"
+    return f"{basis.origin.spp} samples per pixel, seed {basis.origin.seed}"
 
 
 def _full_size(basis: Basis, verification: Verification | None) -> str:

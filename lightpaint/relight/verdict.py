@@ -69,10 +69,12 @@ def share_met(solution: Solution, predicted: Estimate) -> float:
 
 def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
     """One plain sentence: how well the painting is met, and whether a render confirms it."""
-    fit = (
-        f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting "
-        f"(RMS; noise adds {100 * noise_residual(solution, predicted):.0f} %)"
-    )
+    # No render is without noise: where there is none, nobody has measured it.
+    noise = "whatever noise the layers have included"
+    if predicted.half_difference.any():
+        noise = f"noise adds {100 * noise_residual(solution, predicted):.0f} %"
+    fit = f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting"
+    fit += f" (RMS; {noise})"
     if not solution.quality.converged:
         fit += ", from a solve that stopped before it converged"
     return f"{fit}; {agreement(verification)}."

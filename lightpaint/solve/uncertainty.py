@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis, mix
+from lightpaint.errors import BasisError
 from lightpaint.solve.constrained import free_directions, preferring, solve_constrained
 from lightpaint.solve.lighting import LightSetting
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
@@ -89,12 +90,16 @@ class Noise:
     objective_noise: Doubles
 
 
-def error_bars(basis: Basis, solution: Solution) -> Uncertainty:
+def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
     """Standard error and bias of every weight that `solve` or `refine` found.
+
+    None where nothing is known of the noise of the basis: that is not the same as none.
 
     Lights that are kept or reach nothing have none. Under constraints, what a limit holds has
     none either: the error is of what is free to move there.
     """
+    if not basis.knows_noise:
+        return None
     weights = solution.lighting.weights_for(basis)
     equations = solution.equations
     noise = noise_sums(basis, solution, weights)
@@ -188,7 +193,13 @@ def correct_noise(basis: Basis, solution: Solution, *, share: float | None = Non
 
     share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
     What was solved before, `solution`, is where it starts. docs/method.md has what it is worth.
+    Raises BasisError where nothing is known of the noise.
     """
+    if not basis.knows_noise:
+        raise BasisError(
+            f"{basis.origin.scene} says nothing of its noise, so that none can be corrected: "
+            "leave --correct-noise out, and denoise the layers or render them with more samples"
+        )
     weights = solution.lighting.weights_for(basis)
     noise = noise_sums(basis, solution, weights)
     e = solution.equations
@@ -227,8 +238,10 @@ def _best_share(basis: Basis, solution: Solution, noise: Noise, least: Doubles) 
     return float(shares[np.argmin(cost)])
 
 
-def with_error_bars(solution: Solution, uncertainty: Uncertainty) -> Solution:
-    """`solution` with the standard error of each light in its lighting."""
+def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solution:
+    """`solution` with the standard error of each light in its lighting, where it is known."""
+    if uncertainty is None:
+        return solution
     lights: list[LightSetting] = []
     for light, error in zip(solution.lighting.lights, uncertainty.standard_error, strict=True):
         r, g, b = (float(v) for v in error)

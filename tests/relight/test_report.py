@@ -357,7 +357,7 @@ def test_how_well_a_painting_is_met_in_closed_form(make_basis: Any):
     silent = Estimate(image, np.zeros_like(image))
     assert share_met(solution, silent) == pytest.approx(1 - np.sqrt(0.5), rel=1e-9)
     assert verdict(solution, silent, None) == (
-        "The lighting meets 29 % of the painting (RMS; noise adds 0 %); "
+        "The lighting meets 29 % of the painting (RMS; whatever noise the layers have included); "
         "the prediction is not verified by a render."
     )
     # Noise of half the painting's RMS: a quarter of its power is no fault of the lighting.

@@ -1,0 +1,272 @@
+"""How renderers name the layers of their light groups, and which of a file's layers those are.
+
+Works on names alone. A layer is known by its own name, `ViewLayer.Combined_key`, and a
+`--pattern` also finds it by the name of its part or file.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from lightpaint.errors import BasisError
+
+#: What stands for the name of the light in a pattern.
+NAME = "{name}"
+
+#: The whole picture, in the words of most renderers; names compare without regard to case.
+BEAUTIES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
+
+#: A light group of this name is all of them.
+ALL = "all"
+
+#: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
+BESIDE = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
+
+#: What joins a name to what stands around it.
+JOINTS = " ._-"
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How one family of renderers names its light groups.
+
+    layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer.
+    beauty: name of the picture that they add up to, before BEAUTIES are tried.
+    beside: layers that add to it too, in some versions and settings (in lower case).
+    light: what the light is called.
+    """
+
+    renderer: str
+    layer: re.Pattern[str]
+    beauty: str = ""
+    beside: tuple[str, ...] = ()
+    light: str = NAME
+
+
+CONVENTIONS = (
+    Convention(
+        "Blender Cycles",
+        re.compile(r"(?:(?P<view>.+)\.)?Combined_(?P<name>.+)"),
+        "{view}Combined",
+    ),
+    Convention("Arnold", re.compile(r"RGBA_(?P<name>.+)"), "RGBA"),
+    Convention("Karma", re.compile(r"C_(?P<name>.+)"), "C"),
+    Convention("RenderMan or Redshift", re.compile(r"(?:[Bb]eauty|Ci)_(?P<name>.+)"), "beauty"),
+    Convention(
+        "LuxCore",
+        re.compile(r"RADIANCE_GROUP_(?P<name>\d+)"),
+        "RGBA",
+        light="group_{name}",
+    ),
+    Convention(
+        "V-Ray or Corona",
+        re.compile(r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
+        "RGBA",
+        beside=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
+    ),
+    Convention(
+        "Octane",
+        re.compile(r"Light(?:[ _]?pass)?[ _](?P<name>\d+)", re.I),
+        "Main",
+        beside=("ambient light", "ambient_light", "sunlight"),
+        light="light_{name}",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which layers are what.
+
+    lights: name of the light → name of its layer. beside: the same, of layers that may or may
+    not be part of the sum. beauty: name of its layer; None if none is known by its name.
+    """
+
+    renderer: str
+    lights: Mapping[str, str]
+    beside: Mapping[str, str] = field(default_factory=dict)
+    beauty: str | None = None
+    view: str = ""
+    remarks: tuple[str, ...] = ()
+
+
+def choose_layers(
+    layers: Mapping[str, Sequence[str]], *, pattern: str | None = None, where: str
+) -> Choice:
+    """Tell lights, beauty and everything else apart.
+
+    layers: name of each layer → other names that a pattern may meet it by.
+    pattern: `Light_{name}`, instead of the known conventions. where: the file, for messages.
+    Raises BasisError, listing the layers, where no convention fits or several do.
+    """
+    if pattern is not None:
+        return _by_pattern(layers, pattern, where)
+    fitting = []
+    for convention in CONVENTIONS:
+        found = [m for name in layers if (m := convention.layer.fullmatch(name))]
+        if any(not BESIDE.fullmatch(m[0]) for m in found):
+            fitting.append((convention, found))
+    if len(fitting) == 1:
+        return _by_convention(layers, *fitting[0], where)
+    if fitting:
+        told = [f"{len(found)} as of {convention.renderer}" for convention, found in fitting]
+        raise BasisError(
+            f"{where} names its layers in several ways ({', '.join(told)}): say which are the "
+            f"lights, like --pattern {_example(layers)!r}; {_listed(layers)}"
+        )
+    raise BasisError(
+        f"{where} has no layers named like the light groups of a known renderer: say which they "
+        f"are, like --pattern {_example(layers)!r}; {_listed(layers)}"
+    )
+
+
+def choose_files(layers: Iterable[str]) -> Choice:
+    """Of files with one layer each, that no convention knows: all but the beauty are lights."""
+    names = list(layers)
+    beauty = beauty_among(names)
+    return Choice("one file per light", {n: n for n in names if n != beauty}, beauty=beauty)
+
+
+def is_known(name: str) -> bool:
+    """Whether a known renderer calls a light group so."""
+    return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
+
+
+def beauty_among(names: Iterable[str], *, first: str = "") -> str | None:
+    """The one of `names` that is the whole picture: `first`, else by BEAUTIES; None if none is."""
+    by_folded: dict[str, str] = {}
+    for name in names:
+        by_folded.setdefault(name.casefold(), name)
+    wanted = (first.casefold(), *BEAUTIES)
+    return next((by_folded[name] for name in wanted if name in by_folded), None)
+
+
+def short_names(stems: Sequence[str]) -> dict[str, str]:
+    """Names without what they all begin or end with, up to a joint: `shot_key_v1` → `key`."""
+    if len(stems) < 2:
+        return {stem: stem for stem in stems}
+    head = _shared_head(stems)
+    head = head[: max((head.rfind(joint) + 1 for joint in JOINTS), default=0)]
+    cut = [stem[len(head) :] for stem in stems]
+    tail = _shared_head([name[::-1] for name in cut])[::-1]
+    starts = [k for joint in JOINTS if (k := tail.find(joint)) >= 0]
+    tail = tail[min(starts) :] if starts else ""
+    cut = [name.removesuffix(tail) for name in cut]
+    return dict(zip(stems, cut if all(cut) else stems, strict=True))
+
+
+def _shared_head(names: Sequence[str]) -> str:
+    """What all of them begin with."""
+    low, high = min(names), max(names)
+    same = next((k for k, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low))
+    return low[:same]
+
+
+def _by_convention(
+    layers: Mapping[str, Sequence[str]],
+    convention: Convention,
+    found: list[re.Match[str]],
+    where: str,
+) -> Choice:
+    remarks = []
+    left = [m[0] for m in found if BESIDE.fullmatch(m[0])]
+    found = [m for m in found if m[0] not in left]
+    if left:
+        remarks.append(f"{', '.join(left)}: taken for another version of a layer, and left out")
+    views = list(dict.fromkeys(m.groupdict().get("view") or "" for m in found))
+    view = views[0]
+    if len(views) > 1:
+        remarks.append(
+            f"of the view layers {', '.join(views)} the first is taken: "
+            f"--pattern '{views[1]}.Combined_{NAME}' takes {views[1]}"
+        )
+    found = [m for m in found if (m.groupdict().get("view") or "") == view]
+    _check_one_eye([m[0] for m in found], where)
+    # Redshift's name for the whole beauty among its light groups.
+    whole = next((m[0] for m in found if m["name"] == ALL), None) if len(found) > 1 else None
+    found = [m for m in found if m[0] != whole]
+    lights = _named([(convention.light.replace(NAME, m["name"]), m[0]) for m in found], where)
+    rest = [name for name in layers if name not in lights.values() and name != whole]
+    beside = [name for name in rest if name.casefold() in convention.beside]
+    first = convention.beauty.replace("{view}", f"{view}." if view else "")
+    beauty = beauty_among((name for name in rest if name not in beside), first=first)
+    return Choice(
+        convention.renderer,
+        lights,
+        {name: name for name in beside if name not in lights},
+        whole if beauty is None else beauty,
+        view,
+        tuple(remarks),
+    )
+
+
+def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -> Choice:
+    if pattern.count(NAME) != 1:
+        raise BasisError(
+            f"--pattern {pattern!r} must have {NAME} once, where the name of the light stands, "
+            "like 'Light_{name}'"
+        )
+    before, after = pattern.split(NAME)
+    fits = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
+    found = []
+    for layer, others in layers.items():
+        match = next((m for name in (layer, *others) if (m := fits.fullmatch(name))), None)
+        if match:
+            found.append((match[1], layer))
+    if not found:
+        raise BasisError(f"--pattern {pattern!r} fits no layer of {where}: {_listed(layers)}")
+    # A pattern as wide as {name} also meets the beauty.
+    names = [layer for layer in layers if layer not in [taken for _, taken in found]]
+    first = {
+        (before.rstrip(JOINTS) + after).casefold(),  # View.Combined.left of View.Combined_key.left
+        (before + after).strip(JOINTS).casefold(),
+    } - {""}
+    beauty = next((name for name in names if name.casefold() in first), beauty_among(names))
+    if beauty is None:
+        beauty = beauty_among(layer for _, layer in found)
+    found = [(name, layer) for name, layer in found if layer != beauty]
+    return Choice(f"--pattern {pattern}", _named(found, where), beauty=beauty)
+
+
+def _check_one_eye(names: Sequence[str], where: str) -> None:
+    """Raise BasisError for stereo: the same names once with `.left` and once with `.right`."""
+    left, right = (
+        {name.removesuffix(eye) for name in names if name.endswith(eye)}
+        for eye in (".left", ".right")
+    )
+    if both := sorted(left & right):
+        head = both[0].rpartition("_")[0]
+        raise BasisError(
+            f"{where} holds the views left and right, and a solve is of one: say which, like "
+            f"--pattern '{head}_{NAME}.left'"
+        )
+
+
+def _named(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
+    lights: dict[str, str] = {}
+    for name, layer in found:
+        if name in lights:
+            raise BasisError(
+                f"{where} has the light {name!r} twice, in {lights[name]} and in {layer}: "
+                "say which are meant with --pattern"
+            )
+        lights[name] = layer
+    return lights
+
+
+def _example(layers: Iterable[str]) -> str:
+    """A pattern that fits several of the layers, if there is one that does."""
+    names = [name for name in layers if beauty_among([name]) is None]
+    heads: dict[str, int] = {}
+    for name in names:
+        for k in (name.find(joint) for joint in JOINTS):
+            if 0 < k < len(name) - 1:
+                heads[name[: k + 1]] = heads.get(name[: k + 1], 0) + 1
+    best = max(heads, key=lambda head: heads[head], default=None)
+    return f"{best}{NAME}" if best and heads[best] > 1 else f"Light_{NAME}"
+
+
+def _listed(layers: Iterable[str]) -> str:
+    names = [name or "R, G, B" for name in layers]
+    more = f" and {len(names) - 30} more" if len(names) > 30 else ""
+    return f"its RGB layers are {', '.join(names[:30]) or 'none'}{more}"
