@@ -89,7 +89,7 @@ def paint_with_light(
         scene = load_scene(
             scene, sensor=sensor, parameters=parameters, lights=lights, groups=groups
         )
-    groups = basis if isinstance(basis, LightGroups) else None
+    layers = basis if isinstance(basis, LightGroups) else None
     if isinstance(basis, LightGroups):
         basis = basis.basis
     if isinstance(basis, str | Path):
@@ -98,7 +98,7 @@ def paint_with_light(
         check_same_view(scene, basis)
     if not isinstance(target, Target):
         target = read_target(target, mask=mask)
-    view = PaintedView(scene, target, Path(folder), basis, groups)
+    view = PaintedView(scene, target, Path(folder), basis, layers)
     [look] = _paint([view], Path(folder), asked, progress)
     return look
 
