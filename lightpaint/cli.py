@@ -132,6 +132,13 @@ def _parser() -> argparse.ArgumentParser:
         help="times to render the scene as solved, with as many samples as the basis, and improve "
         "the answer by what that shows (default: %(default)s)",
     )
+    solve.add_argument(
+        "--method",
+        choices=("polished", "gauss-seidel"),
+        default="polished",
+        help="gauss-seidel: the paper's iteration alone, which comes late to the optimum or runs "
+        "out of sweeps, and says so (default: %(default)s)",
+    )
     _add_lights(solve)
     solve.add_argument(
         "--pattern",
@@ -244,7 +251,16 @@ def _add_constraints(parser: argparse.ArgumentParser) -> None:
     add("--limit", "NAME=MIN:MAX", _limits, "emit between these levels; one may be left out")
     add("--tie", "A,B,...", _names, "put these on one dimmer, their colours as they are")
     add("--color", "NAME=COLOR", _named, "this colour, and only a dimmer")
-    add("--kelvin", "NAME=2700:6500", _kelvin, "white between these, or of one temperature")
+    group.add_argument(
+        "--kelvin",
+        type=_kelvin,
+        action=_Kelvin,
+        default=[],
+        metavar="NAME=2700:6500[,duv=D]",
+        help="white between these, or of one temperature; so far from Planck's locus, like "
+        "duv=0.003, positive towards green (default: on it)",
+    )
+    parser.set_defaults(duv=[])
     add("--primaries", "NAME=COLOR,...", _primaries, "what a fixture with these LEDs can mix")
     add("--off", "NAME", str, "off")
     group.add_argument(
@@ -412,12 +428,31 @@ def _limits(text: str) -> tuple[str, dict[str, Any]]:
     return name, {k: _value(v) for k, v in (("min", least), ("max", most)) if v.strip()}
 
 
-def _kelvin(text: str) -> tuple[str, list[float]]:
-    name, value = _named(text)
+def _kelvin(text: str) -> tuple[str, list[float], float | None]:
+    """Name, temperatures, and Duv if that was given."""
     try:
-        return name, [float(end.strip().upper().removesuffix("K")) for end in value.split(":")]
+        told, comma, away = text.partition(",")
+        key, _, duv = away.partition("=")
+        name, value = _named(told)
+        ends = [float(end.strip().upper().removesuffix("K")) for end in value.split(":")]
+        if comma and key.strip() != "duv":
+            raise ValueError(key)
+        return name, ends, float(duv) if comma else None
     except (ValueError, AttributeError):
-        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=2700:6500 or NAME=3200") from None
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not NAME=2700:6500 or NAME=3200, with or without ,duv=0.003 behind"
+        ) from None
+
+
+class _Kelvin(argparse.Action):
+    """Puts temperatures to `kelvin` and what they are away from Planck's locus to `duv`."""
+
+    def __call__(self, _parser: Any, options: argparse.Namespace, given: Any, *_: Any) -> None:
+        name, ends, duv = given
+        options.kelvin = [*options.kelvin, (name, ends)]
+        # What is said last of a light holds: also that it is on the locus.
+        options.duv = [entry for entry in options.duv if entry[0] != name]
+        options.duv += [] if duv is None else [(name, duv)]
 
 
 def _primaries(text: str) -> tuple[str, list[str]]:

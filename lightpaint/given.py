@@ -114,7 +114,7 @@ def view_of(options: Namespace) -> View | None:
 def constraints_of(options: Namespace) -> Constraints:
     """What the options ask of the lights."""
     lights: dict[str, dict[str, Any]] = {}
-    for key in ("lock", "limits", "color", "kelvin", "primaries"):
+    for key in ("lock", "limits", "color", "kelvin", "duv", "primaries"):
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
     for name in options.off:

@@ -36,7 +36,7 @@ from lightpaint.scene.surfaces import render_surfaces
 from lightpaint.settings import Settings
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.constraints_file import read_constraints
-from lightpaint.solve.diagnosis import diagnose
+from lightpaint.solve.diagnosis import Diagnosis, diagnose, with_diagnosis
 from lightpaint.solve.indistinguishable import Ambiguity, ambiguities
 from lightpaint.solve.lighting import Lighting, combine, write_lighting
 from lightpaint.solve.reduction import reduce_to
@@ -163,20 +163,32 @@ def _paint(
     views = [replace(view, basis=basis) for view, basis in zip(views, bases, strict=True)]
 
     problems = [
-        problem_of(_basis(view), view.target, constraints=constraints, unpainted=settings.unpainted)
+        problem_of(
+            _basis(view),
+            view.target,
+            constraints=constraints,
+            unpainted=settings.unpainted,
+            method=settings.method,
+        )
         for view in views
     ]
     solution = solution_of(whole, joint_problem(problems), start=whole.present_weights)
     solution, uncertainty = _improved(whole, solution, views, settings, progress)
     alike = () if constraints else ambiguities(whole, solution)
+    joint = (whole, solution) if len(views) > 1 else None
+    diagnoses = [
+        diagnose(_basis(view), view.target, its, whole=joint)
+        for view, its in zip(views, parted(solution, problems), strict=True)
+    ]
+    solution = with_diagnosis(solution, diagnoses[0])
     with restoring(folder, written):
         write_lighting(folder / "lighting.json", solution.lighting)
         if (groups := views[0].groups) is not None:
             write_exports(folder, groups, solution.lighting)
         relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
         return [
-            _finished(view, its, uncertainty, alike, relit, settings, progress)
-            for view, its in zip(views, parted(solution, problems), strict=True)
+            _finished(view, its, uncertainty, told, alike, relit, settings, progress)
+            for view, its, told in zip(views, parted(solution, problems), diagnoses, strict=True)
         ]
 
 
@@ -253,6 +265,7 @@ def _finished(
     view: PaintedView,
     solution: Solution,
     uncertainty: Uncertainty | None,
+    diagnosis: Diagnosis,
     alike: tuple[Ambiguity, ...],
     relit: Scene | None,
     settings: Settings,
@@ -282,7 +295,7 @@ def _finished(
         relit=relit,
         verification=verification,
         uncertainty=uncertainty,
-        diagnosis=diagnose(basis, view.target, solution),
+        diagnosis=diagnosis,
         ambiguities=alike,
     )
     show_look(look, view.folder, command=settings.command)

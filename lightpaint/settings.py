@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from lightpaint.scene.quality import Quality
 from lightpaint.solve.constraints import Constraints
+from lightpaint.solve.optimum import Method
 
 
 @dataclass(frozen=True)
@@ -13,6 +14,7 @@ class Settings:
     What is solved:
     constraints: what is asked of the lights; it goes before what the scene's lights file asks.
     unpainted: weight of unpainted pixels against the current look.
+    method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
     resize: whether a target of another size is resampled.
 
     What is rendered:
@@ -36,6 +38,7 @@ class Settings:
 
     constraints: Constraints | None = None
     unpainted: float = 0.0
+    method: Method = "polished"
     resize: bool = False
     spp: int | None = None
     time_s: float | None = None

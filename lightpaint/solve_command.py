@@ -134,6 +134,7 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     """What the options say of `Settings`, but for constraints and what is done already."""
     return {
         "unpainted": options.unpainted,
+        "method": options.method,
         "spp": options.spp,
         "time_s": options.time_s,
         "seed": options.seed,

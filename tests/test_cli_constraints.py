@@ -11,6 +11,7 @@ from renderer import write_room
 from test_cli import refused, run, succeed
 
 from lightpaint import Constraints, paint_with_light, read_basis
+from lightpaint.cli import _parser
 from lightpaint.images.color import kelvin_to_rgb, luminance
 from lightpaint.images.exr import write_rgb
 from lightpaint.scene.scene import load_scene
@@ -115,6 +116,27 @@ def test_every_option_from_a_saved_basis(room: Path, tmp_path: Path) -> None:
     assert not any(_lights(tmp_path / "c")["sun"]["emission"])
 
 
+def _parsed(*options: str) -> Any:
+    return _parser().parse_args(["solve", "b.basis.exr", "t.exr", *options])
+
+
+def test_a_temperature_may_be_away_from_plancks_locus() -> None:
+    options = _parsed("--kelvin", "a=2700:6500,duv=-0.005", "--kelvin", "b=3200K, duv=1e-2")
+    assert options.kelvin == [("a", [2700, 6500]), ("b", [3200])]
+    assert options.duv == [("a", -0.005), ("b", 0.01)]
+    # What is said last holds, and no list is shared between two commands.
+    options = _parsed("--kelvin", "a=2700,duv=0.01", "--kelvin", "a=3000")
+    assert (options.kelvin[-1], options.duv) == (("a", [3000]), [])
+    assert (_parsed().kelvin, _parsed().duv) == ([], [])
+
+
+def test_a_temperature_away_from_plancks_locus_is_solved_for(room: Path, tmp_path: Path) -> None:
+    solve = ("solve", room / "room.basis.exr", room / "t.exr", "-o", "out")
+    succeed(tmp_path, *solve, "--kelvin", "bulb=3200,duv=0.01")
+    bulb = np.array(_lights(tmp_path / "out")["bulb"]["emission"])
+    np.testing.assert_allclose(bulb, luminance(bulb) * kelvin_to_rgb(3200, 0.01), rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -125,6 +147,9 @@ def test_every_option_from_a_saved_basis(room: Path, tmp_path: Path) -> None:
         (("--color", "bulb"), "'bulb' is not NAME=VALUE"),
         (("--color", "bulb=blue"), "light.bulb.color is 'blue': expected a colour"),
         (("--kelvin", "bulb=warm"), "is not NAME=2700:6500"),
+        (("--kelvin", "bulb=2700,duv=green"), "with or without ,duv=0.003 behind"),
+        (("--kelvin", "bulb=2700,tint=0.01"), "with or without ,duv=0.003 behind"),
+        (("--method", "newton"), "invalid choice: 'newton'"),
         (("--lock", "bulb", "--off", "bulb"), "both 'lock' and 'off'"),
         (("--tie", "bulb"), "a tie has at least two"),
         (("--sparse", "0"), "is not a whole number >= 1"),

@@ -5,6 +5,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.images.color import LUMINANCE, luminance
 from lightpaint.relight.verdict import energy_shares
+from lightpaint.solve.bound import Bound
 from lightpaint.solve.diagnosis import Diagnosis, Place
 from lightpaint.solve.lighting import LightSetting
 from lightpaint.solve.normal_equations import Doubles
@@ -13,6 +14,9 @@ from lightpaint.solve.uncertainty import SIDES, Uncertainty
 
 #: Shares of the miss, or of a light, that are too small to speak of.
 SMALL = 0.05
+
+#: The same of a light that is switched off: it is easily switched on.
+SMALLER = 0.01
 
 #: What the painting and the light there must differ by to be called another colour.
 SEEN = 0.06
@@ -71,7 +75,7 @@ def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
 
 
 def what_is_missed(diagnosis: Diagnosis) -> list[str]:
-    """At most three sentences on why it does not look like the painting, the first first."""
+    """At most four sentences on why it does not look like the painting, the first first."""
     d = diagnosis
     if d.missed < 0.01:
         return ["The lights can do what is painted."]
@@ -92,24 +96,48 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
     if d.place is not None and d.share(d.unreachable) >= SMALL:
         sentences.append(spoken_place(d.place))
-    if d.bounds and d.share(d.bounds[0].gain) >= SMALL:
-        bound = d.bounds[0]
-        sentences.append(
-            f"Light {bound.light} is kept as it is; adjusting it too would take away "
-            f"{spoken_percent(d.share(bound.gain))} of the miss."
-            if bound.is_kept
-            else f"Light {bound.light} is {spoken_bound(bound.multiplier)} and still too much: "
-            "the painting is darker there than the other lights leave it "
-            f"({spoken_percent(d.share(bound.gain))} of the miss)."
-        )
+    most = [bound for bound in d.bounds[:1] if d.gained(bound) >= SMALL]
+    to_switch_on = [
+        bound for bound in d.bounds if bound.is_switched_off and d.gained(bound) >= SMALLER
+    ]
+    for bound in dict.fromkeys([*most, *to_switch_on[:1]]):
+        sentences.append(spoken_bound(bound, d.gained(bound)))
     return sentences
 
 
-def spoken_bound(multiplier: tuple[float, float, float]) -> str:
-    """`off`, or which of its channels are, by where the bound is felt."""
-    largest = max(multiplier)
+def spoken_bound(bound: Bound, share: float) -> str:
+    """What holds a light, and which share of the miss that is."""
+    is_one = len(bound.lights) == 1
+    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {', '.join(bound.lights)} are"
+    if bound.kind == "zero":
+        return (
+            f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
+            f"the other lights leave it ({spoken_percent(share)} of the miss)."
+        )
+    it = "it" if is_one else "them"
+    held = {
+        "kept": f"kept as it is; adjusting {it} too",
+        "lock": f"locked ({bound.held_by}); adjusting {it}",
+        "off": f"switched off, as asked; switching {it} on",
+        "left out": f"left out, as only so many may be on; switching {it} on too",
+        "tie": "on one dimmer; adjusting each by itself",
+        "limits": f"at a limit ({bound.held_by}); letting go of that",
+        "colour": f"held to a colour ({bound.held_by}); any other",
+    }[bound.kind]
+    return f"{lights} {held} would take away {spoken_percent(share)} of the miss."
+
+
+def spoken_hold(bound: Bound) -> str:
+    """What holds a light, in few words; of one at zero, in which channels by where it is felt."""
+    if bound.kind == "kept":
+        return "kept as it is"
+    if bound.kind != "zero":
+        return bound.held_by
+    if len(bound.multiplier) != 3:
+        return "off"
     names = ("red", "green", "blue")
-    held = [n for n, m in zip(names, multiplier, strict=True) if m > 0.01 * largest]
+    felt = zip(names, bound.multiplier, strict=True)
+    held = [n for n, m in felt if m > 0.01 * max(bound.multiplier)]
     return "off" if len(held) == 3 else f"off in {' and '.join(held)}"
 
 

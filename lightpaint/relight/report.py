@@ -14,6 +14,7 @@ from lightpaint.images.display import encode_display
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
 from lightpaint.relight.pictures import exposure_of, spoken_stops, target_picture
+from lightpaint.relight.report_constraints import constraints_section
 from lightpaint.relight.report_diagnosis import missed_section, sure_section
 from lightpaint.relight.report_pictures import Picture, maps, wipe
 from lightpaint.relight.report_tables import (
@@ -67,7 +68,8 @@ def report_page(
         wipe=wipe(looks),
         exposure=_exposure(stops, predicted.image),
         maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
-        missed=missed_section(solution, diagnosis, current, stops=stops),
+        missed=missed_section(solution, diagnosis, current, stops=stops)
+        + constraints_section(basis, target.name, solution, stops=stops),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
         amounts=amounts_heading(solution),

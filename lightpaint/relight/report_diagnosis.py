@@ -10,13 +10,14 @@ from lightpaint.images.exr import Floats
 from lightpaint.relight.explanation import (
     how_sure,
     relative_errors,
-    spoken_bound,
+    spoken_hold,
     spoken_percent,
     what_is_missed,
 )
 from lightpaint.relight.pictures import coverage, diverging, round_up, unpainted_look
 from lightpaint.relight.report_pictures import SIGNED, Picture, figure, scale
 from lightpaint.relight.verdict import energy_shares
+from lightpaint.solve.bound import Bound
 from lightpaint.solve.diagnosis import Diagnosis
 from lightpaint.solve.solve import Solution
 from lightpaint.solve.uncertainty import Uncertainty
@@ -167,17 +168,38 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: f
 
 def _bounds(diagnosis: Diagnosis) -> str:
     rows = [
-        f'<tr><th scope="row">{escape(bound.light)}</th>'
-        f"<td>{'kept as it is' if bound.is_kept else spoken_bound(bound.multiplier)}</td>"
-        f"<td>{spoken_percent(diagnosis.share(bound.gain))} less missed</td></tr>"
+        f'<tr><th scope="row">{escape(", ".join(bound.lights))}</th>'
+        f"<td>{escape(_held_by(bound))}</td>"
+        f"<td>{spoken_percent(diagnosis.gained(bound))}</td>"
+        f'<td class="rgb">{_multiplier(bound)}</td></tr>'
         for bound in diagnosis.bounds
-        if diagnosis.share(bound.gain) >= SMALLEST_GAIN
+        if diagnosis.gained(bound) >= SMALLEST_GAIN
     ]
     if not rows:
         return ""
+    more = diagnosis.bounds_left_out
+    others = f" {more} more seem to matter less, and were not looked into." if more else ""
     return (
-        '<div class="explained"><div><h3>What holds the lights back</h3><p>What would be gained '
-        "if one light might go below zero, and so take light away, or were not kept: a hint at "
-        "which other lights spill where they should not.</p></div>"
-        f"<table><tbody>{''.join(rows)}</tbody></table></div>"
+        '<div class="explained" style="margin-top: 32px"><div><h3>What holds the lights back</h3>'
+        "<p>What would be gained if one of these alone were let go, and all others stayed. "
+        "A light that is kept, locked, "
+        "limited, coloured or tied would then have any emission; one that is off for no other "
+        "reason would go below zero and so take light away: a hint at which other lights spill "
+        f"where they should not.{others}</p><p>At first: how the objective would change, per unit, "
+        "if that which holds were raised a little.</p></div>"
+        '<table><thead><tr><th scope="col">light</th><th scope="col">held by</th>'
+        '<th scope="col">less missed<br>without that</th><th scope="col">at first</th></tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
     )
+
+
+def _held_by(bound: Bound) -> str:
+    """Zero, so that nobody takes it for somebody's wish, or what else holds."""
+    held = spoken_hold(bound)
+    return held.replace("off", "zero") if bound.kind == "zero" else held
+
+
+def _multiplier(bound: Bound) -> str:
+    numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
+    per = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
+    return f"{', '.join(numbers)}<small>per {per.get(bound.per, 'present brightness')}</small>"

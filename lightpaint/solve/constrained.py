@@ -1,13 +1,13 @@
 """The solve under constraints: the reduced problem, solved, and what held which light."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
-from lightpaint.solve.optimum import Optimum, minimise
+from lightpaint.solve.optimum import Method, Optimum, minimise
 from lightpaint.solve.quadratic import UNREACHED
 from lightpaint.solve.reduced_problem import problems
 from lightpaint.solve.reduction import Reduction, Unknown
@@ -20,19 +20,40 @@ FAINT = 1e-8
 #: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
 PULL = 1e-7
 
+#: Distance from a bound, beside the light's other values, that is round-off of a start.
+NEAR = 1e-12
+
 #: Share by which a sum may be short of its limit and be said to be at it.
 AT_LIMIT = 1e-9
 
 
+@dataclass(frozen=True)
+class ConstrainedOptimum:
+    """A result in the unknowns of a reduction, and what shows that it is one.
+
+    x, multipliers: of its unknowns; cap_multipliers: of its caps. All as of `Optimum`, of
+    half the objective.
+    """
+
+    result: SolverResult
+    x: Doubles
+    multipliers: Doubles
+    cap_multipliers: Doubles
+
+
 def solve_constrained(
-    equations: NormalEquations, reduction: Reduction, start: Doubles
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    method: Method = "polished",
 ) -> SolverResult:
     """Minimise the objective over what `reduction` leaves.
 
     start: (n, 3), weights to begin with; lights that reach nothing stay as near to them as
-    the constraints allow.
+    the constraints allow. method: see `minimise`.
     """
-    return _solve_reduced(equations, reduction, start)[0]
+    return constrained_optimum(equations, reduction, start, method=method).result
 
 
 def free_directions(equations: NormalEquations, reduction: Reduction, start: Doubles) -> Doubles:
@@ -40,7 +61,7 @@ def free_directions(equations: NormalEquations, reduction: Reduction, start: Dou
 
     Arguments as of `solve_constrained`.
     """
-    _, x = _solve_reduced(equations, reduction, start)
+    x = constrained_optimum(equations, reduction, start).x
     lit = reached(equations)
     columns = []
     for unknown in reduction.unknowns:
@@ -70,15 +91,28 @@ def free_directions(equations: NormalEquations, reduction: Reduction, start: Dou
     return np.asarray(C[:, kept] @ right[rank:].T)
 
 
-def _solve_reduced(
-    equations: NormalEquations, reduction: Reduction, start: Doubles
-) -> tuple[SolverResult, Doubles]:
-    """The result and the values x of the unknowns."""
+def constrained_optimum(
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    method: Method = "polished",
+    x: Doubles | None = None,
+) -> ConstrainedOptimum:
+    """The same as `solve_constrained`, with the values of the unknowns and their multipliers.
+
+    x: the unknowns to begin with, where they are known; else those nearest to `start`.
+    """
     lit = reached(equations)
     equations = _with_faint_pull(equations, lit, start)
-    x = np.array([0.0] * len(reduction.unknowns))
-    for _, its in reduction.knobs:
-        x[list(its)] = _nearest(reduction, its, start)
+    multipliers = np.zeros(len(reduction.unknowns))
+    cap_multipliers = np.zeros(len(reduction.caps))
+    cap_at = {cap.unknowns[0]: k for k, cap in enumerate(reduction.caps)}
+    if x is None:
+        x = np.zeros(len(reduction.unknowns))
+        for _, its in reduction.knobs:
+            x[list(its)] = _at_bounds(reduction, its, _nearest(reduction, its, start))
+    x = x.copy()
     residuals, tolerances, sweeps = np.zeros(3), np.zeros(3), [0, 0, 0]
     for problem in problems(equations, reduction):
         optimum = minimise(
@@ -88,8 +122,11 @@ def _solve_reduced(
             upper=problem.upper,
             caps=problem.caps,
             start=x[problem.its],
+            method=method,
         )
-        x[problem.its] = optimum.x
+        x[problem.its], multipliers[problem.its] = optimum.x, optimum.multipliers
+        for cap, multiplier in zip(problem.caps, optimum.cap_multipliers, strict=True):
+            cap_multipliers[cap_at[problem.its[cap.unknowns[0]]]] = multiplier
         for c in problem.channels:
             residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
             tolerances[c] = optimum.tolerance
@@ -100,7 +137,7 @@ def _solve_reduced(
         _reached_knobs(reduction, lit),
         float(tolerances.max()),
     )
-    return result, x
+    return ConstrainedOptimum(result, x, multipliers, cap_multipliers)
 
 
 def solve_sparse(
@@ -222,6 +259,15 @@ def _nearest(reduction: Reduction, its: tuple[int, ...], start: Doubles) -> Doub
         C @ C.T, C @ start[lights].ravel(), lower=lower, upper=upper, caps=caps
     )
     return found.x
+
+
+def _at_bounds(reduction: Reduction, its: tuple[int, ...], x: Doubles) -> Doubles:
+    """x, at a bound where only round-off keeps it from there: what is at one has a multiplier."""
+    near = NEAR * float(np.abs(x).max(initial=0))
+    for bound in ("lower", "upper"):
+        limits = np.array([getattr(reduction.unknowns[k], bound) for k in its])
+        x = np.where(np.abs(x - limits) <= near, limits, x)
+    return x
 
 
 def _is_free(unknowns: list[Unknown]) -> bool:

@@ -17,34 +17,17 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.images.color import luminance
 from lightpaint.images.exr import Floats
+from lightpaint.solve.bound import Bound
 from lightpaint.solve.lighting import combine
-from lightpaint.solve.normal_equations import Doubles, NormalEquations
+from lightpaint.solve.normal_equations import Doubles
+from lightpaint.solve.release import bounds_of
 from lightpaint.solve.solve import Solution, solution_of
-from lightpaint.solve.solver import solve_normal_equations
 from lightpaint.solve.uncertainty import pseudo_inverse, unknown_groups
 from lightpaint.target.target import Target
-
-#: Bounds for which the problem is solved again: those that seem to matter most.
-RELEASED = 4
 
 #: Blocks along each side of the image over which it is asked where light is missing, and
 #: regions that are spoken of: left, middle, right.
 BLOCKS, REGIONS = 12, 3
-
-
-@dataclass(frozen=True)
-class Bound:
-    """What holds the answer back: a light that may not go below zero, or that is kept.
-
-    gain: by how much the objective would fall without this one bound, all channels together.
-    multiplier: (3,), how fast it would fall at first, per unit of weight; 0 where the light
-    is on. For a light that is off its gain is what taking light away with it would bring.
-    """
-
-    light: str
-    is_kept: bool
-    gain: float
-    multiplier: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -74,8 +57,10 @@ class Diagnosis:
     norm2: ‖Ψ‖², to hold them against.
     unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
     reason. Their sum is Ψ − ΣwΦ. ignored_map: (h, w), of luminance, weighted.
-    bounds: by their gain, the largest first; none of other constraints. is_constrained: whether
-    there are any, which then forbid too. place: None where nothing is out of reach.
+    bounds: what holds single lights, the largest gain first. bounds_left_out: how many more
+    there are, which seem to matter less. is_constrained: whether anything was asked of the
+    lights, which then forbids too. place: None where nothing is out of reach. lighting_total:
+    `total` of all views that the lighting answers, to hold gains against.
     """
 
     total: float
@@ -90,12 +75,18 @@ class Diagnosis:
     bounds: tuple[Bound, ...]
     place: Place | None
     is_constrained: bool = False
+    bounds_left_out: int = 0
     compromise: float = 0.0
+    lighting_total: float = 0.0
 
     @property
     def avoidable(self) -> float:
         """Energy of `forbidden_map`: what some weights of any sign would not miss."""
         return self.forbidden + self.compromise
+
+    def gained(self, bound: Bound) -> float:
+        """The gain of `bound` as a share of what the lighting misses, of all views together."""
+        return bound.gain / self.lighting_total if self.lighting_total > 0 else 0.0
 
     def share(self, part: float) -> float:
         """`part` of what is missed, 0 to 1."""
@@ -107,8 +98,18 @@ class Diagnosis:
         return float(np.sqrt(self.total / self.norm2)) if self.norm2 > 0 else 0.0
 
 
-def diagnose(basis: Basis, target: Target, solution: Solution) -> Diagnosis:
-    """Split what `solution` misses of `target`. Raises SizeError if they differ in size."""
+def diagnose(
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    *,
+    whole: tuple[Basis, Solution] | None = None,
+) -> Diagnosis:
+    """Split what `solution` misses of `target`. Raises SizeError if they differ in size.
+
+    whole: of one of several views, the joint basis and its solution: what holds the lights does
+    so in all views together.
+    """
     target = target.fitted_to(basis.size, resize=False)
     weights = solution.lighting.weights_for(basis)
     predicted = combine(basis, solution.lighting)
@@ -126,21 +127,23 @@ def diagnose(basis: Basis, target: Target, solution: Solution) -> Diagnosis:
     # Where nothing was painted no colour is missed either.
     uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
     outside = target.image.astype(np.float64) - predicted.image
-    is_simple = not (solution.constraints or solution.is_one_of_several)
     compromise = min(_given_up(basis, solution, weights), total - out_of_reach)
+    bounds, left_out = bounds_of(*(whole or (basis, solution)))
     return Diagnosis(
         total=total,
         unreachable=out_of_reach - noise,
         forbidden=total - out_of_reach - compromise,
-        compromise=compromise,
         noise=noise,
         ignored=float((uncounted[..., None] * np.square(outside)).sum()),
         norm2=float((D * np.square(solution.image, dtype=np.float64)).sum()),
         unreachable_map=unreachable,
         forbidden_map=forbidden,
         ignored_map=uncounted * luminance(outside),
-        bounds=_bounds(basis, solution, weights) if is_simple else (),
+        bounds=bounds,
+        bounds_left_out=left_out,
+        lighting_total=total if whole is None else sum(whole[1].quality.objective),
         is_constrained=bool(solution.constraints),
+        compromise=compromise,
         place=_place(solution, unreachable) if out_of_reach > noise else None,
     )
 
@@ -152,6 +155,12 @@ def _given_up(basis: Basis, solution: Solution, weights: Doubles) -> float:
     alone = solution_of(basis, solution, start=weights)
     gap = sum(solution.quality.objective) - sum(alone.quality.objective)
     return max(gap, 0.0)
+
+
+def with_diagnosis(solution: Solution, diagnosis: Diagnosis) -> Solution:
+    """`solution` whose quality has the bounds, for lighting.json."""
+    quality = replace(solution.quality, bounds=diagnosis.bounds)
+    return replace(solution, lighting=replace(solution.lighting, quality=quality))
 
 
 def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
@@ -168,62 +177,6 @@ def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
         step = pseudo_inverse(M) @ np.einsum("cik,ci->k", to, gradient)
         weights = weights - np.einsum("cik,k->ic", to, step)
     return weights
-
-
-def _bounds(basis: Basis, solution: Solution, weights: Doubles) -> tuple[Bound, ...]:
-    """The lights that hold the answer back most, each with the problem solved without it."""
-    equations = solution.equations
-    gradient = np.einsum("cij,jc->ic", equations.M, weights) - equations.b.T
-    power = np.einsum("cii->ic", equations.M)
-    # A light that is off wants to be negative where its gradient is positive.
-    wants = np.where(weights > 0, 0, np.maximum(gradient, 0)) * (power > 0)
-    for i, light in enumerate(basis.lights):
-        if light.is_fixed:
-            wants[i] = gradient[i]
-        elif light.is_scalar:
-            wants[i] = max(gradient[i].sum(), 0) / 3 if not weights[i].any() else 0
-    # To first order, and with all others as they are: good enough to choose by.
-    estimate = (np.square(wants) / np.where(power > 0, power, 1)).sum(axis=1)
-    chosen = [int(i) for i in np.argsort(-estimate)[:RELEASED] if estimate[i] > 0]
-    before = float(equations.objective(weights).sum())
-    bounds = []
-    for i in chosen:
-        gain = before - _objective_without(basis, equations, weights, i, wants[i] > 0)
-        is_kept = bool(basis.is_fixed[i])
-        bounds.append(Bound(basis.names[i], is_kept, max(gain, 0.0), _rgb(2 * wants[i])))
-    return tuple(sorted(bounds, key=lambda bound: -bound.gain))
-
-
-def _objective_without(
-    basis: Basis, equations: NormalEquations, weights: Doubles, i: int, is_off: Floats
-) -> float:
-    """The objective of the best lighting without the bound of light i.
-
-    is_off: (3,), channels in which it is at zero. Without its bound it goes below in these,
-    so that it is the same to be bounded by zero from above: Φ_i → −Φ_i.
-    """
-    is_fixed = basis.is_fixed.copy()
-    start = weights.copy()
-    if is_fixed[i]:
-        is_fixed[i] = False
-    else:
-        sign = np.ones((3, len(weights)))
-        sign[is_off, i] = -1
-        equations = replace(
-            equations,
-            M=equations.M * sign[:, :, None] * sign[:, None, :],
-            b=equations.b * sign,
-        )
-    free = np.flatnonzero(~is_fixed)
-    result = solve_normal_equations(
-        equations.holding(is_fixed),
-        start[free],
-        is_scalar=[basis.lights[k].is_scalar for k in free],
-        tolerance=1e-6,
-        max_sweeps=2000,
-    )
-    start[free] = result.weights
-    return float(equations.objective(start).sum())
 
 
 def _place(solution: Solution, unreachable: Floats) -> Place | None:

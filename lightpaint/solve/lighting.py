@@ -14,6 +14,7 @@ from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.photometry import Photometry, photometry
+from lightpaint.solve.bound import Bound
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.version import __version__
 
@@ -79,6 +80,7 @@ class Quality:
     their present emission.
     curve: where only some lights may be on, numbers of lights and the relative residual,
     √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
+    bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
     """
 
     kkt_residual: RGB
@@ -88,6 +90,7 @@ class Quality:
     converged: bool
     unreached: tuple[str, ...] = ()
     curve: tuple[tuple[int, float], ...] = ()
+    bounds: tuple[Bound, ...] = ()
 
     def of(self, equations: NormalEquations, weights: Doubles) -> "Quality":
         """With the objective that `weights` (n, 3) have in `equations`."""
@@ -252,6 +255,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             "converged": q.converged,
             "unreached": list(q.unreached),
             **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
+            **({"bounds": [bound.fields() for bound in q.bounds]} if q.bounds else {}),
         }
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
@@ -362,6 +366,7 @@ def _read_quality(data: dict[str, Any]) -> Quality:
         converged,
         tuple(str(name) for name in unreached),
         tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
+        tuple(Bound.of_fields(bound) for bound in data.get("bounds", [])),
     )
 
 

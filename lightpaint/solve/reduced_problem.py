@@ -6,6 +6,7 @@ import numpy as np
 
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.solve.optimum import Cap
+from lightpaint.solve.quadratic import Indices
 from lightpaint.solve.reduction import Reduction, Unknown, channel_groups
 
 
@@ -32,13 +33,14 @@ def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedPr
         its = [k for k, x in enumerate(reduction.unknowns) if _touches(x, channels)]
         M, b = np.zeros((len(its), len(its))), np.zeros(len(its))
         for c in channels:
-            here = [k for k, i in enumerate(its) if _touches(reduction.unknowns[i], [c])]
-            C = np.zeros((len(reduction.held), len(here)))
-            for k, i in enumerate(here):
-                for light, rgb in reduction.unknowns[its[i]].columns:
-                    C[light, k] = rgb[c]
-            M[np.ix_(here, here)] += C.T @ equations.M[c] @ C
-            b[here] += C.T @ (equations.b[c] - equations.M[c] @ reduction.held[:, c])
+            here, lights, values, first = _entries(reduction, its, c)
+            if not here.size:
+                continue
+            left = equations.b[c] - equations.M[c] @ reduction.held[:, c]
+            whole = equations.M[c][np.ix_(lights, lights)] * values[:, None] * values
+            # Most columns are of one light: the sum over those of several is a short one.
+            M[np.ix_(here, here)] += np.add.reduceat(np.add.reduceat(whole, first, 0), first, 1)
+            b[here] += np.add.reduceat(left[lights] * values, first)
         place = {i: k for k, i in enumerate(its)}
         caps = tuple(
             replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
@@ -49,6 +51,25 @@ def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedPr
         upper = np.array([reduction.unknowns[i].upper for i in its])
         made.append(ReducedProblem(channels, its, M, b, lower, upper, caps))
     return made
+
+
+def _entries(
+    reduction: Reduction, its: list[int], c: int
+) -> tuple[Indices, Indices, Doubles, Indices]:
+    """What is not 0 in C_c, column by column.
+
+    Returns the columns that there are, of each entry its light and value, and where among
+    these each column begins.
+    """
+    entries = [
+        (k, light, rgb[c])
+        for k, i in enumerate(its)
+        for light, rgb in reduction.unknowns[i].columns
+        if rgb[c]
+    ]
+    columns, lights = (np.array([entry[j] for entry in entries], dtype=np.intp) for j in (0, 1))
+    here, first = np.unique(columns, return_index=True)
+    return here, lights, np.array([value for _, _, value in entries], dtype=np.float64), first
 
 
 def _touches(unknown: Unknown, channels: list[int]) -> bool:

@@ -10,6 +10,7 @@ from lightpaint.solve.constrained import preferring, pulled, solve_constrained, 
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, Quality
 from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
+from lightpaint.solve.optimum import Method
 from lightpaint.solve.reduction import Reduction, reduce_to
 from lightpaint.solve.selection import only
 from lightpaint.solve.solver import SolverResult, solve_normal_equations
@@ -46,6 +47,8 @@ class Solution:
     refinement: the last step by which the answer was improved, if it was.
     is_one_of_several: whether the lighting answers other views too, so that it need not be the
     best for this one.
+    method: what it was solved with (see `minimise`), and is again where it is improved.
+    tried: with `sparse`, numbers of lights and the weights (n, 3) of the best such.
     """
 
     lighting: Lighting
@@ -58,6 +61,8 @@ class Solution:
     noise_removed: float = 0.0
     refinement: Refinement | None = None
     is_one_of_several: bool = False
+    method: Method = "polished"
+    tried: tuple[tuple[int, Doubles], ...] = ()
 
     @property
     def quality(self) -> Quality:
@@ -73,6 +78,7 @@ def solve(
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
     start: Lighting | None = None,
+    method: Method = "polished",
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
@@ -80,13 +86,15 @@ def solve(
     unpainted: weight of what is not painted, against the current look.
     start: lighting to begin with (the present one by default): a good guess saves sweeps,
     the answer is the same.
+    method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
+    quality of the answer then says that it has not converged.
 
     Lights that are kept have weight 1; the others make up what they leave of the target.
 
     Raises SizeError if basis and target differ in size, TargetError if nothing counts,
     ConstraintError if a constraint does not fit the lights.
     """
-    problem = problem_of(basis, target, constraints=constraints, unpainted=unpainted)
+    problem = problem_of(basis, target, constraints=constraints, unpainted=unpainted, method=method)
     begin = basis.present_weights if start is None else start.weights_for(basis)
     return solution_of(basis, problem, start=begin)
 
@@ -97,6 +105,7 @@ def problem_of(
     *,
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
+    method: Method = "polished",
 ) -> Solution:
     """What is to be solved, with the present lighting for an answer. As of `solve`."""
     target = target.fitted_to(basis.size, resize=False)
@@ -111,6 +120,7 @@ def problem_of(
         solved=equations,
         current_share=np.where(importance > 0, 1 - target.importance / counted, 0),
         constraints=constraints,
+        method=method,
     )
 
 
@@ -120,9 +130,9 @@ def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
     asked = None
     tried: list[tuple[int, Doubles]] = []
     if problem.constraints:
-        result, asked, tried = _solve_asked(problem.solved, basis, problem.constraints, start)
+        result, asked, tried = _solve_asked(problem, basis, problem.constraints, start)
     else:
-        result = _solve_free(problem.solved, basis, start)
+        result = _solve_free(problem, basis, start)
     weights = result.weights
 
     norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
@@ -140,16 +150,17 @@ def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
     ).of(equations, weights)
     target = problem.lighting.target
     lighting = Lighting.of_weights(basis, weights, asked=asked, target=target, quality=quality)
-    return replace(problem, lighting=lighting)
+    return replace(problem, lighting=lighting, tried=tuple(tried))
 
 
-def _solve_free(equations: NormalEquations, basis: Basis, start: Doubles) -> SolverResult:
+def _solve_free(problem: Solution, basis: Basis, start: Doubles) -> SolverResult:
     """Every light that is not kept may have any colour."""
     free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
     result = solve_normal_equations(
-        equations.holding(basis.is_fixed),
+        problem.solved.holding(basis.is_fixed),
         start[free],
         is_scalar=[basis.lights[k].is_scalar for k in free],
+        method=problem.method,
     )
     weights, reached = start.copy(), np.ones(len(start), dtype=bool)
     weights[free], reached[free] = result.weights, result.reached
@@ -157,20 +168,20 @@ def _solve_free(equations: NormalEquations, basis: Basis, start: Doubles) -> Sol
 
 
 def _solve_asked(
-    equations: NormalEquations, basis: Basis, constraints: Constraints, start: Doubles
+    problem: Solution, basis: Basis, constraints: Constraints, start: Doubles
 ) -> tuple[SolverResult, list[tuple[str, bool]], list[tuple[int, Doubles]]]:
     """Under constraints; with it, of each light, what is asked and whether that holds it.
 
     Last, where only some lights may be on: numbers of lights and weights of the best such.
     """
-    reduction = reduce_to(constraints, basis.lights)
+    equations, reduction = problem.solved, reduce_to(constraints, basis.lights)
     if constraints.prefer_current:
         present = basis.present_weights
         equations = preferring(equations, basis, present, constraints.prefer_current)
     tried: list[tuple[int, Doubles]] = []
     if constraints.sparse is not None:
         reduction, tried = solve_sparse(equations, reduction, start, constraints.sparse)
-    result = solve_constrained(equations, reduction, start)
+    result = solve_constrained(equations, reduction, start, method=problem.method)
     active = pulled(equations, basis, result.weights)
     labels = zip(reduction.labels, active, strict=True)
     return result, [(label, bool(label) and holds) for label, holds in labels], tried

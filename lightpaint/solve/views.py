@@ -18,6 +18,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images.estimate import Estimate
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting
+from lightpaint.solve.optimum import Method
 from lightpaint.solve.solve import Solution, problem_of, solution_of
 from lightpaint.target.target import Target
 
@@ -31,6 +32,7 @@ def solve_views(
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
     start: Lighting | None = None,
+    method: Method = "polished",
 ) -> list[Solution]:
     """Find the one lighting that comes closest to the targets of several views together.
 
@@ -41,7 +43,7 @@ def solve_views(
     """
     basis, bases = joint_basis([basis for basis, _ in views])
     problems = [
-        problem_of(basis, target, constraints=constraints, unpainted=unpainted)
+        problem_of(basis, target, constraints=constraints, unpainted=unpainted, method=method)
         for basis, (_, target) in zip(bases, views, strict=True)
     ]
     begin = basis.present_weights if start is None else start.weights_for(basis)
@@ -139,7 +141,7 @@ def parted(joint: Solution, problems: Sequence[Solution]) -> list[Solution]:
             target=problem.lighting.target,
             quality=joint.quality.of(problem.equations, weights),
         )
-        views.append(replace(problem, lighting=lighting, is_one_of_several=True))
+        views.append(replace(problem, lighting=lighting, tried=joint.tried, is_one_of_several=True))
     return views
 
 

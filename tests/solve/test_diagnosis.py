@@ -49,8 +49,7 @@ def test_darkness_that_only_negative_light_would_make_is_forbidden(make_basis: A
     assert found.total == pytest.approx(2 * pixels * 0.25**2, rel=1e-5)
     assert found.forbidden == pytest.approx(found.total, rel=1e-5)
     [bound] = found.bounds
-    assert bound.light == "light 0"
-    assert not bound.is_kept
+    assert (bound.lights, bound.kind, bound.held_by) == (("light 0",), "zero", "zero")
     # Without that bound the painting is met.
     assert bound.gain == pytest.approx(found.total, rel=1e-4)
     # d/dw of the objective at w = 0 of that light: 2 Σ 1 · 0.25 over its pixels, per channel.
@@ -103,7 +102,7 @@ def test_a_light_that_is_kept_stands_in_the_way(make_basis: Any):
     basis = replace(basis, lights=(kept, basis.lights[1]))
     found = _diagnosis(basis, _target(0.5 * _halves()[0] + 0.2 * _halves()[1]))
     [bound] = found.bounds
-    assert bound.is_kept
+    assert (bound.kind, bound.held_by) == ("kept", "kept")
     assert bound.gain == pytest.approx(found.total, rel=1e-5)
     # Held as it is, no weights of the others help.
     assert found.unreachable == pytest.approx(found.total, rel=1e-5)

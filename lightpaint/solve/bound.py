@@ -1,0 +1,68 @@
+"""One thing that holds lights back, as data: what it is, and what it costs."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+#: What holds: that light is not negative; that a light is not adjusted; what was asked of it.
+Kind = Literal["zero", "kept", "lock", "off", "left out", "tie", "limits", "colour"]
+
+#: What a multiplier is per unit of.
+Per = Literal["emission", "luminance", "dimmer"]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What holds back one light, or several on one dimmer.
+
+    held_by: what was asked of the light, in few words (`LightSetting.constraint`); else its kind.
+    gain: by how much the objective, all channels together, would fall if this alone were let
+    go. A kept, locked, limited, coloured or tied light then may have any emission >= 0, a
+    light that is left out what else is asked of it, and one at zero takes light away. Where
+    there is a pull towards the present it stays, is no part of the objective, and may make
+    the gain negative.
+    multiplier: by how much the objective would change at first, per unit by which that which
+    holds rose: >= 0 at a lower limit, as zero is one, and <= 0 at an upper one, as `off` is.
+    Of three channels where it is per `emission`; one number per `luminance` of the emission; and
+    per unit of its `dimmer`, 1 being the present, one for each tied light moved by itself, or
+    one number for all.
+    """
+
+    lights: tuple[str, ...]
+    kind: Kind
+    held_by: str
+    gain: float
+    multiplier: tuple[float, ...]
+    per: Per
+
+    @property
+    def is_switched_off(self) -> bool:
+        """Whether it is off because somebody, or a choice of few lights, wants it so."""
+        return self.kind in ("off", "left out")
+
+    def fields(self) -> dict[str, Any]:
+        """As it stands in lighting.json."""
+        return {
+            "lights": list(self.lights),
+            "kind": self.kind,
+            "held_by": self.held_by,
+            "gain": self.gain,
+            "multiplier": list(self.multiplier),
+            "per": self.per,
+        }
+
+    @classmethod
+    def of_fields(cls, data: dict[str, Any]) -> "Bound":
+        """From what `fields` gave. Raises KeyError, TypeError or ValueError for anything else."""
+        kind, per = data["kind"], data["per"]
+        if kind not in get_args(Kind) or per not in get_args(Per):
+            raise ValueError(f"a bound is of no kind {kind!r}, per {per!r}")
+        names, numbers = data["lights"], data["multiplier"]
+        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+            raise TypeError(f"lights of a bound is a list of names, not {names!r}")
+        if not isinstance(numbers, list):
+            raise TypeError(f"multiplier of a bound is a list of numbers, not {numbers!r}")
+        multiplier, gain = tuple(float(v) for v in numbers), float(data["gain"])
+        if not all(map(math.isfinite, (gain, *multiplier))):
+            raise ValueError("gain and multiplier of a bound are finite numbers")
+        return cls(tuple(names), kind, str(data["held_by"]), gain, multiplier, per)
