@@ -69,7 +69,7 @@ def report_page(
         exposure=_exposure(stops, predicted.image),
         maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
         missed=missed_section(solution, diagnosis, current, stops=stops)
-        + constraints_section(basis, target.name, solution, stops=stops),
+        + constraints_section(basis, solution, stops=stops),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
         amounts=amounts_heading(solution),

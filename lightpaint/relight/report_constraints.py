@@ -20,13 +20,13 @@ WIDTH = 320
 AROUND = 2
 
 
-def constraints_section(basis: Basis, target_name: str, solution: Solution, *, stops: float) -> str:
+def constraints_section(basis: Basis, solution: Solution, *, stops: float) -> str:
     """The best lighting without constraints beside the one as asked, both from the basis.
 
     With `sparse`, what other numbers of lights would miss. Empty where nothing is asked, and for
     one of several views, whose lighting answers the others too.
     """
-    if not solution.constraints or solution.lighting.target != target_name:
+    if not solution.constraints or solution.is_one_of_several:
         return ""
     start = solution.lighting.weights_for(basis)
     free = solution_of(basis, replace(solution, constraints=None, method="polished"), start=start)

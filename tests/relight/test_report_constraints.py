@@ -30,7 +30,7 @@ def _missed(solution: Any) -> float:
 
 
 def _section(basis: Any, target: Target, solution: Any) -> str:
-    return constraints_section(basis, target.name, solution, stops=0.0)
+    return constraints_section(basis, solution, stops=0.0)
 
 
 def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:
