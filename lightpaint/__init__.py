@@ -35,7 +35,8 @@ from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
 from lightpaint.solve.solve import Solution, solve
 from lightpaint.solve.views import solve_views
-from lightpaint.target.target import Target, read_target
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
 __all__ = [

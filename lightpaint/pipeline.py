@@ -44,7 +44,8 @@ from lightpaint.solve.solve import Solution, problem_of, solution_of
 from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.solve.views import joint_basis, joint_problem, parted
 from lightpaint.sources import without_holes
-from lightpaint.target.target import Target, read_target
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 from lightpaint.target.template import Template, write_look, write_template
 
 #: Rendering of what each light does alone, to recognise it by.

@@ -10,7 +10,7 @@ from lightpaint.basis.foreign import LightGroups
 from lightpaint.basis.render import basis_lights
 from lightpaint.errors import BasisError, TargetError
 from lightpaint.files import check_writable
-from lightpaint.given import constraints_of, folders_of, load, render_or_find
+from lightpaint.given import constraints_of, folders_of, load, render_or_find, view_of
 from lightpaint.pipeline import (
     all_constraints,
     command_line,
@@ -24,7 +24,8 @@ from lightpaint.scene.scene import Scene
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.reduction import reduce_to
 from lightpaint.sources import light_group_source, read_source
-from lightpaint.target.target import Target, read_target
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 
 
 def solve(options: Namespace, given: list[str]) -> int:
@@ -42,7 +43,17 @@ def solve(options: Namespace, given: list[str]) -> int:
         raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
     # Everything a user gave is looked at before the first sample is taken.
     masks = _one_for_each(options.masks or [None], paths)
-    targets = [read_target(t, mask=m) for t, m in zip(paths, masks, strict=True)]
+    how: dict[str, Any] = {
+        "layer": options.layer,
+        "view": view_of(options),
+        "template": options.template,
+        "find": options.find_template,
+        "paint": options.paint,
+    }
+    targets = [read_target(t, mask=m, **how) for t, m in zip(paths, masks, strict=True)]
+    for target in targets:
+        for note in target.notes:
+            console.say(f"{target.name}: {note}")
     if options.views:
         return _solve_views(options, targets, given)
     return _solve_each(options, targets, groups, given)
@@ -68,6 +79,8 @@ def _solve_each(
         scene = on_film(load(options, path=source), options.quality, options.resolution)
         reduce_to(all_constraints(scene, constraints), basis_lights(scene))
         size = scene.size
+    for target in targets if scene is not None else []:
+        _check_same_picture(target, scene)
     targets = [_fitted(target, size, options) for target in targets]
     for folder in folders:
         check_writable(folder)
@@ -109,6 +122,8 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
     constraints = constraints_of(options)
     reduce_to(all_constraints(scenes[0], constraints), basis_lights(scenes[0]))
     folder = Path(options.output or targets[0].name)
+    for target, scene in zip(targets, scenes, strict=True):
+        _check_same_picture(target, scene)
     targets = [_fitted(t, s.size, options) for t, s in zip(targets, scenes, strict=True)]
     check_writable(folder)
     check_relightable(scenes[0], folder / "relit.xml")
@@ -144,6 +159,18 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
         "cd_per_unit": options.cd_per_unit,
         "command": command_line(given),
     }
+
+
+def _check_same_picture(target: Target, scene: Scene) -> None:
+    """Raise TargetError for a painting of another view; say so if the scene has changed since."""
+    sensor = scene.sensor_names[scene.sensor]
+    if target.sensor not in ("", sensor):
+        raise TargetError(
+            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
+            f"{sensor}: choose it with -s or --target {target.sensor}=..., or pass --no-template"
+        )
+    if target.content not in ("", scene.content):
+        console.say(f"{target.name}: the scene has changed since its template was made")
 
 
 def _fitted(target: Target, size: tuple[int, int], options: Namespace) -> Target:

@@ -10,7 +10,8 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.display import choose_exposure, encode_display
 from lightpaint.images.exr import read_parts
 from lightpaint.images.view import View
-from lightpaint.target.target import Target, read_target
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 from lightpaint.target.template import write_template
 
 # Resampling runs in float32.
