@@ -79,8 +79,9 @@ def _solve_each(
         scene = on_film(load(options, path=source), options.quality, options.resolution)
         reduce_to(all_constraints(scene, constraints), basis_lights(scene))
         size = scene.size
-    for target in targets if scene is not None else []:
-        _check_same_picture(target, scene)
+    if scene is not None:
+        for target in targets:
+            _check_same_picture(target, scene)
     targets = [_fitted(target, size, options) for target in targets]
     for folder in folders:
         check_writable(folder)

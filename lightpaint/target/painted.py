@@ -14,9 +14,9 @@ from lightpaint.images.exr import Floats
 from lightpaint.images.picture import Picture
 from lightpaint.target.template import Template
 
-#: Difference at which paint counts fully, of the display's range or, in linear light, of the
-#: brighter of both.
-FULL = 0.04
+#: Difference at which paint counts fully: of the display's range; and, about the same for the eye,
+#: of the brighter of two linear values.
+FULL, FULL_OF_LIGHT = 0.04, 0.09
 
 #: Codes by which programs differ in rounding: half a code each, and dithering.
 ROUNDING = 1.6
@@ -40,13 +40,12 @@ def painted_where(picture: Picture, template: Template) -> npt.NDArray[np.float3
             f"{template.size[1]}x{template.size[0]}: export it at that size, or say by alpha or "
             "--mask what was painted"
         )
-    difference, tolerance = (
-        _difference_of_light(picture, template)
-        if picture.codes is None
-        else _difference_of_codes(picture, template)
-    )
+    if picture.codes is None:
+        (difference, tolerance), full = _difference_of_light(picture, template), FULL_OF_LIGHT
+    else:
+        (difference, tolerance), full = _difference_of_codes(picture, template), FULL
     # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.
-    share = np.clip((difference - tolerance) / (FULL - tolerance), 0, 1)
+    share = np.clip((difference - tolerance) / (full - tolerance), 0, 1)
     return _without_pinholes((share * share * (3 - 2 * share)).astype(np.float32))
 
 
@@ -62,7 +61,7 @@ def _difference_of_light(picture: Picture, template: Template) -> tuple[Floats, 
         size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), dark)
         relative = np.max(np.abs(picture.image - look) / size, axis=-1)
         found.append((relative, allowed))
-    return min(found, key=lambda pair: float(np.median(np.minimum(pair[0], FULL))))
+    return min(found, key=lambda pair: float(np.median(np.minimum(pair[0], FULL_OF_LIGHT))))
 
 
 def _difference_of_codes(picture: Picture, template: Template) -> tuple[Floats, float]:

@@ -21,9 +21,9 @@ Paint = Literal["look", "light"]
 #: Beyond this share of the picture, a comparison more likely found a conversion than paint.
 NEARLY_ALL = 0.97
 
-#: Times the light of most of the paint that no lamp would give for the rest of it, and the share
-#: of the paint that may ask for that without a word.
-BEYOND, FEW = 30.0, 0.01
+#: Times the light of the brightest parts of the template that no lamp is meant to give, and the
+#: share of the paint that may ask for that without a word.
+BEYOND, FEW = 10.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -152,13 +152,15 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     if not painted.any():
         return []
     light = np.maximum(reading.picture.image, 0) / albedo
-    usual = float(np.median(np.asarray(luminance(light))[painted]))
+    there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
+    bright = float(np.percentile(there[template.albedo.max(axis=-1) > 0], 95))
     # What is nearly black anyway needs little, however it is divided.
-    asks = (light > BEYOND * usual) & (reading.picture.image > 0.02 * template.view.white)
+    asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.view.white)
     share = float((asks.any(axis=-1) & painted).sum() / painted.sum())
     if share <= FEW:
         return []
     return [
-        f"{100 * share:.2g} % of the paint asks surfaces for a colour that they hardly reflect, "
-        f"{BEYOND:g} times the light of the rest: --paint light paints the light instead"
+        f"{100 * share:.2g} % of the paint asks surfaces for a colour that they hardly reflect, so "
+        f"for more than {BEYOND:g} times the light of the template's brightest parts: --paint "
+        "light paints the light instead"
     ]
