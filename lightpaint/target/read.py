@@ -111,7 +111,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
     if template is None or not is_opaque:
         return picture.alpha, []
-    importance = painted_where(picture, template)
+    importance = painted_where(path, picture, template)
     share = float((importance > 0).mean())
     if share == 0:
         raise TargetError(
