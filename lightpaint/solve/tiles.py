@@ -14,7 +14,7 @@ import numpy.typing as npt
 from lightpaint.errors import SizeError
 from lightpaint.images.exr import Floats
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
-from lightpaint.solve.threads import one_thread
+from lightpaint.solve.threads import one_thread, side_by_side
 
 #: Pixels along the side of a tile. Smaller ones fit a brush better and are more to add.
 SIDE = 16
@@ -24,6 +24,9 @@ ROOM = 2**29
 
 #: Bytes of pixels, in float64, that are summed at a time: they stay in the processor's cache.
 CHUNK = 2**20
+
+#: Lights up to which a tile takes the time of the calls and not of the arithmetic.
+FEW_LIGHTS = 32
 
 
 class TiledEquations:
@@ -89,12 +92,18 @@ class TiledEquations:
         columns = _tiles(region[1], self._importance.shape[1], self.side)
         if not (rows and columns):
             return
-        tile_bytes = 8 * 3 * (len(self._images) + 1) * self.side**2
-        step = max(CHUNK // tile_bytes, 1)
-        with one_thread():
-            for row in rows:
-                for first in range(columns.start, columns.stop, step):
-                    self._sum(row, range(first, min(first + step, columns.stop)), with_M)
+        few = max(CHUNK // (8 * 3 * (len(self._images) + 1) * self.side**2), 1)
+
+        def sum_row(row: int) -> None:
+            for first in range(columns.start, columns.stop, few):
+                self._sum(row, range(first, min(first + few, columns.stop)), with_M)
+
+        if with_M and len(self._images) > FEW_LIGHTS:
+            side_by_side(sum_row, rows)
+        else:
+            with one_thread():
+                for row in rows:
+                    sum_row(row)
         for pyramid in (self._M, self._b) if with_M else (self._b,):
             _add_up(pyramid, rows, columns)
 
@@ -117,7 +126,10 @@ class TiledEquations:
         if with_M:
             lit = pixels[:, :, :n]
             lit *= np.sqrt(D)[:, :, None]
-            np.matmul(lit, lit.swapaxes(-1, -2), out=self._M[0][row, here])
+            # Of one array and itself numpy forms half of the product, of two all of it, which is
+            # faster for few lights.
+            other = lit.copy() if n <= FEW_LIGHTS else lit
+            np.matmul(lit, other.swapaxes(-1, -2), out=self._M[0][row, here])
 
 
 def _cut(pictures: Floats, side: int, out: Doubles) -> None:
