@@ -6,7 +6,8 @@ subtracted, so that nothing drifts: undoing a stroke gives back the very same bi
 updated problem is bit for bit the one built from scratch.
 """
 
-from itertools import pairwise
+from functools import partial
+from itertools import pairwise, product
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ SIDE = 16
 ROOM = 2**29
 
 #: Bytes of pixels, in float64, that are summed at a time: they stay in the processor's cache.
-CHUNK = 2**20
+CHUNK = 2**21
 
 #: Lights up to which a tile takes the time of the calls and not of the arithmetic.
 FEW_LIGHTS = 32
@@ -93,57 +94,66 @@ class TiledEquations:
         if not (rows and columns):
             return
         few = max(CHUNK // (8 * 3 * (len(self._images) + 1) * self.side**2), 1)
-
-        def sum_row(row: int) -> None:
-            for first in range(columns.start, columns.stop, few):
-                self._sum(row, range(first, min(first + few, columns.stop)), with_M)
-
+        wide = min(few, len(columns))
+        blocks = product(_parts(rows, few // wide), _parts(columns, wide))
+        sum_block = partial(self._sum, with_M=with_M)
         if with_M and len(self._images) > FEW_LIGHTS:
-            side_by_side(sum_row, rows)
+            side_by_side(sum_block, blocks)
         else:
             with one_thread():
-                for row in rows:
-                    sum_row(row)
+                for block in blocks:
+                    sum_block(block)
         for pyramid in (self._M, self._b) if with_M else (self._b,):
             _add_up(pyramid, rows, columns)
 
-    def _sum(self, row: int, columns: range, with_M: bool) -> None:
-        """Σ D f g over each of k tiles in a row: of images and target, and of pairs of images."""
-        n, k, side = len(self._images), len(columns), self.side
-        here = slice(columns.start, columns.stop)
-        where = slice(row * side, row * side + side), slice(here.start * side, here.stop * side)
-        # (k, 1, pixels), and (k, 3, n + 1, pixels): the target goes along as one more image.
-        D = np.empty((k, 1, side * side))
-        pixels = np.empty((k, 3, n + 1, side * side))
-        _cut(self._importance[where][None, ..., None], side, out=D[:, :, None])
-        _cut(self._images[(slice(None), *where)], side, out=pixels[:, :, :n])
-        _cut(self._target[where][None], side, out=pixels[:, :, n:])
+    def _sum(self, block: tuple[range, range], *, with_M: bool) -> None:
+        """Σ D f g over each of a block of tiles: of images and target, and of pairs of images."""
+        n, side = len(self._images), self.side
+        tiles = len(block[0]), len(block[1])
+        rows, columns = (slice(part.start, part.stop) for part in block)
+        where = (
+            slice(rows.start * side, rows.stop * side),
+            slice(columns.start * side, columns.stop * side),
+        )
+        # The target goes along as one more image.
+        D = np.empty((*tiles, 1, side * side))
+        pixels = np.empty((*tiles, 3, n + 1, side * side))
+        _cut(self._importance[where][None, ..., None], side, out=D[:, :, :, None])
+        _cut(self._images[(slice(None), *where)], side, out=pixels[:, :, :, :n])
+        _cut(self._target[where][None], side, out=pixels[:, :, :, n:])
         if not D.all():
             # Pixels without weight may hold anything.
-            np.copyto(pixels, 0, where=(D == 0)[:, :, None])
-        painted = pixels[:, :, n] * D
-        self._b[0][row, here] = np.matmul(pixels, painted[..., None])[..., 0]
+            np.copyto(pixels, 0, where=(D == 0)[:, :, :, None])
+        painted = pixels[:, :, :, n] * D
+        self._b[0][rows, columns] = np.matmul(pixels, painted[..., None])[..., 0]
         if with_M:
-            lit = pixels[:, :, :n]
-            lit *= np.sqrt(D)[:, :, None]
+            lit = pixels[:, :, :, :n]
+            lit *= np.sqrt(D)[:, :, :, None]
             # Of one array and itself numpy forms half of the product, of two all of it, which is
             # faster for few lights.
             other = lit.copy() if n <= FEW_LIGHTS else lit
-            np.matmul(lit, other.swapaxes(-1, -2), out=self._M[0][row, here])
+            np.matmul(lit, other.swapaxes(-1, -2), out=self._M[0][rows, columns])
+
+
+def _parts(whole: range, size: int) -> list[range]:
+    """Ranges of `size`, the last one shorter, that make up the whole."""
+    starts = range(whole.start, whole.stop, size)
+    return [range(first, min(first + size, whole.stop)) for first in starts]
 
 
 def _cut(pictures: Floats, side: int, out: Doubles) -> None:
-    """Cut a row of tiles apart: (n, h, w, channels) into (tiles, channels, n, side²).
+    """Cut a block of tiles apart: (n, h, w, channels) into (rows, columns, channels, n, side²).
 
     Tiles that the border of the picture cuts off are 0 beyond it.
     """
     n, height, width, channels = pictures.shape
-    tiles = len(out)
-    if (height, width) != (side, tiles * side):
-        part, pictures = pictures, np.zeros((n, side, tiles * side, channels), pictures.dtype)
+    rows, columns = out.shape[:2]
+    if (height, width) != (rows * side, columns * side):
+        part = pictures
+        pictures = np.zeros((n, rows * side, columns * side, channels), part.dtype)
         pictures[:, :height, :width] = part
-    cut = pictures.reshape(n, side, tiles, side, channels).transpose(2, 4, 0, 1, 3)
-    out.reshape(tiles, channels, n, side, side)[...] = cut
+    apart = pictures.reshape(n, rows, side, columns, side, channels).transpose(1, 3, 5, 0, 2, 4)
+    out.reshape(rows, columns, channels, n, side, side)[...] = apart
 
 
 def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:
