@@ -28,8 +28,11 @@ Floats = npt.NDArray[np.floating[Any]]
 
 #: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
 #: is refused before any is decoded. Pictures compress to less only where they are empty.
-MAX_BYTES = 2**30
+MAX_BYTES = 2**29
 MAX_COMPRESSION = 64
+
+#: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … on each side.
+CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 0.002128)
 
 #: How other files begin that people take for paintings.
 MAGICS = {
@@ -182,16 +185,27 @@ def _part(path: Path, part: Any) -> Part:
 
 
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:
-    """A channel stored for every so-manieth pixel, linearly between those and constant beyond."""
+    """A channel stored for every so-manieth pixel, at all of them.
+
+    Of every other pixel, as chroma is stored, by the filter that OpenEXR reads it with; else
+    linearly. Beyond the last it is constant.
+    """
     result = pixels.astype(np.float32)
     for axis, (length, step) in enumerate(zip(size, sampling, strict=True)):
-        last = result.shape[axis] - 1
+        result = np.moveaxis(result, axis, 0)
+        last = len(result) - 1
         at = np.minimum(np.arange(length) / step, last)
         below = at.astype(int)
-        share = (at - below).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
-        above = np.minimum(below + 1, last)
-        low, high = result.take(below, axis), result.take(above, axis)
-        result = low * (1 - share) + high * share
+        share = (at - below).astype(np.float32)[:, None]
+        between = np.zeros_like(result[below])
+        for k, weight in enumerate(CHROMA_FILTER if step == 2 else (0.5,)):
+            left, right = np.maximum(below - k, 0), np.minimum(below + 1 + k, last)
+            between += np.float32(weight) * (result[left] + result[right])
+        if step == 2:
+            result = np.where(share > 0, between, result[below])
+        else:
+            result = result[below] * (1 - share) + result[np.minimum(below + 1, last)] * share
+        result = np.moveaxis(result, 0, axis)
     return result
 
 
