@@ -19,6 +19,7 @@ import OpenImageIO
 from lightpaint.errors import ImageError
 from lightpaint.images.icc import Profile, gamma_profile, read_icc, srgb_profile
 from lightpaint.images.primaries import REC709
+from lightpaint.images.tiff import check_tiff
 
 #: Above this many pixels nothing is decoded: 8192x4096, for which decoding takes some 1 GB.
 MAX_PIXELS = 2**25
@@ -69,10 +70,13 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
         raise ImageError("is too long to be a picture")
     shown: str | None = None
     profile: Profile | None = None
+    transparency = True
     if kind == "png":
         shown, profile = _png_says(path)
     elif kind == "psd":
-        _check_psd(path)
+        transparency = _check_psd(path)
+    elif kind == "tiff":
+        check_tiff(path)
     spec, pixels = _decoded(path, kind)
     if kind == "tiff":
         _check_tiff(spec)
@@ -83,6 +87,10 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
         profile = read_icc(np.asarray(icc, np.uint8).tobytes())
     pixels = _upright(pixels, int(spec.get_int_attribute("Orientation", 1)))
     alpha = _alpha(spec, pixels)
+    if alpha is not None and not transparency:
+        raise ImageError(
+            "has a channel beside its colours that is no transparency: delete it, or export a PNG"
+        )
     integer = np.issubdtype(pixels.dtype, np.integer)
     return Bitmap(
         kind,
@@ -155,8 +163,11 @@ def _check_tiff(spec: Any) -> None:
         raise ImageError(f"is damaged: {spec.nchannels} channels of {TIFF_COLOURS[colours]}")
 
 
-def _check_psd(path: Path) -> None:
-    """Refuse Photoshop files of other colours, and those without the merged picture."""
+def _check_psd(path: Path) -> bool:
+    """Refuse Photoshop files of other colours, and those without the merged picture.
+
+    Returns whether a channel beside the colours is transparency, and not a saved selection.
+    """
     with path.open("rb") as file:
         head = file.read(26)
         if len(head) < 26:
@@ -172,7 +183,9 @@ def _check_psd(path: Path) -> None:
         length = int.from_bytes(file.read(4), "big")
         resources = file.read(min(length, 2**26))
         file.seek(length - len(resources), 1)
-        file.seek(int.from_bytes(file.read(4), "big"), 1)
+        length = int.from_bytes(file.read(4), "big")
+        layers = file.read(min(length, 6))
+        file.seek(length - len(layers), 1)
         _check_packed_rows(file, head)
     for ident, data in _resources(resources):
         # VersionInfo: a version, then whether the merged picture is there.
@@ -180,6 +193,8 @@ def _check_psd(path: Path) -> None:
             raise ImageError(
                 "has no merged picture: save it with maximised compatibility, or export a PNG"
             )
+    # The number of layers is negative then.
+    return len(layers) == 6 and layers[4] >= 0x80
 
 
 def _check_packed_rows(file: BinaryIO, head: bytes) -> None:
