@@ -19,6 +19,7 @@ import OpenImageIO
 from lightpaint.errors import ImageError
 from lightpaint.images.icc import Profile, gamma_profile, read_icc, srgb_profile
 from lightpaint.images.primaries import REC709
+from lightpaint.images.silence import silenced
 from lightpaint.images.tiff import check_tiff
 
 #: Above this many pixels nothing is decoded: 8192x4096, for which decoding takes some 1 GB.
@@ -77,7 +78,8 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
         transparency = _check_psd(path)
     elif kind == "tiff":
         check_tiff(path)
-    spec, pixels = _decoded(path, kind)
+    with silenced():
+        spec, pixels = _decoded(path, kind)
     if kind == "tiff":
         _check_tiff(spec)
     if kind == "jpeg" and spec.getattribute("jpeg:ColorSpace") == "CMYK":

@@ -5,14 +5,7 @@ reference library lets pass silently (a cut-off file, missing parts, deep pixels
 ImageError here.
 """
 
-import errno
-import fcntl
-import io
-import os
-import sys
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +16,7 @@ import OpenEXR
 
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing
+from lightpaint.images.silence import silenced
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -102,7 +96,7 @@ class Part:
 
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
     """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
-    with _silenced():
+    with silenced():
         try:
             headers = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
             size, _ = _windows(headers[0])
@@ -137,7 +131,7 @@ def read_parts(path: Path) -> list[Part]:
     """
     path = Path(path)
     _check_is_exr(path)
-    with _silenced():
+    with silenced():
         try:
             header = OpenEXR.File(str(path), header_only=True)
         except Exception as error:
@@ -286,51 +280,3 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
 def _first_line(error: BaseException) -> str:
     text = str(error).strip()
     return text.splitlines()[0] if text else type(error).__name__
-
-
-#: The descriptors belong to the whole process: two threads would put back each other's.
-_silencing = threading.Lock()
-
-
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Keep what the C++ library prints about damaged files off the user's terminal.
-
-    It writes to the process's own descriptors and, by way of Python, to `sys.stdout`, which
-    is another place in a notebook. The same news comes as an ImageError. A descriptor that
-    the process was started without stays closed.
-    """
-    with _silencing:
-        _flush_standard_streams()
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        saved = [(fd, _copy_if_open(fd)) for fd in (1, 2) if fd != nowhere]
-        try:
-            for fd, _ in saved:
-                os.dup2(nowhere, fd)
-            with redirect_stdout(io.StringIO()):
-                yield
-        finally:
-            _flush_standard_streams()
-            for fd, copy in saved:
-                if copy is None:
-                    os.close(fd)
-                else:
-                    os.dup2(copy, fd)
-                    os.close(copy)
-            os.close(nowhere)
-
-
-def _flush_standard_streams() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # which is how Python shows that it is closed
-            stream.flush()
-
-
-def _copy_if_open(fd: int) -> int | None:
-    try:
-        # Above the standard ones, of which another may be closed and would be taken for it.
-        return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 3)
-    except OSError as error:
-        if error.errno != errno.EBADF:
-            raise
-        return None
