@@ -3,8 +3,10 @@
 import tempfile
 import zipfile
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +14,8 @@ import numpy.typing as npt
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.display import encode_display
-from lightpaint.images.exr import Floats, read_parts
+from lightpaint.images.exr import Floats, Part, read_parts
+from lightpaint.images.icc import Profile
 from lightpaint.images.layers import Layer, choose_layer
 from lightpaint.images.primaries import converted
 from lightpaint.images.view import View
@@ -211,7 +214,8 @@ def _bitmap(path: Path, kind: str) -> Bitmap:
     except KeyError:
         raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
-        raise ImageError(f"is damaged: {error}") from error
+        # The archive's own names stand in the message, and may be anything.
+        raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
 
 
 def _copy(source: object, target: object, length: int) -> None:
@@ -236,20 +240,26 @@ def _of_layer(layer: Layer) -> Picture:
                 "there is colour where alpha is 0: if it is not premultiplied, as OpenEXR "
                 "prescribes, edges of strokes are read too bright",
             )
-        image = _unpremultiplied(image, alpha)
+        _unpremultiply(image, alpha)
     is_half = any(c.dtype == np.float16 for c in stored_part.channels.values())
-    ones = replace(stored_part, channels={"Y": np.ones(stored_part.size, np.bool_)})
-    finite = np.asarray(np.isfinite(image).all(axis=-1))
     return Picture(
         kind="exr",
-        image=np.where(finite[..., None], image, np.float32(0)),
-        finite=finite,
+        image=image,
+        finite=_only_finite(image),
         alpha=alpha,
         weight=weight,
-        stored=ones.in_display_window().channels["Y"],
+        stored=_stored(stored_part),
         mantissa=11 if is_half else 24,
         notes=notes,
     )
+
+
+def _stored(part: Part) -> Mask | None:
+    """Where in its display window a part has pixels; None if everywhere."""
+    if part.display in (None, part.size) and part.offset == (0, 0):
+        return None
+    ones = replace(part, channels={"Y": np.ones(part.size, np.bool_)})
+    return ones.in_display_window().channels["Y"]
 
 
 def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
@@ -267,14 +277,11 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
         image = _decoded(bitmap, alpha, used)
         top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
         saturated = bitmap.values >= top
-    finite = np.asarray(np.isfinite(image).all(axis=-1))
-    if not finite.all():
-        image = np.where(finite[..., None], image, np.float32(0))
     floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
     return Picture(
         kind=bitmap.kind,
         image=image,
-        finite=finite,
+        finite=_only_finite(image),
         alpha=alpha,
         saturated=saturated,
         view=used,
@@ -312,7 +319,7 @@ def _view_of(bitmap: Bitmap) -> View:
 
 
 def _light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
-    image = bitmap.values.astype(np.float32)
+    image = np.array(bitmap.values, np.float32)
     if bitmap.profile is not None:
         if not bitmap.profile.is_linear:
             raise ImageError(
@@ -321,7 +328,7 @@ def _light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
             )
         image = converted(image, bitmap.profile.matrix)
     if alpha is not None and bitmap.premultiplied:
-        image = _unpremultiplied(image, alpha)
+        _unpremultiply(image, alpha)
     return image
 
 
@@ -333,18 +340,43 @@ def _decoded(bitmap: Bitmap, alpha: Floats | None, view: View) -> Floats:
         profile = None
     image = np.empty(bitmap.values.shape, np.float32)
     rows = max(1, STRIP // bitmap.values.shape[1])
+    decode = _decoder(bitmap.codes, profile, view, by_table=not bitmap.premultiplied)
     for top in range(0, len(image), rows):
         strip = slice(top, top + rows)
-        display = bitmap.values[strip] / np.float32(bitmap.codes)
+        values = bitmap.values[strip]
         if bitmap.premultiplied and alpha is not None:
-            display = np.clip(_unpremultiplied(display, alpha[strip]), 0, 1)
-        if profile is None:
-            image[strip] = view.decode(display)
-            continue
-        curved = [curve(display[..., k]) for k, curve in enumerate(profile.curves)]
-        shown = converted(np.stack(curved, axis=-1), profile.matrix)
-        image[strip] = _through(view, shown, is_linear=profile.is_linear, name=profile.name)
+            display = values / np.float32(bitmap.codes)
+            _unpremultiply(display, alpha[strip])
+            values = np.clip(display, 0, 1)
+        image[strip] = decode(values)
     return image
+
+
+def _decoder(
+    codes: int, profile: Profile | None, view: View, *, by_table: bool
+) -> Callable[[npt.NDArray[Any]], Floats]:
+    """From numbers (h, w, 3) to light: from integers by table, else from values in [0, 1]."""
+
+    def curve(of: Callable[[Floats], Floats]) -> Callable[[npt.NDArray[Any]], Floats]:
+        if not by_table:
+            return of
+        # The same numbers come again and again.
+        table = np.asarray(of(np.arange(codes + 1) / codes), np.float32)
+        return lambda values: table[values]
+
+    if profile is None and view.is_per_channel:
+        return curve(view.decode)
+    if profile is None:
+        display = curve(lambda values: values)
+        return lambda values: view.decode(display(values))
+    curves = [curve(own) for own in profile.curves]
+
+    def through_profile(values: npt.NDArray[Any]) -> Floats:
+        light = np.stack([own(values[..., k]) for k, own in enumerate(curves)], axis=-1)
+        shown = converted(light, profile.matrix)
+        return _through(view, shown, is_linear=profile.is_linear, name=profile.name)
+
+    return through_profile
 
 
 def _through(view: View, shown: Floats, *, is_linear: bool, name: str) -> Floats:
@@ -365,17 +397,25 @@ def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
     return np.asarray(mask, np.float32)
 
 
-def _unpremultiplied(image: Floats, alpha: Floats) -> Floats:
-    safe = np.where(alpha > 0, alpha, 1)
+def _unpremultiply(image: Floats, alpha: Floats) -> None:
+    """Divide by alpha, in place, where there is some."""
     # Over next to no alpha a colour may become infinite, and is then counted as such.
     with np.errstate(over="ignore", invalid="ignore"):
-        return image / safe[..., None]
+        image /= np.where(alpha > 0, alpha, np.float32(1))[..., None]
+
+
+def _only_finite(image: Floats) -> Mask:
+    """Where all channels are finite; elsewhere the image is made 0, in place."""
+    finite = np.asarray(np.isfinite(image).all(axis=-1))
+    if not finite.all():
+        image[~finite] = 0
+    return finite
 
 
 def _looks_straight(image: Floats, alpha: Floats) -> bool:
     """Whether most of what is transparent has a colour, which premultiplied light rarely has."""
     clear = alpha == 0
-    return bool(clear.any() and (image[clear] != 0).any(axis=-1).mean() > 0.5)
+    return bool((image.any(axis=-1) & clear).sum() > clear.sum() / 2)
 
 
 def _naming(path: Path, error: ImageError) -> str:

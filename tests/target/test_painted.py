@@ -19,7 +19,7 @@ SIZE = (60, 80)
 
 
 def template_of(view: View = View("srgb")) -> Template:  # noqa: B008 (frozen)
-    """Noise over a gradient, like a render of few samples, a red wall and a grey one, a little of it beyond white."""
+    """A red wall and a grey one, like a render of few samples, a little of it beyond white."""
     rng = np.random.default_rng(0)
     ramp = np.linspace(0.02, 0.9, SIZE[1])[None, :, None] * np.array([1, 0.8, 0.6])
     albedo = np.broadcast_to(np.float32([0.6, 0.06, 0.05]), (*SIZE, 3)).copy()
