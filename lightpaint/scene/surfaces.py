@@ -26,9 +26,9 @@ class Surfaces:
 
     albedo: (h, w, 3) float32 in [0, 1], share of light that is reflected diffusely, as the
     materials say it. normal: (h, w, 3), shading normal in world space, of unit length; 0 where
-    there is nothing. depth: (h, w), distance from the camera along its axis in scene units, of the
-    nearest sample; NOTHING where there is none. coverage: by name of shape, (h, w) in [0, 1], how much
-    of the pixel it fills. Shapes out of sight are left out.
+    there is nothing. depth: (h, w), distance from the camera along its axis in scene units, of
+    the nearest sample; NOTHING where there is none. coverage: by name of shape, (h, w) in
+    [0, 1], how much of the pixel it fills. Shapes out of sight are left out.
     """
 
     albedo: Floats
