@@ -3,6 +3,10 @@
 A file that comes back from a paint program was rounded to its format, and maybe compressed; all
 that differs by more is paint. Faint paint counts for less, so that a soft brush leaves a soft
 importance.
+
+What rounding may do is the same for all formats, that of 8 bits. A file does not tell what its
+pixels went through: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers;
+profiles are taken off and put on again. And so a painting counts the same in every format.
 """
 
 import io
@@ -19,20 +23,19 @@ from lightpaint.images.exr import Floats
 from lightpaint.images.picture import Picture
 from lightpaint.target.template import Template
 
-#: Difference at which paint counts fully: of the display's range; and, about the same for the eye,
-#: of the brighter of two linear values.
-FULL, FULL_OF_LIGHT = 0.04, 0.09
+#: Difference at which paint counts fully, of the display's range.
+FULL = 0.04
 
-#: Codes by which programs differ in rounding: half a code each, and dithering.
-ROUNDING = 1.6
+#: Half a code each by which two programs round 8 bits, and dithering.
+ROUNDING = 1.6 / 255
+
+#: Display values by which a change of light, relative to it, counts where displays show white:
+#: about the slope of display curves there.
+BEYOND_WHITE = 0.44
 
 #: Pixels on either side over which what compressors do differently to single ones averages out,
 #: and what is left of it then.
 LOSSY_RADIUS, LOSSY = 4, 2.5 / 255
-
-#: Light below this share of display white is compared as if it were that: deep shadows are noise.
-DARK = 0.002
-
 
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
     """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
@@ -46,42 +49,34 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
             f"{template.size[1]}x{template.size[0]}: export it at that size, or say by alpha or "
             "--mask what was painted"
         )
-    if picture.codes is None:
-        (difference, tolerance), full = _difference_of_light(picture, template), FULL_OF_LIGHT
-    else:
-        (difference, tolerance), full = _difference_of_codes(path, picture, template), FULL
+    difference, tolerance = _difference(path, picture, template)
     # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.
-    share = np.clip((difference - tolerance) / (full - tolerance), 0, 1)
+    share = np.clip((difference - tolerance) / (FULL - tolerance), 0, 1)
     return _without_pinholes((share * share * (3 - 2 * share)).astype(np.float32))
 
 
-def _difference_of_light(picture: Picture, template: Template) -> tuple[Floats, float]:
-    """Relative difference of linear light, largest of the channels, and what rounding makes."""
-    tolerance = 4 * 2.0 ** -(picture.mantissa or 24)
-    # It may have been painted on the EXR, or on the PNG and saved as light.
-    decoded = template.view.decode(template.shown)
-    looks = [(template.image, tolerance), (decoded, tolerance + 1e-4)]
-    found = []
-    for look, allowed in looks:
-        dark = DARK * template.view.white
-        size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), dark)
-        relative = np.max(np.abs(picture.image - look) / size, axis=-1)
-        found.append((relative, allowed))
-    return min(found, key=lambda pair: float(np.median(np.minimum(pair[0], FULL_OF_LIGHT))))
-
-
-def _difference_of_codes(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
-    """Difference of display values, largest of the channels, and what rounding makes."""
-    assert picture.codes is not None
+def _difference(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
+    """(h, w), in display values, largest of the channels; and what the file alone makes."""
+    if picture.codes is None:
+        # It may have been painted on the EXR, or on the PNG, without what is brighter than white.
+        looks = template.image, template.view.decode(template.shown)
+        found = [_difference_of_light(picture, look, template) for look in looks]
+        return max(found, key=lambda one: float((one <= ROUNDING).mean())), ROUNDING
     view = picture.view or template.view
     mine, its = view.encode(picture.image), view.encode(template.image)
     if picture.lossy:
         smooth = box_mean(np.asarray(mine - _compressed_like(path, its), np.float64), LOSSY_RADIUS)
         return np.abs(smooth).max(axis=-1), LOSSY
-    difference = np.asarray(mine - its, np.float64)
-    codes = 255 if _is_8_bit(mine) else picture.codes
-    # Some programs reckon in 15 bits when they say 16.
-    return np.abs(difference).max(axis=-1), ROUNDING / min(codes, 2**15)
+    return np.abs(mine - its).max(axis=-1).astype(np.float64), ROUNDING
+
+
+def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:
+    """As a display shows it; and relative, of what is brighter than that."""
+    view = template.view
+    shown = np.abs(view.encode(picture.image) - view.encode(look))
+    size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), view.white)
+    relative = BEYOND_WHITE * np.abs(picture.image - look) / size
+    return np.asarray(np.maximum(shown, relative).max(axis=-1), np.float64)
 
 
 def _compressed_like(path: Path, display: Floats) -> Floats:
@@ -98,12 +93,6 @@ def _compressed_like(path: Path, display: Floats) -> Floats:
     except (OSError, ValueError):
         return display  # tables that this encoder does not take
     return np.asarray(Image.open(buffer), np.float32) / 255
-
-
-def _is_8_bit(display: Floats) -> bool:
-    """Whether all values are those of 8 bits, whatever the file has."""
-    values = display * 255
-    return bool(np.abs(values - np.round(values)).max() < 0.02)
 
 
 def _without_pinholes(share: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
