@@ -34,8 +34,28 @@ ROUNDING = 1.6 / 255
 BEYOND_WHITE = 0.44
 
 #: Pixels on either side over which what compressors do differently to single ones averages out,
+#: and what is left of it then; and over how few paint still shows where it is.
+LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
+
+#: Display values by which a change of light, relative to it, counts where displays show white:
+#: about the slope of display curves there.
+BEYOND_WHITE = 0.44
+
+#: Pixels on either side over which what compressors do differently to single ones averages out,
+#: and what is left of it then. Most programs have the same compressor, and differ only in blocks
+#: that paint touches.
+LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
+
+#: Share of a picture that is not painted, at least, and so shows whether the compressor is the same.
+UNTOUCHED = 0.3
+
+#: Display values by which a change of light, relative to it, counts where displays show white:
+#: about the slope of display curves there.
+BEYOND_WHITE = 0.44
+
+#: Pixels on either side over which what compressors do differently to single ones averages out,
 #: and what is left of it then.
-LOSSY_RADIUS, LOSSY = 4, 2.5 / 255
+LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
     """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
@@ -65,8 +85,11 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
     view = picture.view or template.view
     mine, its = view.encode(picture.image), view.encode(template.image)
     if picture.lossy:
-        smooth = box_mean(np.asarray(mine - _compressed_like(path, its), np.float64), LOSSY_RADIUS)
-        return np.abs(smooth).max(axis=-1), LOSSY
+        rough = np.asarray(mine - _compressed_like(path, its), np.float64)
+        near, wide = (
+            np.abs(box_mean(rough, radius)).max(axis=-1) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
+        )
+        return np.minimum(near, wide), LOSSY
     return np.abs(mine - its).max(axis=-1).astype(np.float64), ROUNDING
 
 
