@@ -26,7 +26,8 @@ from lightpaint.target.template import Template
 #: Difference at which paint counts fully, of the display's range.
 FULL = 0.04
 
-#: Half a code each by which two programs round 8 bits, and dithering.
+#: Display values by which 8 bits of two programs differ: half a code each, some cut off instead of
+#: rounding, some dither.
 ROUNDING = 1.6 / 255
 
 #: Display values by which a change of light, relative to it, counts where displays show white:
@@ -37,25 +38,6 @@ BEYOND_WHITE = 0.44
 #: and what is left of it then; and over how few paint still shows where it is.
 LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 
-#: Display values by which a change of light, relative to it, counts where displays show white:
-#: about the slope of display curves there.
-BEYOND_WHITE = 0.44
-
-#: Pixels on either side over which what compressors do differently to single ones averages out,
-#: and what is left of it then. Most programs have the same compressor, and differ only in blocks
-#: that paint touches.
-LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
-
-#: Share of a picture that is not painted, at least, and so shows whether the compressor is the same.
-UNTOUCHED = 0.3
-
-#: Display values by which a change of light, relative to it, counts where displays show white:
-#: about the slope of display curves there.
-BEYOND_WHITE = 0.44
-
-#: Pixels on either side over which what compressors do differently to single ones averages out,
-#: and what is left of it then.
-LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
     """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
