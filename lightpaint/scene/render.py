@@ -29,6 +29,7 @@ class Stream(IntEnum):
     NUMBERS = 3
     SECOND_VERIFICATION = 4
     REFINEMENT = 5
+    CANDIDATES = 6
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:
