@@ -27,22 +27,26 @@ from lightpaint.scene.parsed import Position
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.resolution import reductions
 from lightpaint.scene.scene import Scene
-from lightpaint.solve.additional import Addition, Candidates, find_additions
+from lightpaint.solve.additional import SURE, Addition, Candidates, find_additions
 from lightpaint.solve.solve import Solution
 from lightpaint.target.target import Target
 
 #: Suggestions that are made where no number is given.
 SUGGESTED = 3
 
-#: Positions that are tried in a pass, and the least on a film that cannot be made small.
-TRIED, FEWEST = 48, 8
+#: Positions that are tried: all over, near the best of these, nearer, and the best once more,
+#: with all samples for them. Fewest on a film that cannot be made small.
+TRIED, FEWEST = (64, 48, 24, 0), 8
 
 #: Pixels of the film that candidates are rendered on, where it can be reduced; values of all
 #: their images; camera samples, and samples of a pixel.
-PIXELS, VALUES, SAMPLES, MOST_SPP = 2**14, 2**24, 2**20, 128
+PIXELS, VALUES, SAMPLES, MOST_SPP = 2**14, 2**24, 2**19, 128
 
 #: What is missed of a painting, RMS, below which its lights can do it.
 NOTHING_MISSED = 0.01
+
+#: Gains below this share of the miss are not worth a light.
+SMALLEST_SHARE = 0.01
 
 #: Distance that two suggestions have at least, over the spread of what is seen.
 APART = 0.25
@@ -116,21 +120,25 @@ def suggest_lights(
     space = _look_around(small, seed)
     if not len(space.places):
         return ()
-    places, rendered = np.zeros((0, 3)), []
+    best, radius = np.zeros((0, 3)), np.inf
     additions: list[Addition] = []
-    for k in range(2):
-        near = _places_near(space, places, additions, _most(small))
-        if not len(near):
-            break
-        places = np.concatenate([places, near])
-        rendered.append(_render(small, near, pass_seed(seed, Stream.CANDIDATES, 1 + k), progress))
-        candidates = Candidates.of(basis, solution, rendered)
+    for k, tried in enumerate(TRIED):
+        places = _places(space, best, radius, _most(small, tried))
+        lit = _render(small, places, pass_seed(seed, Stream.CANDIDATES, 1 + k), progress)
+        is_last = k + 1 == len(TRIED)
         additions = find_additions(
-            candidates, total, count=count, too_near=_too_near(places, space)
+            Candidates.of(basis, solution, lit),
+            count=count,
+            least=SMALLEST_SHARE * total if is_last else 0.0,
+            # Few samples show little; the last pass has enough.
+            sure=SURE if is_last else SURE / 3,
+            too_near=_too_near(places, space),
         )
         if not additions:
             break
-    return _suggestions(scene, additions, places, total)
+        best = places[[addition.candidate for addition in additions]]
+        radius = _spacing(places) if k == 0 else radius / 2
+    return _suggestions(scene, additions, best, total) if additions else ()
 
 
 def _on_small_film(scene: Scene, basis: Basis) -> Scene:
@@ -150,10 +158,10 @@ def _on_small_film(scene: Scene, basis: Basis) -> Scene:
     return scene.reduced(f"1/{next(enough, fitting[-1])}")
 
 
-def _most(small: Scene) -> int:
-    """How many positions can be tried at once."""
+def _most(small: Scene, tried: int) -> int:
+    """How many of `tried` positions fit at once."""
     height, width = small.size
-    return int(np.clip(VALUES // (height * width * 3), FEWEST, TRIED))
+    return min(tried, max(VALUES // (height * width * 3), FEWEST))
 
 
 def _look_around(scene: Scene, seed: int) -> FreeSpace:
@@ -165,21 +173,22 @@ def _look_around(scene: Scene, seed: int) -> FreeSpace:
         gc.collect()
 
 
-def _places_near(
-    space: FreeSpace, tried: Floats, additions: Sequence[Addition], count: int
-) -> Floats:
-    """Positions to try next: all over at first, then around the best of those that were tried."""
-    if not len(tried):
+def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats:
+    """The best so far, and `count` positions more within `radius` of these, far apart."""
+    if not len(best):
         return far_apart(space.places, count)
-    chosen = tried[[addition.candidate for addition in additions]]
-    between = np.linalg.norm(tried[:, None] - tried[None], axis=2)
-    np.fill_diagonal(between, np.inf)
-    radius = float(np.median(between.min(axis=1)))
-    near = []
-    for place in chosen:
+    near = [best]
+    for place in best:
         its = space.places[np.linalg.norm(space.places - place, axis=1) < radius]
-        near.append(far_apart(its, count // len(chosen), start=tried))
-    return np.unique(np.concatenate(near), axis=0)
+        near.append(far_apart(its, count // len(best), start=np.concatenate(near)))
+    return np.concatenate(near)
+
+
+def _spacing(places: Floats) -> float:
+    """Median distance from one to the next."""
+    between = np.linalg.norm(places[:, None] - places[None], axis=2)
+    np.fill_diagonal(between, np.inf)
+    return float(np.median(between.min(axis=1)))
 
 
 def _too_near(places: Floats, space: FreeSpace) -> npt.NDArray[np.bool_]:
@@ -204,12 +213,9 @@ def _suggestions(
     places: Floats,
     total: float,
 ) -> tuple[Suggestion, ...]:
-    if not additions:
-        return ()
-    chosen = places[[addition.candidate for addition in additions]]
     loaded = scene.load()
     try:
-        seen = pixels_of(scene, loaded, chosen)
+        seen = pixels_of(scene, loaded, places)
     finally:
         del loaded
         gc.collect()
@@ -219,7 +225,7 @@ def _suggestions(
     for k, addition in enumerate(additions):
         missed -= addition.gain
         r, g, b = (float(f"{v:.4g}") for v in addition.weights[-1])
-        x, y, z = (float(f"{v:.6g}") for v in chosen[k])
+        x, y, z = (float(f"{v:.6g}") for v in places[k])
         made.append(
             Suggestion(
                 name=names[k],

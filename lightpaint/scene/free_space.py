@@ -17,7 +17,7 @@ from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
 
 #: Points of the picture from which places are looked for, and rays from each.
-POINTS, RAYS = 600, 12
+POINTS, RAYS = 600, 24
 
 #: How far a ray goes that hits nothing, and beyond which points are too far off to count,
 #: over how far visible points spread.

@@ -6,7 +6,7 @@ their noise alone. So the weights are found on one half of the samples and what 
 measured on the other, and the other way around: noise that was fitted does not come again.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,9 +23,13 @@ from lightpaint.solve.optimum import minimise
 from lightpaint.solve.reduced_problem import ReducedProblem, problems
 from lightpaint.solve.reduction import Reduction, Unknown, reduce_to
 from lightpaint.solve.solve import Solution, chosen_reduction
+from lightpaint.solve.uncertainty import pseudo_inverse
 
-#: Gains below this share of the miss are not worth a light.
-SMALLEST_SHARE = 0.01
+#: Candidates that the problem is solved for again, of those that seem to help most.
+SOLVED = 8
+
+#: Share of a column that others cannot make up for, below which it is taken for none.
+ALONE = 1e-6
 
 #: Standard errors by which a gain must be above 0. Under no gain at all the measured one is
 #: negative on average, since what was fitted to one half does not fit the other.
@@ -68,32 +72,32 @@ class Candidates:
     count: int
 
     @classmethod
-    def of(cls, basis: Basis, solution: Solution, added: Sequence[Basis]) -> "Candidates":
+    def of(cls, basis: Basis, solution: Solution, added: Basis) -> "Candidates":
         """added: images of candidates, at the size of `basis` or a whole part of it.
 
-        Lights in them that are fixed are not candidates. Raises SizeError for other sizes.
+        Lights in it that are fixed are no candidates. Raises SizeError for other sizes.
         """
-        size = added[0].size
+        size = added.size
         factor = whole_factor(basis.size, size)
-        if factor is None or any(other.size != size for other in added):
+        if factor is None:
             raise SizeError(
                 f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
                 f"{basis.size[0]}: render them at a whole part of its size"
             )
         image, importance = _reduced(solution.image, solution.importance, factor)
-        images = [np.stack([block_mean(one, factor) for one in basis.images])]
-        noise = [np.stack([block_mean(one, factor) for one in basis.half_differences])]
-        halves = [_shares(basis, len(basis.lights))]
-        for other in added:
-            free = ~other.is_fixed
-            images.append(other.images[free])
-            noise.append(other.half_differences[free])
-            halves.append(_shares(other, int(free.sum())))
-        count = sum(map(len, images[1:]))
+        free = ~added.is_fixed
+        count = int(free.sum())
+        images, noise = (
+            np.concatenate([[block_mean(one, factor) for one in its], more[free]])
+            for its, more in (
+                (basis.images, added.images),
+                (basis.half_differences, added.half_differences),
+            )
+        )
         return cls(
-            np.concatenate(images),
-            np.concatenate(noise),
-            np.concatenate(halves),
+            images,
+            noise,
+            np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
             image,
             importance,
             _with_free_lights(_reduction(basis, solution), count),
@@ -127,17 +131,16 @@ class Candidates:
 
 def find_additions(
     candidates: Candidates,
-    total: float,
     *,
     count: int,
+    least: float = 0.0,
+    sure: float = SURE,
     too_near: npt.NDArray[np.bool_] | None = None,
-    smallest_share: float = SMALLEST_SHARE,
 ) -> list[Addition]:
     """At most `count` lights to add, each the one that helps most beside those before it.
 
-    total: what is missed without them, Σ D r². too_near: (m, m), pairs of candidates of which
-    one at most is wanted. What helps by less than `smallest_share` of `total`, or not surely
-    (SURE standard errors), is left out.
+    least: the gain a light has to be worth; sure: its standard errors. Once there is none,
+    there are no more. too_near: (m, m), pairs of candidates of which one at most is wanted.
     """
     folds = [_Fold(candidates, k) for k in range(2)]
     whole = _Solver(candidates, candidates.equations(candidates.images))
@@ -146,18 +149,19 @@ def find_additions(
     left = np.ones(candidates.count, dtype=bool)
     before, picture = _missed(folds, chosen), candidates.picture(whole.weights(chosen))
     while len(chosen) < count and left.any():
-        trials = {int(k): _missed(folds, [*chosen, int(k)]) for k in np.flatnonzero(left)}
-        best = min(trials, key=lambda k: trials[k])
-        gain = before - trials[best]
-        is_sure = _standard_errors(folds, chosen, best) >= SURE
-        if gain <= max(smallest_share * total, 0) or not is_sure:
+        estimates = np.where(left, whole.estimated_gains(chosen), -1)
+        tried = [int(k) for k in np.argsort(-estimates)[:SOLVED] if left[k]]
+        gains = {k: before - _missed(folds, [*chosen, k]) for k in tried}
+        worth = sorted((k for k in tried if gains[k] > max(least, 0)), key=lambda k: -gains[k])
+        best = next((k for k in worth if _standard_errors(folds, chosen, k) >= sure), None)
+        if best is None:
             break
         chosen.append(best)
-        before = trials[best]
+        before -= gains[best]
         weights = whole.weights(chosen)
         kept = [*range(candidates.lights), *(candidates.lights + k for k in chosen)]
         without, picture = picture, candidates.picture(weights)
-        found.append(Addition(best, gain, weights[kept], without, picture))
+        found.append(Addition(best, gains[best], weights[kept], without, picture))
         left[best] = False
         if too_near is not None:
             left &= ~too_near[best]
@@ -176,14 +180,36 @@ class _Solver:
 
     def weights(self, chosen: Iterable[int]) -> Doubles:
         """(n + m, 3), the best with the candidates `chosen`; the others are 0."""
-        off = set(range(len(self.reduction.knobs))[self.first :])
+        x = np.zeros(len(self.reduction.unknowns))
+        for problem, here, values in self._solved(chosen):
+            x[[problem.its[k] for k in here]] = values
+        return weights_of(self.reduction, x)
+
+    def estimated_gains(self, chosen: Iterable[int]) -> Doubles:
+        """(m,), what each candidate would gain if the same lights stayed at their limits."""
+        gains = np.zeros(len(self.reduction.unknowns))
+        for problem, here, x in self._solved(chosen):
+            inside = (x > problem.lower[here]) & (x < problem.upper[here])
+            free = np.asarray(here, dtype=int)[inside]
+            gradient = problem.b - problem.M[:, here] @ x
+            # What is left of a column once the free unknowns have made up for it as they can.
+            cross = problem.M[free]
+            inverse = pseudo_inverse(problem.M[np.ix_(free, free)])
+            power = np.diag(problem.M)
+            alone = power - np.einsum("ik,ij,jk->k", cross, inverse, cross, optimize=True)
+            safe = np.where(alone > ALONE * power, alone, np.inf)
+            gains[problem.its] = np.square(np.maximum(gradient, 0)) / safe
+        knobs = self.reduction.knobs[self.first :]
+        return np.array([gains[list(its)].sum() for _, its in knobs])
+
+    def _solved(self, chosen: Iterable[int]) -> Iterator[tuple[ReducedProblem, list[int], Doubles]]:
+        """Each problem, which of its unknowns are not off, and their best values."""
+        off = set(range(self.first, len(self.reduction.knobs)))
         off -= {self.first + k for k in chosen}
         unknowns = {i for knob in off for i in self.reduction.knobs[knob][1]}
-        x = np.zeros(len(self.reduction.unknowns))
         for problem in self.problems:
             here = [k for k, i in enumerate(problem.its) if i not in unknowns]
-            x[[problem.its[k] for k in here]] = _solved(problem, here)
-        return weights_of(self.reduction, x)
+            yield problem, here, _best(problem, here)
 
 
 class _Fold:
@@ -224,14 +250,17 @@ def _missed(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:
 
 
 def _standard_errors(folds: Sequence[_Fold], chosen: Sequence[int], new: int) -> float:
-    """A gain over its standard error under no gain, where each pixel's has mean 0."""
-    maps = [fold.missed_map(chosen) - fold.missed_map([*chosen, new]) for fold in folds]
-    gained = np.mean(maps, axis=0)
-    error = float(np.sqrt(np.square(gained).sum()))
-    return float(gained.sum()) / error if error > 0 else 0.0
+    """A gain over its standard error.
+
+    That of the mean of two maps of the gain, pixel by pixel, is told by their difference:
+    what one half of the samples shows and the other does not is noise.
+    """
+    a, b = (fold.missed_map(chosen) - fold.missed_map([*chosen, new]) for fold in folds)
+    error = float(np.sqrt(np.square(a - b).sum()))
+    return float((a + b).sum()) / error if error > 0 else np.inf
 
 
-def _solved(problem: ReducedProblem, here: Sequence[int]) -> Doubles:
+def _best(problem: ReducedProblem, here: Sequence[int]) -> Doubles:
     """The best of the unknowns at `here`, the others 0."""
     place = {k: j for j, k in enumerate(here)}
     caps = [
