@@ -27,9 +27,9 @@ from lightpaint.scene.parsed import Position
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.resolution import reductions
 from lightpaint.scene.scene import Scene
-from lightpaint.solve.additional import SURE, Addition, Candidates, find_additions
+from lightpaint.solve.additional import SURE, Addition, find_additions
+from lightpaint.solve.candidates import Candidates
 from lightpaint.solve.solve import Solution
-from lightpaint.target.target import Target
 
 #: Suggestions that are made where no number is given.
 SUGGESTED = 3
@@ -38,9 +38,12 @@ SUGGESTED = 3
 #: with all samples for them. Fewest on a film that cannot be made small.
 TRIED, FEWEST = (64, 48, 24, 0), 8
 
+#: How many more than are asked for are looked at closer: the best of few is not near the best.
+BESIDE = 3
+
 #: Pixels of the film that candidates are rendered on, where it can be reduced; values of all
-#: their images; camera samples, and samples of a pixel.
-PIXELS, VALUES, SAMPLES, MOST_SPP = 2**14, 2**24, 2**19, 128
+#: their images; camera samples of a pass.
+PIXELS, VALUES, SAMPLES = 2**14, 2**24, 2**19
 
 #: What is missed of a painting, RMS, below which its lights can do it.
 NOTHING_MISSED = 0.01
@@ -94,14 +97,13 @@ def check_suggestible(scene: Scene) -> None:
 def suggest_lights(
     scene: Scene,
     basis: Basis,
-    target: Target,
     solution: Solution,
     *,
     count: int = SUGGESTED,
     seed: int = 0,
     progress: Progress = silent,
 ) -> tuple[Suggestion, ...]:
-    """Point lights that would bring `solution` closest to `target`, the best first.
+    """Point lights that would bring `solution` closest to its painting, the best first.
 
     scene: what `basis` was made of, on the same film or a larger one. count: at most so many;
     none where nothing is missed, or no light would surely take a hundredth of it away.
@@ -120,20 +122,23 @@ def suggest_lights(
     space = _look_around(small, seed)
     if not len(space.places):
         return ()
-    best, radius = np.zeros((0, 3)), np.inf
+    best: Floats = np.zeros((0, 3))
+    radius = np.inf
     additions: list[Addition] = []
+    progress("candidates", 0, len(TRIED))
     for k, tried in enumerate(TRIED):
         places = _places(space, best, radius, _most(small, tried))
-        lit = _render(small, places, pass_seed(seed, Stream.CANDIDATES, 1 + k), progress)
+        lit = _render(small, places, pass_seed(seed, Stream.CANDIDATES, 1 + k))
         is_last = k + 1 == len(TRIED)
         additions = find_additions(
             Candidates.of(basis, solution, lit),
-            count=count,
+            count=count if is_last else count + BESIDE,
             least=SMALLEST_SHARE * total if is_last else 0.0,
             # Few samples show little; the last pass has enough.
             sure=SURE if is_last else SURE / 3,
             too_near=_too_near(places, space),
         )
+        progress("candidates", k + 1, len(TRIED))
         if not additions:
             break
         best = places[[addition.candidate for addition in additions]]
@@ -196,15 +201,11 @@ def _too_near(places: Floats, space: FreeSpace) -> npt.NDArray[np.bool_]:
     return np.asarray(between < APART * space.spread)
 
 
-def _render(small: Scene, places: Floats, seed: int, progress: Progress) -> Basis:
+def _render(small: Scene, places: Floats, seed: int) -> Basis:
     height, width = small.size
-    spp = int(np.clip(SAMPLES // (height * width), 4, MOST_SPP))
+    spp = max(4, SAMPLES // (height * width))
     lit = small.lit_by_points([as_position(place) for place in places])
-
-    def named(label: str, done: int, total: int, unit: str = "passes") -> None:
-        progress("candidates", done, total, unit)
-
-    return render_basis(lit, spp=spp, seed=seed, progress=named)
+    return render_basis(lit, spp=spp, seed=seed)
 
 
 def _suggestions(

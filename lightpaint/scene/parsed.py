@@ -16,7 +16,6 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
 
-
 #: A place in units of the scene.
 Position = tuple[float, float, float]
 
@@ -200,9 +199,7 @@ class ParsedScene:
             node.props["intensity"] = mi.ScalarColor3f(1)
             other.state.nodes.append(node)
             k = len(other.state.nodes) - 1
-            other.state.nodes[0].props[f"{name} of lightpaint"] = (
-                mi.Properties.ResolvedReference(k)
-            )
+            other.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
             other.emitter_nodes.append(k)
             other.names[k] = name
         return other

@@ -12,18 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.basis.basis import Basis, mix
-from lightpaint.errors import SizeError
-from lightpaint.images.blocks import block_mean, whole_factor
+from lightpaint.basis.basis import mix
 from lightpaint.images.exr import Floats
-from lightpaint.solve.constrained import preferring, weights_of
-from lightpaint.solve.constraints import Constraints
-from lightpaint.solve.normal_equations import Doubles, NormalEquations, inner_products
+from lightpaint.solve.candidates import Candidates
+from lightpaint.solve.constrained import weights_of
+from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.solve.optimum import minimise
 from lightpaint.solve.reduced_problem import ReducedProblem, problems
-from lightpaint.solve.reduction import Reduction, Unknown, reduce_to
-from lightpaint.solve.solve import Solution, chosen_reduction
-from lightpaint.solve.uncertainty import pseudo_inverse
+from lightpaint.solve.uncertainty import pseudo_inverse, without_noise
 
 #: Candidates that the problem is solved for again, of those that seem to help most.
 SOLVED = 8
@@ -52,83 +48,6 @@ class Addition:
     with_it: Floats
 
 
-@dataclass(frozen=True)
-class Candidates:
-    """A solved problem, and images of lights to try, all of one size.
-
-    images, noise: (n + m, h, w, 3), the n lights of the basis and m candidates at unit emission,
-    and half the differences of halves of their samples. halves: (n + m, 2), shares of the
-    samples in half A and B. image, importance: what is solved for. reduction: what may be done
-    with the n lights. pull: of `prefer current`, for these.
-    """
-
-    images: Floats
-    noise: Floats
-    halves: Doubles
-    image: Floats
-    importance: Floats
-    reduction: Reduction
-    pull: NormalEquations | None
-    count: int
-
-    @classmethod
-    def of(cls, basis: Basis, solution: Solution, added: Basis) -> "Candidates":
-        """added: images of candidates, at the size of `basis` or a whole part of it.
-
-        Lights in it that are fixed are no candidates. Raises SizeError for other sizes.
-        """
-        size = added.size
-        factor = whole_factor(basis.size, size)
-        if factor is None:
-            raise SizeError(
-                f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
-                f"{basis.size[0]}: render them at a whole part of its size"
-            )
-        image, importance = _reduced(solution.image, solution.importance, factor)
-        free = ~added.is_fixed
-        count = int(free.sum())
-        images, noise = (
-            np.concatenate([[block_mean(one, factor) for one in its], more[free]])
-            for its, more in (
-                (basis.images, added.images),
-                (basis.half_differences, added.half_differences),
-            )
-        )
-        return cls(
-            images,
-            noise,
-            np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
-            image,
-            importance,
-            _with_free_lights(_reduction(basis, solution), count),
-            _pull(basis, solution, count),
-            count,
-        )
-
-    @property
-    def lights(self) -> int:
-        """n, the lights of the basis."""
-        return len(self.images) - self.count
-
-    def picture(self, weights: Doubles) -> Floats:
-        """Σ w_i Φ_i, (h, w, 3). weights: (n + m, 3)."""
-        return mix(self.images, weights)
-
-    def half(self, k: int) -> Floats:
-        """The images as half A (0) or B (1) of the samples has them."""
-        sign = 1 if k == 0 else -1
-        scale = sign * 2 * self.halves[:, 1 - k]
-        return np.asarray(self.images + self.noise * _column(scale), np.float32)
-
-    def noise_of_half(self, k: int) -> Floats:
-        """What has the variance of `half(k)`, as its square."""
-        return np.asarray(self.noise * _column(2 * np.sqrt(self.halves[:, 1 - k])), np.float32)
-
-    def equations(self, images: Floats) -> NormalEquations:
-        """Of these images, and of what is solved for."""
-        return NormalEquations(*inner_products(images, self.image, self.importance))
-
-
 def find_additions(
     candidates: Candidates,
     *,
@@ -143,7 +62,7 @@ def find_additions(
     there are no more. too_near: (m, m), pairs of candidates of which one at most is wanted.
     """
     folds = [_Fold(candidates, k) for k in range(2)]
-    whole = _Solver(candidates, candidates.equations(candidates.images))
+    whole = _Solver(candidates, candidates.images, candidates.noise)
     chosen: list[int] = []
     found: list[Addition] = []
     left = np.ones(candidates.count, dtype=bool)
@@ -151,9 +70,13 @@ def find_additions(
     while len(chosen) < count and left.any():
         estimates = np.where(left, whole.estimated_gains(chosen), -1)
         tried = [int(k) for k in np.argsort(-estimates)[:SOLVED] if left[k]]
+        # Held against the most that may be said for the lights without it.
+        before = min(before, whole.objective(chosen))
         gains = {k: before - _missed(folds, [*chosen, k]) for k in tried}
         worth = sorted((k for k in tried if gains[k] > max(least, 0)), key=lambda k: -gains[k])
-        best = next((k for k in worth if _standard_errors(folds, chosen, k) >= sure), None)
+        best = next(
+            (k for k in worth if gains[k] >= sure * _standard_error(folds, [*chosen, k])), None
+        )
         if best is None:
             break
         chosen.append(best)
@@ -169,10 +92,18 @@ def find_additions(
 
 
 class _Solver:
-    """The problem of all lights and candidates; solved with some of these off."""
+    """The problem of all lights and candidates; solved with some of these off.
 
-    def __init__(self, candidates: Candidates, equations: NormalEquations) -> None:
+    Noise in its images makes lights come out too dim, and a candidate with less of it would make
+    up for that: so the power of the noise is taken out.
+    """
+
+    def __init__(self, candidates: Candidates, images: Floats, noise: Floats) -> None:
         self.reduction = candidates.reduction
+        equations = candidates.equations(images)
+        M = without_noise(equations, candidates.equations(noise).M)
+        equations = NormalEquations(M, equations.b, equations.target_norm2)
+        self.equations = equations
         if candidates.pull is not None:
             equations = equations + candidates.pull
         self.problems = problems(equations, self.reduction)
@@ -184,6 +115,10 @@ class _Solver:
         for problem, here, values in self._solved(chosen):
             x[[problem.its[k] for k in here]] = values
         return weights_of(self.reduction, x)
+
+    def objective(self, chosen: Iterable[int]) -> float:
+        """What is missed with these weights, as the images they were solved with have it."""
+        return float(self.equations.objective(self.weights(chosen)).sum())
 
     def estimated_gains(self, chosen: Iterable[int]) -> Doubles:
         """(m,), what each candidate would gain if the same lights stayed at their limits."""
@@ -217,10 +152,11 @@ class _Fold:
 
     def __init__(self, candidates: Candidates, solve_half: int) -> None:
         self.candidates, self.measured = candidates, 1 - solve_half
-        self.solver = _Solver(candidates, candidates.equations(candidates.half(solve_half)))
+        self.solver = _Solver(
+            candidates, candidates.half(solve_half), candidates.noise_of_half(solve_half)
+        )
         self.equations = candidates.equations(candidates.half(self.measured))
-        noise = candidates.noise_of_half(self.measured)
-        self.noise, _, _ = inner_products(noise, candidates.image, candidates.importance)
+        self.noise = candidates.equations(candidates.noise_of_half(self.measured)).M
         self.known: dict[tuple[int, ...], Doubles] = {}
 
     def weights(self, chosen: Sequence[int]) -> Doubles:
@@ -249,15 +185,14 @@ def _missed(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:
     return sum(fold.missed(chosen) for fold in folds) / len(folds)
 
 
-def _standard_errors(folds: Sequence[_Fold], chosen: Sequence[int], new: int) -> float:
-    """A gain over its standard error.
+def _standard_error(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:
+    """Of what is missed with `chosen`.
 
-    That of the mean of two maps of the gain, pixel by pixel, is told by their difference:
-    what one half of the samples shows and the other does not is noise.
+    That of the mean of two maps, pixel by pixel, is told by their difference: what one half of
+    the samples shows and the other does not is noise.
     """
-    a, b = (fold.missed_map(chosen) - fold.missed_map([*chosen, new]) for fold in folds)
-    error = float(np.sqrt(np.square(a - b).sum()))
-    return float((a + b).sum()) / error if error > 0 else np.inf
+    a, b = (fold.missed_map(chosen) for fold in folds)
+    return float(np.sqrt(np.square(a - b).sum())) / 2
 
 
 def _best(problem: ReducedProblem, here: Sequence[int]) -> Doubles:
@@ -271,54 +206,3 @@ def _best(problem: ReducedProblem, here: Sequence[int]) -> Doubles:
     lower, upper = problem.lower[here], problem.upper[here]
     M: Doubles = problem.M[np.ix_(here, here)]
     return minimise(M, problem.b[here], lower=lower, upper=upper, caps=caps).x
-
-
-def _reduction(basis: Basis, solution: Solution) -> Reduction:
-    if solution.constraints:
-        return chosen_reduction(basis, solution)
-    return reduce_to(Constraints(), basis.lights)
-
-
-def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
-    """`reduction` with that many lights more, of which nothing is asked."""
-    n = len(reduction.held)
-    held = np.vstack([reduction.held, np.zeros((count, 3))])
-    labels = [*reduction.labels, *[""] * count]
-    more = Reduction(
-        held, labels, [*reduction.unknowns], [*reduction.caps], [*reduction.knobs]
-    )
-    for k in range(n, n + count):
-        more.add([Unknown(((k, axis),)) for axis in np.eye(3)], None)
-    return more
-
-
-def _pull(basis: Basis, solution: Solution, count: int) -> NormalEquations | None:
-    """What draws the lights to their present emission; nothing draws the candidates."""
-    if not (solution.constraints and solution.constraints.prefer_current):
-        return None
-    n = len(basis.lights)
-    nothing = NormalEquations(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros(3))
-    strength = solution.constraints.prefer_current
-    pull = preferring(nothing, basis, basis.present_weights, strength)
-    return NormalEquations(
-        np.pad(pull.M, ((0, 0), (0, count), (0, count))),
-        np.pad(pull.b, ((0, 0), (0, count))),
-        pull.target_norm2,
-    )
-
-
-def _reduced(image: Floats, importance: Floats, factor: int) -> tuple[Doubles, Doubles]:
-    """Means of blocks, weighted with importance, and the importance of whole blocks."""
-    weight = block_mean(importance.astype(np.float64), factor)
-    weighted = block_mean(image * importance[..., None].astype(np.float64), factor)
-    return weighted / np.where(weight > 0, weight, 1)[..., None], weight * factor**2
-
-
-def _shares(basis: Basis, count: int) -> Doubles:
-    """(count, 2), the part of the samples that half A and B have."""
-    a, b = basis.origin.halves
-    return np.tile([a / (a + b), b / (a + b)], (count, 1))
-
-
-def _column(values: Doubles) -> Doubles:
-    return values[:, None, None, None]
