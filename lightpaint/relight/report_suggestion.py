@@ -31,7 +31,7 @@ def spoken_suggestions(suggestions: Sequence[Suggestion]) -> str:
 
 def spoken_position(suggestion: Suggestion) -> str:
     """`(1.02, 2.03, 3.57)`, in units of the scene."""
-    return f"({', '.join(f'{v:.4g}' for v in suggestion.position)})"
+    return f"({', '.join(f'{v:.4g}' for v in suggestion.position)})".replace("-", "−")
 
 
 def suggestion_section(
@@ -53,14 +53,18 @@ def suggestion_section(
         if suggestions
         else ""
     )
-    shown = "".join(_shown(x, stops=stops, cd_per_unit=cd_per_unit) for x in suggestions)
+    shown = "".join(
+        _shown(x, before=k > 0, stops=stops, cd_per_unit=cd_per_unit)
+        for k, x in enumerate(suggestions)
+    )
     return (
         f"<section><h2>Lights that would help</h2><p>{escape(spoken_suggestions(suggestions))}</p>"
         f"{how}{shown}</section>"
     )
 
 
-def _shown(suggestion: Suggestion, *, stops: float, cd_per_unit: float | None) -> str:
+def _shown(suggestion: Suggestion, *, before: bool, stops: float, cd_per_unit: float | None) -> str:
+    """before: whether others are suggested before it, which then are in both pictures."""
     seen = suggestion.photometry(cd_per_unit)
     amounts = ", ".join(filter(None, seen.amounts))
     facts = [
@@ -78,10 +82,11 @@ def _shown(suggestion: Suggestion, *, stops: float, cd_per_unit: float | None) -
         if suggestion.seen_at
         else "it would be outside of the picture"
     )
+    without = "with those above it" if before else "as solved"
     name = escape(suggestion.name)
     return (
         f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
-        f"{_picture(suggestion.without, f'Without {name}', 'as solved', None, stops)}"
+        f"{_picture(suggestion.without, f'Without {name}', without, None, stops)}"
         f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, stops)}"
         f"<div>{swatch}<dl>{listed}</dl></div></div>"
         f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'

@@ -36,10 +36,10 @@ SUGGESTED = 3
 
 #: Positions that are tried: all over, near the best of these, nearer, and the best once more,
 #: with all samples for them. Fewest on a film that cannot be made small.
-TRIED, FEWEST = (64, 48, 24, 0), 8
+TRIED, FEWEST = (96, 48, 24, 0), 8
 
 #: How many more than are asked for are looked at closer: the best of few is not near the best.
-BESIDE = 3
+BESIDE = 5
 
 #: Pixels of the film that candidates are rendered on, where it can be reduced; values of all
 #: their images; camera samples of a pass.

@@ -73,16 +73,15 @@ def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Flo
 
     start: (m, 3), places that are taken already.
     """
+    if not len(places):
+        return places
+    chosen: list[int] = []
     if start is None or not len(start):
-        # The one in the middle of all.
-        nearest = np.linalg.norm(places - np.median(places, axis=0, keepdims=True), axis=1)
-        chosen = [int(np.argmin(nearest))] if len(places) else []
-        distance = np.full(len(places), np.inf)
-        for k in chosen:
-            distance = np.linalg.norm(places - places[k], axis=1)
-    else:
-        chosen = []
-        distance = np.linalg.norm(places[:, None] - start[None], axis=2).min(axis=1)
+        # The one nearest to the middle of all.
+        start = np.median(places, axis=0, keepdims=True)
+        chosen = [int(np.argmin(np.linalg.norm(places - start, axis=1)))]
+        start = places[chosen]
+    distance = np.linalg.norm(places[:, None] - start[None], axis=2).min(axis=1)
     while len(chosen) < min(count, len(places)):
         k = int(np.argmax(distance))
         if distance[k] <= 0:
