@@ -27,7 +27,7 @@ from lightpaint.scene.parsed import Position
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.resolution import reductions
 from lightpaint.scene.scene import Scene
-from lightpaint.solve.additional import SURE, Addition, find_additions
+from lightpaint.solve.additional import Addition, find_additions
 from lightpaint.solve.candidates import Candidates
 from lightpaint.solve.solve import Solution
 
@@ -134,8 +134,8 @@ def suggest_lights(
             Candidates.of(basis, solution, lit),
             count=count if is_last else count + BESIDE,
             least=SMALLEST_SHARE * total if is_last else 0.0,
-            # Few samples show little; the last pass has enough.
-            sure=SURE if is_last else SURE / 3,
+            # Few samples, and far from the best places: only the last pass can promise.
+            surely=is_last,
             too_near=_too_near(places, space),
         )
         progress("candidates", k + 1, len(TRIED))

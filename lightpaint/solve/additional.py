@@ -53,13 +53,15 @@ def find_additions(
     *,
     count: int,
     least: float = 0.0,
-    sure: float = SURE,
+    surely: bool = True,
     too_near: npt.NDArray[np.bool_] | None = None,
 ) -> list[Addition]:
     """At most `count` lights to add, each the one that helps most beside those before it.
 
-    least: the gain a light has to be worth; sure: its standard errors. Once there is none,
-    there are no more. too_near: (m, m), pairs of candidates of which one at most is wanted.
+    least: the gain a light has to be worth. surely: whether it has to stand out from noise,
+    with all doubt for the lights there are; if not, what only seems to help is named too, as
+    where to look closer. Once there is none, there are no more.
+    too_near: (m, m), pairs of candidates of which one at most is wanted.
     """
     folds = [_Fold(candidates, k) for k in range(2)]
     whole = _Solver(candidates, candidates.images, candidates.noise)
@@ -71,14 +73,23 @@ def find_additions(
         estimates = np.where(left, whole.estimated_gains(chosen), -1)
         tried = [int(k) for k in np.argsort(-estimates)[:SOLVED] if left[k]]
         # Held against the most that may be said for the lights without it.
-        before = min(before, whole.objective(chosen))
+        doubt = max(before - whole.objective(chosen), 0.0)
         gains = {k: before - _missed(folds, [*chosen, k]) for k in tried}
-        worth = sorted((k for k in tried if gains[k] > max(least, 0)), key=lambda k: -gains[k])
+        order = sorted(tried, key=lambda k: -gains[k])
+        worth = [k for k in order if gains[k] - doubt > max(least, 0)]
+        errors = SURE if surely else 1.0
         best = next(
-            (k for k in worth if gains[k] >= sure * _standard_error(folds, [*chosen, k])), None
+            (k for k in worth if gains[k] - doubt >= errors * _standard_error(folds, [*chosen, k])),
+            None,
         )
-        if best is None:
+        if best is not None:
+            gains[best] -= doubt
+            before -= doubt
+        elif surely or chosen or gains[order[0]] <= 0:
             break
+        else:
+            # Nothing stands out yet: look closer where most seems to be gained.
+            best = order[0]
         chosen.append(best)
         before -= gains[best]
         weights = whole.weights(chosen)
@@ -155,8 +166,10 @@ class _Fold:
         self.solver = _Solver(
             candidates, candidates.half(solve_half), candidates.noise_of_half(solve_half)
         )
-        self.equations = candidates.equations(candidates.half(self.measured))
-        self.noise = candidates.equations(candidates.noise_of_half(self.measured)).M
+        self.images = candidates.half(self.measured)
+        self.noise_images = candidates.noise_of_half(self.measured)
+        self.equations = candidates.equations(self.images)
+        self.noise = candidates.equations(self.noise_images).M
         self.known: dict[tuple[int, ...], Doubles] = {}
 
     def weights(self, chosen: Sequence[int]) -> Doubles:
@@ -175,8 +188,9 @@ class _Fold:
     def missed_map(self, chosen: Sequence[int]) -> Doubles:
         """The same for each pixel, (h, w) float64."""
         c, w = self.candidates, self.weights(chosen)
-        missed = c.image - mix(c.half(self.measured), w)
-        noise = mix(c.noise_of_half(self.measured), w).astype(np.float64)
+        on = w.any(axis=1)
+        missed = c.image - mix(self.images[on], w[on])
+        noise = mix(self.noise_images[on], w[on]).astype(np.float64)
         squared = np.square(missed) - np.square(noise)
         return np.asarray(c.importance * squared.sum(axis=-1))
 
