@@ -19,11 +19,13 @@ from lightpaint.pipeline import (
 )
 from lightpaint.relight.export import EXPORTS
 from lightpaint.relight.relight import check_relightable
+from lightpaint.relight.suggestion import check_suggestible
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.reduction import reduce_to
 from lightpaint.sources import light_group_source, read_source
+from lightpaint.suggestion_table import show_suggestions
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 
@@ -78,6 +80,8 @@ def _solve_each(
     else:
         scene = on_film(load(options, path=source), options.quality, options.resolution)
         reduce_to(all_constraints(scene, constraints), basis_lights(scene))
+        if options.suggest:
+            check_suggestible(scene)
         size = scene.size
     if scene is not None:
         for target in targets:
@@ -101,6 +105,8 @@ def _solve_each(
                 **_settings(options, given),
             )
         tables.show_look(look, folder)
+        if look.suggestions is not None:
+            show_suggestions(look.suggestions, cd_per_unit=options.cd_per_unit)
         if groups is not None:
             there = ", ".join(name for name in EXPORTS if (folder / name).is_file())
             console.write(f"for other programs: {there}")
@@ -113,6 +119,8 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
     """One lighting for the paintings of several views."""
     if options.sensor:
         raise TargetError("-s cannot be had with --target, which names the sensors: leave it out")
+    if options.suggest:
+        raise TargetError("--suggest is for one view only: solve for a single painting")
     if is_basis_file(Path(options.source)):
         raise BasisError("a basis has one view only: give the scene, to solve for several")
     scenes: list[Scene] = []
@@ -151,6 +159,7 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     return {
         "unpainted": options.unpainted,
         "method": options.method,
+        "suggest": options.suggest,
         "spp": options.spp,
         "time_s": options.time_s,
         "seed": options.seed,
@@ -193,6 +202,7 @@ def _check_nothing_to_render(options: Namespace) -> None:
     asked |= {"--spp": options.spp, "--time": options.time_s}
     asked |= {"--quality": options.quality}
     asked |= {"--resolution": options.resolution, "--refine": options.refine}
+    asked |= {"--suggest": options.suggest}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"
