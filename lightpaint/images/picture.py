@@ -1,5 +1,6 @@
 """A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
 
+import struct
 import tempfile
 import zipfile
 import zlib
@@ -51,6 +52,18 @@ MERGED = "mergedimage.png"
 
 #: Longest merged picture that is unpacked, in bytes.
 MAX_MERGED = 2**30
+
+#: What reading a damaged archive raises: its places and lengths may be any numbers.
+DAMAGES = (
+    zipfile.BadZipFile,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    ValueError,
+    OverflowError,
+    struct.error,
+    zlib.error,
+)
 
 #: JPEG's rounding keeps white within so many codes of the top.
 JPEG_WHITE = 2
@@ -213,7 +226,7 @@ def _bitmap(path: Path, kind: str) -> Bitmap:
             return replace(read_bitmap(merged, "png"), kind=kind)
     except KeyError:
         raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
+    except DAMAGES as error:
         # The archive's own names stand in the message, and may be anything.
         raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
 
