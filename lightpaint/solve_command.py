@@ -53,9 +53,6 @@ def solve(options: Namespace, given: list[str]) -> int:
         "paint": options.paint,
     }
     targets = [read_target(t, mask=m, **how) for t, m in zip(paths, masks, strict=True)]
-    for target in targets:
-        for note in target.notes:
-            console.say(f"{target.name}: {note}")
     if options.views:
         return _solve_views(options, targets, given)
     return _solve_each(options, targets, groups, given)
@@ -91,6 +88,7 @@ def _solve_each(
         check_writable(folder)
         if scene is not None:
             check_relightable(scene, folder / "relit.xml")
+    _say_how_read(targets)
     for target, folder in zip(targets, folders, strict=True):
         if made is None and scene is not None:
             made = render_or_find(scene, options)
@@ -136,6 +134,7 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
     targets = [_fitted(t, s.size, options) for t, s in zip(targets, scenes, strict=True)]
     check_writable(folder)
     check_relightable(scenes[0], folder / "relit.xml")
+    _say_how_read(targets)
     share_s = None if options.time_s is None else options.time_s / len(scenes)
     made = [render_or_find(scene, options, time_s=share_s) for scene in scenes]
     with console.progress() as progress:
@@ -171,6 +170,16 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     }
 
 
+def _say_how_read(targets: list[Target]) -> None:
+    for target in targets:
+        for note in target.notes:
+            console.say(f"{target.name}: {note}")
+        if target.not_finite:
+            console.say(
+                f"{target.name}: {target.not_finite} pixels hold NaN or Inf and count nothing"
+            )
+
+
 def _check_same_picture(target: Target, scene: Scene) -> None:
     """Raise TargetError for a painting of another view; say so if the scene has changed since."""
     sensor = scene.sensor_names[scene.sensor]
@@ -186,8 +195,6 @@ def _check_same_picture(target: Target, scene: Scene) -> None:
 def _fitted(target: Target, size: tuple[int, int], options: Namespace) -> Target:
     """`target` at the size of the basis. Says so where nobody has asked for another size."""
     fitted = target.fitted_to(size, resize=options.resize)
-    if target.not_finite:
-        console.say(f"{target.name}: {target.not_finite} pixels hold NaN or Inf and count nothing")
     if fitted.size != target.size and not (options.resize or options.resolution or options.quality):
         console.say(
             f"{target.name}: {target.size[1]}x{target.size[0]} pixels averaged to the basis's "
