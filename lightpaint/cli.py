@@ -163,6 +163,16 @@ def _parser() -> argparse.ArgumentParser:
         help="gauss-seidel: the paper's iteration alone, which comes late to the optimum or runs "
         "out of sweeps, and says so (default: %(default)s)",
     )
+    solve.add_argument(
+        "--suggest",
+        type=_at_least(1),
+        nargs="?",
+        const=3,
+        default=0,
+        metavar="N",
+        help="look for up to N (3) further point lights that would help most, with XML to paste; "
+        "takes some ten seconds",
+    )
     _add_lights(solve)
     solve.add_argument(
         "--pattern",

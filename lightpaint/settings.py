@@ -32,6 +32,8 @@ class Settings:
     improve the answer by what that shows; needs a scene.
 
     What is said:
+    suggest: how many point lights that would help most are looked for at most; needs a scene, and
+    one view only.
     cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
     command: the shell command that asks for this, for the report.
     """
@@ -48,6 +50,7 @@ class Settings:
     use_cache: bool = True
     noise_correction: bool = False
     refine: int = 0
+    suggest: int = 0
     cd_per_unit: float | None = None
     command: str = ""
 

@@ -1,23 +1,20 @@
 """A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
 
+import struct
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.display import encode_display
 from lightpaint.images.exr import Floats, Part, read_parts
-from lightpaint.images.icc import Profile
 from lightpaint.images.layers import Layer, choose_layer
-from lightpaint.images.primaries import converted
+from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
 from lightpaint.images.view import View
 
 Mask = npt.NDArray[np.bool_]
@@ -52,11 +49,20 @@ MERGED = "mergedimage.png"
 #: Longest merged picture that is unpacked, in bytes.
 MAX_MERGED = 2**30
 
+#: What reading a damaged archive raises: its places and lengths may be any numbers.
+DAMAGES = (
+    zipfile.BadZipFile,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    ValueError,
+    OverflowError,
+    struct.error,
+    zlib.error,
+)
+
 #: JPEG's rounding keeps white within so many codes of the top.
 JPEG_WHITE = 2
-
-#: Pixels that are converted at once.
-STRIP = 2**18
 
 
 @dataclass(frozen=True)
@@ -213,7 +219,7 @@ def _bitmap(path: Path, kind: str) -> Bitmap:
             return replace(read_bitmap(merged, "png"), kind=kind)
     except KeyError:
         raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
+    except DAMAGES as error:
         # The archive's own names stand in the message, and may be anything.
         raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
 
@@ -240,7 +246,7 @@ def _of_layer(layer: Layer) -> Picture:
                 "there is colour where alpha is 0: if it is not premultiplied, as OpenEXR "
                 "prescribes, edges of strokes are read too bright",
             )
-        _unpremultiply(image, alpha)
+        unpremultiply(image, alpha)
     is_half = any(c.dtype == np.float16 for c in stored_part.channels.values())
     return Picture(
         kind="exr",
@@ -270,11 +276,11 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
     if bitmap.kind == "psd" and alpha is not None:
         alpha, notes = _without_partial(alpha)
     if bitmap.codes is None:
-        image = _light_of_floats(bitmap, alpha)
+        image = light_of_floats(bitmap, alpha)
         saturated, used = None, None
     else:
-        used = view or _view_of(bitmap)
-        image = _decoded(bitmap, alpha, used)
+        used = view or view_of(bitmap)
+        image = light_of_integers(bitmap, alpha, used)
         top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
         saturated = bitmap.values >= top
     floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
@@ -308,100 +314,12 @@ def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
     return np.where(partial, np.float32(0), alpha), (note,)
 
 
-def _view_of(bitmap: Bitmap) -> View:
-    if bitmap.shown is None:
-        return View()
-    name, _, stops = bitmap.shown.rpartition(" ")
-    try:
-        return View(name, float(stops))
-    except ValueError:
-        raise ImageError(f"says that it was shown through {bitmap.shown!r}, no view") from None
-
-
-def _light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
-    image = np.array(bitmap.values, np.float32)
-    if bitmap.profile is not None:
-        if not bitmap.profile.is_linear:
-            raise ImageError(
-                f"holds floats of the profile {bitmap.profile.name!r}, which is not linear: "
-                "convert it to linear light and export it again"
-            )
-        image = converted(image, bitmap.profile.matrix)
-    if alpha is not None and bitmap.premultiplied:
-        _unpremultiply(image, alpha)
-    return image
-
-
-def _decoded(bitmap: Bitmap, alpha: Floats | None, view: View) -> Floats:
-    """Linear Rec.709 of the integers, strip by strip."""
-    assert bitmap.codes is not None
-    profile = bitmap.profile
-    if profile is not None and profile.is_srgb:
-        profile = None
-    image = np.empty(bitmap.values.shape, np.float32)
-    rows = max(1, STRIP // bitmap.values.shape[1])
-    decode = _decoder(bitmap.codes, profile, view, by_table=not bitmap.premultiplied)
-    for top in range(0, len(image), rows):
-        strip = slice(top, top + rows)
-        values = bitmap.values[strip]
-        if bitmap.premultiplied and alpha is not None:
-            display = values / np.float32(bitmap.codes)
-            _unpremultiply(display, alpha[strip])
-            values = np.clip(display, 0, 1)
-        image[strip] = decode(values)
-    return image
-
-
-def _decoder(
-    codes: int, profile: Profile | None, view: View, *, by_table: bool
-) -> Callable[[npt.NDArray[Any]], Floats]:
-    """From numbers (h, w, 3) to light: from integers by table, else from values in [0, 1]."""
-
-    def curve(of: Callable[[Floats], Floats]) -> Callable[[npt.NDArray[Any]], Floats]:
-        if not by_table:
-            return of
-        # The same numbers come again and again.
-        table = np.asarray(of(np.arange(codes + 1) / codes), np.float32)
-        return lambda values: table[values]
-
-    if profile is None and view.is_per_channel:
-        return curve(view.decode)
-    if profile is None:
-        display = curve(lambda values: values)
-        return lambda values: view.decode(display(values))
-    curves = [curve(own) for own in profile.curves]
-
-    def through_profile(values: npt.NDArray[Any]) -> Floats:
-        light = np.stack([own(values[..., k]) for k, own in enumerate(curves)], axis=-1)
-        shown = converted(light, profile.matrix)
-        return _through(view, shown, is_linear=profile.is_linear, name=profile.name)
-
-    return through_profile
-
-
-def _through(view: View, shown: Floats, *, is_linear: bool, name: str) -> Floats:
-    """Scene light of what a display is to show, in linear Rec.709."""
-    scale = np.float32(2.0**view.stops)
-    if view.name == "srgb" or (view.name == "linear" and is_linear):
-        return shown / scale  # Beyond Rec.709 as well, for which display values have no room.
-    if view.name == "linear":
-        raise ImageError(f"has the colour profile {name!r}, but its numbers are said to be linear")
-    return view.decode(encode_display(shown))
-
-
 def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
     scale = np.float32(bitmap.codes or 1)
     mask = bitmap.values.max(axis=-1) / scale
     if bitmap.alpha is not None and not bitmap.premultiplied:
         mask = mask * (bitmap.alpha / scale)
     return np.asarray(mask, np.float32)
-
-
-def _unpremultiply(image: Floats, alpha: Floats) -> None:
-    """Divide by alpha, in place, where there is some."""
-    # Over next to no alpha a colour may become infinite, and is then counted as such.
-    with np.errstate(over="ignore", invalid="ignore"):
-        image /= np.where(alpha > 0, alpha, np.float32(1))[..., None]
 
 
 def _only_finite(image: Floats) -> Mask:

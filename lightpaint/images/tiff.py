@@ -29,8 +29,9 @@ def check_tiff(path: Path) -> None:
     try:
         with path.open("rb") as file:
             fields = _first_directory(file)
-    except struct.error:
-        raise ImageError("is cut off") from None
+    except (struct.error, ValueError, OverflowError, OSError):
+        # Too short, or a place that no file has.
+        raise ImageError("is cut off or damaged") from None
     if not {WIDTH, HEIGHT, BITS} <= fields.keys():
         raise ImageError("is damaged: its head does not give width, height and bits")
     width, height = _one(fields, WIDTH), _one(fields, HEIGHT)

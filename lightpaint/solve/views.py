@@ -139,7 +139,8 @@ def parted(joint: Solution, problems: Sequence[Solution]) -> list[Solution]:
         lighting = replace(
             joint.lighting,
             target=problem.lighting.target,
-            quality=joint.quality.of(problem.equations, weights),
+            # The error of the joint objective is not this view's.
+            quality=replace(joint.quality.of(problem.equations, weights), objective_error=None),
         )
         views.append(replace(problem, lighting=lighting, tried=joint.tried, is_one_of_several=True))
     return views

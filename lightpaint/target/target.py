@@ -9,6 +9,7 @@ from PIL import Image
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_any, block_mean, whole_factor
 from lightpaint.images.exr import Floats
+from lightpaint.images.view import View
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class Target:
         this or anything brighter was meant; None if it can say everything.
     notes: what a person should know of how it was read, a sentence each.
     content, sensor: of the scene and view that it was painted on, where a template says.
+    view: what a display showed it through when it was painted; None if nobody knows.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Target:
     notes: tuple[str, ...] = ()
     content: str = ""
     sensor: str = ""
+    view: View | None = None
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):

@@ -76,6 +76,7 @@ def _unchecked() -> dict[str, bytes]:
             np.tile(WORDS[..., :3], (4, 4, 1)), tile=(16, 16), compression="zlib", predictor=True
         ),
         "floats.tif": _tiff(FLOATS),
+        "big.tif": _tiff(WORDS[..., :3], bigtiff=True),
         "plain.jpg": _jpeg(),
         "progressive.jpg": _jpeg(progressive=True),
         "plain.psd": psd(WORDS[..., :3], merged=True),
