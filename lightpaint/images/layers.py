@@ -13,6 +13,9 @@ from lightpaint.images.primaries import REC709, converted, is_rec709, rgb_to_xyz
 #: Channel that holds importance in a layer whose RGB is not premultiplied.
 WEIGHT_CHANNEL = "W"
 
+#: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
+KRITA_LAYERS = "krita_layers_info"
+
 #: What programs call the channels of a colour.
 RGB_NAMES = (("R", "G", "B"), ("r", "g", "b"), ("red", "green", "blue"))
 
@@ -82,14 +85,20 @@ def colour_layers(parts: Sequence[Part]) -> list[Layer]:
 def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
     """The layer called `wanted`: its name, that of its part or view, or its prefix.
 
-    Without one, the only layer, or the only one without a prefix. Raises ImageError, listing
-    the layers, where there is none or more than one.
+    Without one, the only layer, or the only one without a prefix, unless Krita wrote it: there
+    it is the background alone. Raises ImageError, listing the layers, where there is none or more
+    than one.
     """
     layers = colour_layers(parts)
     if not layers:
         channels = dict.fromkeys(name for part in parts for name in part.channels)
         raise ImageError(f"is no RGB image: no channel R, G, B nor Y; it has {', '.join(channels)}")
     if wanted is None:
+        if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
+            raise ImageError(
+                f"has {len(layers)} layers of Krita ({_names(layers)}) and no merged picture: "
+                "flatten the image and export it again, or name the painted one with --layer"
+            )
         plain = [layer for layer in layers if not layer.prefix] or layers
         if len(plain) > 1:
             raise ImageError(

@@ -82,6 +82,20 @@ def test_layers_by_name(tmp_path: Path):
         read_picture(_exr(path, channels))
 
 
+def test_layers_of_krita_are_not_taken_for_a_picture(tmp_path: Path):
+    """Krita 5.1.5 leaves the background without a prefix, and the paint beside it."""
+    background, paint = _rgb(seed=1), _rgb(seed=2)
+    both = _named(background) | _named(paint, "paint.")
+    path = _exr(tmp_path / "a.exr", both, krita_layers_info="<!DOCTYPE krita-extra-layers-info>")
+    with pytest.raises(
+        ImageError, match=r"2 layers of Krita \(one without a name, paint\).*flatten"
+    ):
+        read_picture(path)
+    np.testing.assert_array_equal(read_picture(path, layer="paint").image, paint)
+    flat = _exr(path, _named(paint, "root Merged."), krita_layers_info="<!DOCTYPE>")
+    np.testing.assert_array_equal(read_picture(flat).image, paint)
+
+
 @pytest.mark.parametrize("names", ["rgb", ["red", "green", "blue"]])
 def test_other_names_of_channels(tmp_path: Path, names: Any):
     image = _rgb()
