@@ -84,6 +84,7 @@ def report_page(
         verification=verification_table(verification),
         render=render_table(basis, target, solution, verification),
         command=escape(command or "(made from Python, without a command line)"),
+        again=_paint_again(basis, target, verification),
         versions=escape(versions(basis)),
     )
 
@@ -141,4 +142,19 @@ def _exposure(view: View, predicted: Floats) -> str:
     text = f"All at {at}, {'sRGB' if view.name == 'srgb' else view.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
+    return text
+
+
+def _paint_again(basis: Basis, target: Target, verification: Verification | None) -> str:
+    """How to change the painting and solve once more, for those who open the page much later."""
+    text = (
+        "Open the painting with its layers, change it, save it under the same name, and give the "
+        "command again. The basis is kept"
+    )
+    text += "." if verification is None else "; only the verification is rendered anew."
+    if target.content:
+        text += " What counts is what differs from the template."
+    elif target.everything and basis.origin.scene.endswith(".xml"):
+        make = f"<code>lightpaint template {escape(basis.origin.scene)}</code>"
+        text += f" Here every pixel counts; painted over what {make} renders, only the paint does."
     return text

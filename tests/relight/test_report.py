@@ -212,6 +212,21 @@ def test_without_a_verification(make_basis: Any):
     assert len(page.all("img")) == 8
 
 
+def test_how_to_paint_again(make_basis: Any):
+    result = _result(make_basis)
+    painting = result["target"]
+    cases = (
+        (painting, "give the command again. The basis is kept; only the verification"),
+        (replace(painting, content="abc"), "differs from the template"),
+        (replace(painting, everything=True), "lightpaint template scene.xml renders"),
+    )
+    for target, words in cases:
+        page = Page(report_page(**{**result, "target": target}))
+        assert words in page.text("details")
+        assert page.text("summary") == "Paint again"
+        assert page.all("details")[0].get("open") is None
+
+
 def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
     result = _result(make_basis)
     page = Page(report_page(**result))
