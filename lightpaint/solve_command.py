@@ -10,7 +10,7 @@ from lightpaint.basis.foreign import LightGroups
 from lightpaint.basis.render import basis_lights
 from lightpaint.errors import BasisError, TargetError
 from lightpaint.files import check_writable
-from lightpaint.given import constraints_of, folders_of, load, render_or_find
+from lightpaint.given import constraints_of, folders_of, load, render_or_find, view_of
 from lightpaint.pipeline import (
     all_constraints,
     command_line,
@@ -135,6 +135,8 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     return {
         "unpainted": options.unpainted,
         "method": options.method,
+        "space": options.space,
+        "view": view_of(options),
         "spp": options.spp,
         "time_s": options.time_s,
         "seed": options.seed,

@@ -81,6 +81,8 @@ class Quality:
     curve: where only some lights may be on, numbers of lights and the relative residual,
     √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
     bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
+    display: the view through which the objective is seen; "" where it is of linear light.
+    rounds: linear problems solved one after the other, the last of which is the certified one.
     """
 
     kkt_residual: RGB
@@ -91,6 +93,8 @@ class Quality:
     unreached: tuple[str, ...] = ()
     curve: tuple[tuple[int, float], ...] = ()
     bounds: tuple[Bound, ...] = ()
+    display: str = ""
+    rounds: int = 1
 
     def of(self, equations: NormalEquations, weights: Doubles) -> "Quality":
         """With the objective that `weights` (n, 3) have in `equations`."""
@@ -256,6 +260,8 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             "unreached": list(q.unreached),
             **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
             **({"bounds": [bound.fields() for bound in q.bounds]} if q.bounds else {}),
+            **({"display": q.display} if q.display else {}),
+            **({"rounds": q.rounds} if q.rounds > 1 else {}),
         }
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
@@ -367,6 +373,8 @@ def _read_quality(data: dict[str, Any]) -> Quality:
         tuple(str(name) for name in unreached),
         tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
         tuple(Bound.of_fields(bound) for bound in data.get("bounds", [])),
+        _read_text(data, "display"),
+        int(data.get("rounds", 1)),
     )
 
 

@@ -80,6 +80,15 @@ class Loss:
         """The objective of a black picture, (3,): ‖Ψ‖² where nothing else is asked."""
         return self.objective(np.zeros_like(self.painted))
 
+    def meant(self, x: Floats) -> Doubles:
+        """What was to be there, (h, w, 3) linear, of a picture x: x itself where that will do."""
+        q = self.share[..., None]
+        return np.asarray((1 - q) * self._moved(x) + q * self.current, np.float64)
+
+    def missed(self, x: Floats) -> Doubles:
+        """V(ψ) − V(x), (h, w, 3): what a picture misses of the painting."""
+        return np.asarray(self.shown(self._moved(x)) - self.shown(x))
+
     def same_squares(self, a: Floats, b: Floats) -> bool:
         """Whether the squares made for two pictures are the same, and so exact between them."""
         if self.view is not None:
@@ -114,7 +123,7 @@ class Loss:
         q: Floats,
         *,
         from_clipping: bool,
-    ) -> tuple[Doubles, Doubles, Doubles]:
+    ) -> tuple[Floats, Floats, Floats]:
         """image, factor and share of some pixels, (p, 3) each. As of `squares`."""
         if self.view is None:
             counts = (1 - q) * ~exceeds

@@ -16,7 +16,7 @@ from lightpaint.solve.loss import Loss, Squares
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
 
 #: Rounds at most.
-ROUNDS = 50
+ROUNDS = 100
 
 #: Change of a light's picture in a round, beside the brightest light's, that ends them.
 STEP = 1e-6

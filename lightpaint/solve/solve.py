@@ -85,6 +85,16 @@ class Solution:
         return D if self.reweighting is None else D * self.reweighting.factor
 
     @property
+    def current_shares(self) -> Floats:
+        """`current_share` per channel, (h, w, 1) or (h, w, 3)."""
+        share = self.current_share
+        return share if share.ndim == 3 else share[..., None]
+
+    def meant(self, predicted: Floats) -> Floats:
+        """What was to be there, (h, w, 3) linear; `predicted` itself where brighter will do."""
+        return self.image if self.loss is None else self.loss.meant(predicted)
+
+    @property
     def norm2(self) -> Doubles:
         """(3,), what a black picture would miss, to hold the objective against."""
         return self.equations.target_norm2 if self.loss is None else self.loss.norm2
@@ -296,7 +306,12 @@ def _descended(
     its = linear(found.equations, found.reweighting.at)
     converged = its.quality.converged and found.reweighting.converged
     quality = with_objective(basis, problem, its.quality, found.weights)
-    quality = replace(quality, converged=converged)
+    quality = replace(
+        quality,
+        converged=converged,
+        display="" if loss.view is None else loss.view.spoken,
+        rounds=1 + found.reweighting.rounds,
+    )
     lighting = its.lighting
     if (found.weights != lighting.weights_for(basis)).any():
         lighting = Lighting.of_weights(basis, found.weights, target=lighting.target)
