@@ -61,9 +61,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.space not in get_args(Space):
-            raise LightpaintError(
-                f"no space {self.space!r}: expected {' or '.join(get_args(Space))}"
-            )
+            known = " or ".join(get_args(Space))
+            raise LightpaintError(f"no space {self.space!r} to fit in: expected {known}")
 
     @property
     def checks_as_basis(self) -> bool:

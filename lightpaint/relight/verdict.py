@@ -40,8 +40,9 @@ def relative_residual(solution: Solution) -> float:
     """RMS of what the prediction misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
 
     E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
-    by importance; in display space, both of display values. 0 is a perfect match, 1 is what all lights off would give. Without the
-    square root a miss of 10 % of the light would look like one of 1 %.
+    by importance; in display space, both of display values. 0 is a perfect match, 1 is what all
+    lights off would give. Without the square root a miss of 10 % of the light would look like
+    one of 1 %.
     """
     norm2 = _norm2(solution)
     # A painting that is black wherever it counts is met by darkness alone.

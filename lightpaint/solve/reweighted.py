@@ -61,13 +61,12 @@ def descend(
     solve: Callable[[NormalEquations, Doubles], Doubles],
     *,
     pull: NormalEquations | None = None,
-    rounds: int = ROUNDS,
 ) -> Descent:
     """Minimise `loss` over what `solve` keeps to, from the weights `start`, (n, 3).
 
     solve: (equations, weights to begin with) → the weights (n, 3) that are best for them; the
     set of those it may return is convex. pull: of the weights, added to the loss; `solve` adds
-    it by itself. rounds: linear problems at most.
+    it by itself.
     """
     w, x = start, predicted(basis, start)
     value = _value(loss, pull, w, x)
@@ -90,7 +89,7 @@ def descend(
             if part == 0:
                 continue
             done = False
-        if done or part == 0 or count >= rounds:
+        if done or part == 0 or count >= ROUNDS:
             stays = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
             small = done or fall <= 1e-9 * value
             return Descent(
