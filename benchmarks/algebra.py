@@ -2,14 +2,15 @@
 
     python benchmarks/algebra.py [--repeats N]
 
-Four tables: forming M and b against a plain float64 BLAS product of the same shape; one
-channel's solve, M given, against scipy's nnls on the Cholesky factor of M; a stroke of a
-64-pixel brush, update and solve of three channels; and many looks from one basis.
+Four tables: forming M and b against a plain float64 BLAS product of the same shape; the solve,
+M given, of one channel against scipy's nnls on the Cholesky factor of M, and of three; a stroke of
+a 64-pixel brush, update and solve of three channels; and many looks from one basis.
 """
 
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.optimize import nnls
 from lightpaint.solve.normal_equations import BLOCK, NormalEquations, inner_products
 from lightpaint.solve.optimum import minimise
 from lightpaint.solve.solver import solve_normal_equations
+from lightpaint.solve.threads import one_thread
 from lightpaint.solve.tiles import TiledEquations
 
 HEIGHT, WIDTH, BRUSH = 360, 640, 64
@@ -44,8 +46,9 @@ def gram(repeats: int) -> None:
         blocks = 3 * HEIGHT * WIDTH / BLOCK
 
         def product(plain: Any = plain, blocks: float = blocks) -> None:
-            for _ in range(int(blocks)):
-                plain @ plain.T
+            with one_thread():
+                for _ in range(int(blocks)):
+                    plain @ plain.T
 
         ours = timed(lambda p=(images, target, importance): inner_products(*p), repeats)
         base = timed(product, repeats)
@@ -53,48 +56,65 @@ def gram(repeats: int) -> None:
 
 
 def solves(repeats: int) -> None:
-    """One channel, M given, from all lights at 1."""
-    print("\nsolve of one channel, M given, ms (least / median of the runs)")
-    print(f"{'lights':>8s}{'ours':>18s}{'nnls':>18s}{'off':>6s}{'KKT':>10s}")
+    """M given, from all lights at 1."""
+    print("\nsolve, M given, ms (least / median of the runs)")
+    print(
+        f"{'lights':>8s}{'one channel':>18s}{'nnls':>18s}{'off':>6s}{'KKT':>10s}"
+        f"{'three channels':>18s}{'from another':>18s}"
+    )
     for n in (12, 64, 256, 1000):
         rng = np.random.default_rng(n)
         A = rng.random((2 * n + 10, n)) ** 3
-        y = A @ (rng.random(n) * (rng.random(n) < 0.6)) + 0.3 * rng.normal(size=len(A))
-        M, b = A.T @ A, A.T @ y
+        y = A @ (rng.random((n, 3)) * (rng.random((n, 3)) < 0.6)) + 0.3 * rng.normal(
+            size=(len(A), 3)
+        )
+        M, b = A.T @ A, np.ascontiguousarray((A.T @ y).T)
+        other = np.ascontiguousarray((A.T @ (y * rng.normal(1, 0.02, y.shape))).T)
+        all_M = np.stack([M, M, M])
 
-        def by_scipy(M: Any = M, b: Any = b) -> None:
+        def by_scipy(M: Any = M, b: Any = b[0]) -> None:
             L = np.linalg.cholesky(M)
             nnls(L.T, np.linalg.solve(L, b), maxiter=100 * len(b))
 
-        ours = timed(lambda M=M, b=b: minimise(M, b, start=np.ones(b.size)), repeats)
-        oracle = timed(by_scipy, min(repeats, 3))
-        found = minimise(M, b, start=np.ones(n))
+        one = partial(minimise, M, b[0], start=np.ones(n))
+        three = partial(
+            solve_normal_equations, NormalEquations(all_M, b, np.ones(3)), np.ones((n, 3))
+        )
+        again = partial(
+            solve_normal_equations, NormalEquations(all_M, other, np.ones(3)), three().weights
+        )
+        found = one()
         print(
-            f"{n:8d}{pair(ours):>18s}{pair(oracle):>18s}"
+            f"{n:8d}{pair(timed(one, repeats)):>18s}"
+            f"{pair(timed(by_scipy, min(repeats, 3))):>18s}"
             f"{np.count_nonzero(found.x == 0):6d}{found.kkt_residual:10.0e}"
+            f"{pair(timed(three, repeats)):>18s}{pair(timed(again, repeats)):>18s}"
         )
 
 
 def strokes(count: int) -> None:
     """A square of new colour, and of new importance, anywhere; then the solve from the last."""
     print(f"\nstroke of {BRUSH}x{BRUSH} pixels in {WIDTH}x{HEIGHT}, ms (least / median)")
-    print(f"{'lights':>8s}{'colour':>18s}{'importance':>18s}{'solve':>18s}")
+    print(f"{'lights':>8s}{'painted':>12s}{'update':>16s}{'solve':>16s}{'together':>16s}")
     for n in (12, 64):
         tiled = TiledEquations(*picture(n))
         rng = np.random.default_rng(1)
         weights = solve_normal_equations(tiled.equations, np.ones((n, 3))).weights
-        spent: dict[str, list[float]] = {"target": [], "importance": [], "solve": []}
-        for k in range(count):
-            top, left = rng.integers(0, HEIGHT - BRUSH), rng.integers(0, WIDTH - BRUSH)
-            region = slice(top, top + BRUSH), slice(left, left + BRUSH)
-            kind = ("target", "importance")[k % 2]
-            start = time.perf_counter()
-            tiled.update(region, **{kind: rng.random(3) if kind == "target" else rng.random()})
-            between = time.perf_counter()
-            weights = solve_normal_equations(tiled.equations, weights).weights
-            spent[kind].append(between - start)
-            spent["solve"].append(time.perf_counter() - between)
-        print(f"{n:8d}" + "".join(f"{pair(each):>18s}" for each in spent.values()))
+        for kind in ("target", "importance"):
+            updates, solves = [], []
+            for _ in range(count):
+                top, left = rng.integers(0, HEIGHT - BRUSH), rng.integers(0, WIDTH - BRUSH)
+                region = slice(top, top + BRUSH), slice(left, left + BRUSH)
+                painted = rng.random(3) if kind == "target" else rng.random()
+                start = time.perf_counter()
+                tiled.update(region, **{kind: painted})
+                between = time.perf_counter()
+                weights = solve_normal_equations(tiled.equations, weights).weights
+                updates.append(between - start)
+                solves.append(time.perf_counter() - between)
+            together = [sum(both) for both in zip(updates, solves, strict=True)]
+            times = "".join(f"{pair(each):>16s}" for each in (updates, solves, together))
+            print(f"{n:8d}{kind:>12s}{times}")
 
 
 def looks() -> None:

@@ -6,7 +6,9 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     call                        in → out                             question
     load_scene                  scene XML → Scene                    which lights are there?
     render_basis, read_basis    Scene → Basis                        what does each do alone?
-    read_target                 painted EXR → Target                 what is wanted, and where?
+    read_light_groups           another renderer's EXR → LightGroups the same
+    render_template             Scene → a folder to paint on
+    read_target                 painting → Target                    what is wanted, and where?
     solve                       Basis, Target → Solution             which lighting is closest?
     combine                     Basis, Lighting → Estimate           what will it look like?
     relight                     Scene, Lighting → relit Scene        write it into the scene
@@ -18,12 +20,16 @@ happens when the first scene is loaded.
 """
 
 from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.foreign import LightGroups, read_light_groups
 from lightpaint.basis.render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.images.display import display_picture
 from lightpaint.images.estimate import Estimate
-from lightpaint.pipeline import paint_views_with_light, paint_with_light
+from lightpaint.images.view import View
+from lightpaint.pipeline import paint_views_with_light, paint_with_light, render_template
+from lightpaint.relight.export import write_exports
 from lightpaint.relight.relight import relight
+from lightpaint.relight.suggestion import Suggestion, suggest_lights
 from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.results import Look
@@ -35,21 +41,25 @@ from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
 from lightpaint.solve.solve import Solution, solve
 from lightpaint.solve.views import solve_views
-from lightpaint.target.target import Target, read_target
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
 __all__ = [
     "Basis",
     "Constraints",
     "Estimate",
+    "LightGroups",
     "Lighting",
     "LightpaintError",
     "Look",
     "Scene",
     "Settings",
     "Solution",
+    "Suggestion",
     "Target",
     "Verification",
+    "View",
     "__version__",
     "combine",
     "display_picture",
@@ -58,15 +68,19 @@ __all__ = [
     "paint_with_light",
     "read_basis",
     "read_constraints",
+    "read_light_groups",
     "read_lighting",
     "read_target",
     "relight",
     "render_basis",
+    "render_template",
     "solve",
     "solve_views",
+    "suggest_lights",
     "use_variant",
     "verdict",
     "verify",
     "write_basis",
+    "write_exports",
     "write_lighting",
 ]

@@ -87,7 +87,9 @@ def _parser() -> argparse.ArgumentParser:
         help="scene XML, a *.basis.exr, or light groups of another "
         "renderer: an EXR or a folder of them",
     )
-    solve.add_argument("targets", metavar="TARGET", nargs="*", help="painted EXR")
+    solve.add_argument(
+        "targets", metavar="TARGET", nargs="*", help="painting: EXR, PNG, TIFF, JPEG, ..."
+    )
     solve.add_argument(
         "--target",
         dest="views",
@@ -103,8 +105,30 @@ def _parser() -> argparse.ArgumentParser:
         "--mask",
         dest="masks",
         action="append",
-        metavar="M.exr",
-        help="what counts, instead of the alpha; once for all targets, or once for each in order",
+        metavar="MASK",
+        help="picture of what counts, instead of the alpha or what differs from the template; once "
+        "for all targets, or once for each in order",
+    )
+    solve.add_argument("--layer", metavar="NAME", help="layer, part or view of an EXR to read")
+    _add_view_transform(solve)
+    solve.add_argument(
+        "--template",
+        metavar="DIR",
+        help="what was painted on, so that only what differs from it counts (default: the template "
+        "beside the painting, or ./template)",
+    )
+    solve.add_argument(
+        "--no-template",
+        dest="find_template",
+        action="store_false",
+        help="do not look for a template",
+    )
+    solve.add_argument(
+        "--paint",
+        choices=("look", "light"),
+        default="look",
+        help="what the brush puts down: the look of a surface, or the light that falls on it, "
+        "which is multiplied by what the surface reflects (default: %(default)s)",
     )
     solve.add_argument(
         "--unpainted",
@@ -139,13 +163,22 @@ def _parser() -> argparse.ArgumentParser:
         help="linear: come closest in light; display: in what the eye sees of it through --view, "
         "where dark parts count for more (default: %(default)s)",
     )
-    _add_view_transform(solve)
     solve.add_argument(
         "--method",
         choices=("polished", "gauss-seidel"),
         default="polished",
         help="gauss-seidel: the paper's iteration alone, which comes late to the optimum or runs "
         "out of sweeps, and says so (default: %(default)s)",
+    )
+    solve.add_argument(
+        "--suggest",
+        type=_at_least(1),
+        nargs="?",
+        const=3,
+        default=0,
+        metavar="N",
+        help="look for up to N (3) further point lights that would help most, with XML to paste; "
+        "takes some ten seconds",
     )
     _add_lights(solve)
     solve.add_argument(

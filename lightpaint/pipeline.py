@@ -19,6 +19,7 @@ from lightpaint.progress import Progress, silent
 from lightpaint.relight.export import EXPORTS, write_exports
 from lightpaint.relight.refine import refine_by_rendering
 from lightpaint.relight.relight import check_relightable, relight
+from lightpaint.relight.suggestion import Suggestion, check_suggestible, suggest_lights
 from lightpaint.relight.verify import verify
 from lightpaint.results import (
     ALWAYS,
@@ -44,7 +45,8 @@ from lightpaint.solve.solve import Solution, problem_of, solution_of
 from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
 from lightpaint.solve.views import joint_basis, joint_problem, parted
 from lightpaint.sources import without_holes
-from lightpaint.target.target import Target, read_target
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 from lightpaint.target.template import Template, write_look, write_template
 
 #: Rendering of what each light does alone, to recognise it by.
@@ -81,6 +83,10 @@ def paint_with_light(
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
     """
     asked = Settings(**settings)
+    if asked.suggest and scene is None:
+        raise LightpaintError(
+            "suggesting lights renders them in the scene: give it, and not only its basis"
+        )
     if asked.refine and scene is None:
         raise LightpaintError("refining renders the scene: give it, and not only its basis")
     if scene is None and basis is None:
@@ -126,11 +132,14 @@ def paint_views_with_light(
         if Path(name).name != name or name in ("..", ""):
             raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
     made = [None] * len(scenes) if bases is None else bases
+    asked = Settings(**settings)
+    if asked.suggest and len(scenes) > 1:
+        raise LightpaintError("lights are suggested for one view only: leave out the others")
     views = [
         PaintedView(scene, target, Path(folder) / name, basis)
         for scene, target, name, basis in zip(scenes, targets, names, made, strict=True)
     ]
-    return _paint(views, Path(folder), Settings(**settings), progress)
+    return _paint(views, Path(folder), asked, progress)
 
 
 @dataclass(frozen=True)
@@ -156,6 +165,8 @@ def _paint(
     constraints = all_constraints(scene, settings.constraints)
     if scene is not None:
         reduce_to(constraints, basis_lights(scene))  # names what cannot be had before it renders
+        if settings.suggest:
+            check_suggestible(scene)
     check_writable(folder)
     written = _to_be_written(views, folder)
     views = [_with_basis(view, settings, len(views), progress) for view in _fitted(views, settings)]
@@ -200,7 +211,8 @@ def _fitted_in(views: list[PaintedView], settings: Settings) -> View | None:
     """The one view through which all paintings are compared, None for linear light."""
     if settings.space == "linear":
         return None
-    return settings.view or View("srgb", choose_exposure(views[0].target.image))
+    given = settings.view or next((v.target.view for v in views if v.target.view), None)
+    return given or View("srgb", choose_exposure(views[0].target.image))
 
 
 def _to_be_written(views: list[PaintedView], folder: Path) -> list[Path]:
@@ -308,9 +320,25 @@ def _finished(
         uncertainty=uncertainty,
         diagnosis=diagnosis,
         ambiguities=alike,
+        suggestions=_suggested(view, solution, settings, progress),
     )
     show_look(look, view.folder, command=settings.command)
     return look
+
+
+def _suggested(
+    view: PaintedView, solution: Solution, settings: Settings, progress: Progress
+) -> tuple[Suggestion, ...] | None:
+    if not settings.suggest or view.scene is None:
+        return None
+    return suggest_lights(
+        view.scene,
+        _basis(view),
+        solution,
+        count=settings.suggest,
+        seed=settings.seed,
+        progress=progress,
+    )
 
 
 def _basis(view: PaintedView) -> Basis:

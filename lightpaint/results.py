@@ -12,6 +12,7 @@ from lightpaint.progress import Progress, silent
 from lightpaint.relight.comparison import write_comparison
 from lightpaint.relight.export import EXPORTS
 from lightpaint.relight.report import report_page
+from lightpaint.relight.suggestion import Suggestion
 from lightpaint.relight.verify import Verification, verify
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
@@ -53,7 +54,7 @@ class Look:
     relit and verification are None where there was only a saved basis and no scene.
     uncertainty: how sure the lights are, None where nothing is known of the noise; diagnosis:
     why the painting is not met; ambiguities: lights that it cannot tell apart, of several views
-    in none of them.
+    in none of them. suggestions: lights that would help most, None if they were not asked for.
     """
 
     target: Target
@@ -65,6 +66,7 @@ class Look:
     uncertainty: Uncertainty | None
     diagnosis: Diagnosis
     ambiguities: tuple[Ambiguity, ...] = ()
+    suggestions: tuple[Suggestion, ...] | None = None
 
     @property
     def lighting(self) -> Lighting:
@@ -111,6 +113,7 @@ def show_look(look: Look, folder: Path, *, command: str) -> None:
         command=command,
         uncertainty=look.uncertainty,
         diagnosis=look.diagnosis,
+        suggestions=look.suggestions,
     )
     write_text(folder / "report.html", page)
 

@@ -21,7 +21,7 @@ class Settings:
     method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
     resize: whether a target of another size is resampled.
     space: `linear`, or `display` to come closest in what a display shows, which is `view`; None
-    for sRGB at the exposure at which the painting is shown.
+    for that of the painting or, where it holds light, sRGB at an exposure that shows something.
 
     What is rendered:
     spp, seed: of the basis and, with other random numbers, of the verification.
@@ -38,6 +38,8 @@ class Settings:
     improve the answer by what that shows; needs a scene.
 
     What is said:
+    suggest: how many point lights that would help most are looked for at most; needs a scene, and
+    one view only.
     cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
     command: the shell command that asks for this, for the report.
     """
@@ -56,6 +58,7 @@ class Settings:
     use_cache: bool = True
     noise_correction: bool = False
     refine: int = 0
+    suggest: int = 0
     cd_per_unit: float | None = None
     command: str = ""
 

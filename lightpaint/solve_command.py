@@ -19,12 +19,15 @@ from lightpaint.pipeline import (
 )
 from lightpaint.relight.export import EXPORTS
 from lightpaint.relight.relight import check_relightable
+from lightpaint.relight.suggestion import check_suggestible
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.solve.constraints_file import read_constraints
 from lightpaint.solve.reduction import reduce_to
 from lightpaint.sources import light_group_source, read_source
-from lightpaint.target.target import Target, read_target
+from lightpaint.suggestion_table import show_suggestions
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
 
 
 def solve(options: Namespace, given: list[str]) -> int:
@@ -42,7 +45,14 @@ def solve(options: Namespace, given: list[str]) -> int:
         raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
     # Everything a user gave is looked at before the first sample is taken.
     masks = _one_for_each(options.masks or [None], paths)
-    targets = [read_target(t, mask=m) for t, m in zip(paths, masks, strict=True)]
+    how: dict[str, Any] = {
+        "layer": options.layer,
+        "view": view_of(options),
+        "template": options.template,
+        "find": options.find_template,
+        "paint": options.paint,
+    }
+    targets = [read_target(t, mask=m, **how) for t, m in zip(paths, masks, strict=True)]
     if options.views:
         return _solve_views(options, targets, given)
     return _solve_each(options, targets, groups, given)
@@ -67,12 +77,18 @@ def _solve_each(
     else:
         scene = on_film(load(options, path=source), options.quality, options.resolution)
         reduce_to(all_constraints(scene, constraints), basis_lights(scene))
+        if options.suggest:
+            check_suggestible(scene)
         size = scene.size
+    if scene is not None:
+        for target in targets:
+            _check_same_picture(target, scene)
     targets = [_fitted(target, size, options) for target in targets]
     for folder in folders:
         check_writable(folder)
         if scene is not None:
             check_relightable(scene, folder / "relit.xml")
+    _say_how_read(targets)
     for target, folder in zip(targets, folders, strict=True):
         if made is None and scene is not None:
             made = render_or_find(scene, options)
@@ -87,6 +103,8 @@ def _solve_each(
                 **_settings(options, given),
             )
         tables.show_look(look, folder)
+        if look.suggestions is not None:
+            show_suggestions(look.suggestions, cd_per_unit=options.cd_per_unit)
         if groups is not None:
             there = ", ".join(name for name in EXPORTS if (folder / name).is_file())
             console.write(f"for other programs: {there}")
@@ -99,6 +117,8 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
     """One lighting for the paintings of several views."""
     if options.sensor:
         raise TargetError("-s cannot be had with --target, which names the sensors: leave it out")
+    if options.suggest:
+        raise TargetError("--suggest is for one view only: solve for a single painting")
     if is_basis_file(Path(options.source)):
         raise BasisError("a basis has one view only: give the scene, to solve for several")
     scenes: list[Scene] = []
@@ -109,9 +129,12 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
     constraints = constraints_of(options)
     reduce_to(all_constraints(scenes[0], constraints), basis_lights(scenes[0]))
     folder = Path(options.output or targets[0].name)
+    for target, scene in zip(targets, scenes, strict=True):
+        _check_same_picture(target, scene)
     targets = [_fitted(t, s.size, options) for t, s in zip(targets, scenes, strict=True)]
     check_writable(folder)
     check_relightable(scenes[0], folder / "relit.xml")
+    _say_how_read(targets)
     share_s = None if options.time_s is None else options.time_s / len(scenes)
     made = [render_or_find(scene, options, time_s=share_s) for scene in scenes]
     with console.progress() as progress:
@@ -137,6 +160,7 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
         "method": options.method,
         "space": options.space,
         "view": view_of(options),
+        "suggest": options.suggest,
         "spp": options.spp,
         "time_s": options.time_s,
         "seed": options.seed,
@@ -148,11 +172,31 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     }
 
 
+def _say_how_read(targets: list[Target]) -> None:
+    for target in targets:
+        for note in target.notes:
+            console.say(f"{target.name}: {note}")
+        if target.not_finite:
+            console.say(
+                f"{target.name}: {target.not_finite} pixels hold NaN or Inf and count nothing"
+            )
+
+
+def _check_same_picture(target: Target, scene: Scene) -> None:
+    """Raise TargetError for a painting of another view; say so if the scene has changed since."""
+    sensor = scene.sensor_names[scene.sensor]
+    if target.sensor not in ("", sensor):
+        raise TargetError(
+            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
+            f"{sensor}: choose it with -s or --target {target.sensor}=..., or pass --no-template"
+        )
+    if target.content not in ("", scene.content):
+        console.say(f"{target.name}: the scene has changed since its template was made")
+
+
 def _fitted(target: Target, size: tuple[int, int], options: Namespace) -> Target:
     """`target` at the size of the basis. Says so where nobody has asked for another size."""
     fitted = target.fitted_to(size, resize=options.resize)
-    if target.not_finite:
-        console.say(f"{target.name}: {target.not_finite} pixels hold NaN or Inf and count nothing")
     if fitted.size != target.size and not (options.resize or options.resolution or options.quality):
         console.say(
             f"{target.name}: {target.size[1]}x{target.size[0]} pixels averaged to the basis's "
@@ -167,6 +211,7 @@ def _check_nothing_to_render(options: Namespace) -> None:
     asked |= {"--spp": options.spp, "--time": options.time_s}
     asked |= {"--quality": options.quality}
     asked |= {"--resolution": options.resolution, "--refine": options.refine}
+    asked |= {"--suggest": options.suggest}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
             f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"

@@ -95,6 +95,7 @@ def _check_nothing_to_render(source: GroupSource, options: Namespace) -> None:
         "--resolution": given.get("resolution"),
         "--seed": given.get("seed"),
         "--refine": given.get("refine"),
+        "--suggest": given.get("suggest"),
         "--correct-noise": given.get("noise_correction"),
         "--unit": given.get("cd_per_unit"),
     }

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from PIL import Image
 from renderer import LIGHTS, REPOSITORY, write_room
 
 from lightpaint import paint_with_light, read_basis
@@ -241,13 +242,53 @@ def test_template_is_the_current_look(tmp_path: Path) -> None:
 
 
 def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
-    succeed(tmp_path, "template", CORNELL, "--spp", 2)
-    painted = tmp_path / "template.exr"
-    painted.write_bytes(b"hours of work")
-    assert "may have been painted on" in refused(tmp_path, "template", CORNELL, "--spp", 2)
-    assert painted.read_bytes() == b"hours of work"
-    succeed(tmp_path, "template", CORNELL, "--spp", 2, "--force")
-    assert painted.read_bytes() != b"hours of work"
+    for output, file in (("t.exr", "t.exr"), ("t.exr", "t.png"), ("template", "template.png")):
+        command = ("template", CORNELL, "--spp", 2, "-o", output)
+        succeed(tmp_path, *command, "--force")
+        painted = (tmp_path / output).parent / file if "." in output else tmp_path / output / file
+        painted.write_bytes(b"hours of work")
+        assert "may have been painted on" in refused(tmp_path, *command)
+        assert painted.read_bytes() == b"hours of work"
+        succeed(tmp_path, *command, "--force")
+        assert painted.read_bytes() != b"hours of work"
+
+
+def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
+    said = succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 64)
+    assert "template/template.png" in said
+    folder = tmp_path / "template"
+    names = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()}
+    plain = {"template.exr", "template.png", "albedo.exr", "normals.exr", "depth.exr"}
+    assert plain | {"template.json"} <= names
+    assert {"lights/ceiling.png", "lights/lamp.png"} <= names
+    assert "mattes/floor.png" in names
+    with Image.open(folder / "template.png") as file:
+        pixels = np.array(file.convert("RGB"))
+    pixels[8:20, 8:20] = 250, 200, 120
+    # Whatever a program calls it, and whatever it forgets of the view.
+    Image.fromarray(pixels).save(folder / "warmer.png")
+    command = ("solve", CORNELL, "template/warmer.png", "--resolution", "1/4", "--spp", 16)
+    done = run(tmp_path, *command, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    # 12 x 12 of 32 x 32 pixels.
+    assert "warmer: 14.1 % painted: what differs from the template in template" in done.stderr
+    assert "nothing in" in refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    about = folder / "template.json"
+    other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
+    about.write_text(other, encoding="utf-8")
+    assert "a template of the sensor balcony, not of camera" in refused(tmp_path, *command)
+
+
+def test_a_template_that_is_forced_leaves_nothing_of_the_earlier_one(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    succeed(tmp_path, "template", room, "--spp", 2)
+    (tmp_path / "template" / "painting.png").write_bytes(b"mine")
+    room.write_text(room.read_text(encoding="utf-8").replace('id="ball"', 'id="globe"'))
+    succeed(tmp_path, "template", room, "--spp", 2, "--force")
+    mattes = {file.name for file in (tmp_path / "template" / "mattes").iterdir()}
+    assert "globe.png" in mattes
+    assert "ball.png" not in mattes
+    assert (tmp_path / "template" / "painting.png").read_bytes() == b"mine"
 
 
 def test_results_of_two_solves_never_stand_together(
@@ -354,7 +395,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         "bad/negative.exr": "not negative",
         "bad/nan.exr": "NaN or Inf in every pixel",
         "bad/cut.exr": "cut off",
-        "bad/text.exr": "is no OpenEXR file",
+        "bad/text.exr": "is no picture that can be read",
         "bad": "is a folder",
     }.items():
         assert words in refused(here, "solve", basis_file, target)
@@ -363,7 +404,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         here, "solve", basis_file, WARM, "-o", "bad/file"
     )
     assert "cannot write" in refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
-    assert "is not a basis" in refused(here, "solve", WARM, WARM)
+    assert "no layers named like" in refused(here, "solve", WARM, WARM)
     assert "no such scene" in refused(here, "solve", "gone.xml", WARM)
     assert "not a scene" in refused(here, "lights", "bad/text.exr")
     assert "is a folder" in refused(here, "lights", "bad")
@@ -567,7 +608,7 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
     assert "room.lights.toml is not TOML" in line
     assert "line 1" in line
     # What has no use for lights does not read it.
-    succeed(tmp_path, "template", room, "--spp", 2)
+    succeed(tmp_path, "template", room, "--spp", 2, "-o", "t.exr")
 
 
 @pytest.mark.parametrize(
@@ -615,7 +656,8 @@ def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     assert "basis: 2 passes" in run(tmp_path, "basis", CORNELL, "--spp", 2, "--seed", 8).stderr
     # A template that was made small is painted small.
     succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 4)
-    succeed(tmp_path, "solve", *arguments[1:2], "template.exr", *arguments[3:], "-o", "small")
+    small = ("solve", *arguments[1:2], "template/template.exr", "--no-template", *arguments[3:])
+    succeed(tmp_path, *small, "-o", "small")
 
 
 def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) -> None:

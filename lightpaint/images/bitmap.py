@@ -6,10 +6,11 @@ a Photoshop file without its merged picture) is refused here.
 """
 
 import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +19,17 @@ import OpenImageIO
 from lightpaint.errors import ImageError
 from lightpaint.images.icc import Profile, gamma_profile, read_icc, srgb_profile
 from lightpaint.images.primaries import REC709
+from lightpaint.images.silence import silenced
+from lightpaint.images.tiff import check_tiff
 
-#: Above this many pixels nothing is decoded: a picture takes up to 20 bytes of memory for each.
-MAX_PIXELS = 2**26
+#: Above this many pixels nothing is decoded: 8192x4096, for which decoding takes some 1 GB.
+MAX_PIXELS = 2**25
 
 #: Longest file that is opened, in bytes.
 MAX_FILE = 2**31
+
+#: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
+MAX_CHUNK = 2**24
 
 #: Text in a PNG that names the view it was shown through.
 VIEW_KEY = "lightpaint.view"
@@ -65,11 +71,15 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
         raise ImageError("is too long to be a picture")
     shown: str | None = None
     profile: Profile | None = None
+    transparency = True
     if kind == "png":
         shown, profile = _png_says(path)
     elif kind == "psd":
-        _check_psd(path)
-    spec, pixels = _decoded(path, kind)
+        transparency = _check_psd(path)
+    elif kind == "tiff":
+        check_tiff(path)
+    with silenced():
+        spec, pixels = _decoded(path, kind)
     if kind == "tiff":
         _check_tiff(spec)
     if kind == "jpeg" and spec.getattribute("jpeg:ColorSpace") == "CMYK":
@@ -79,12 +89,18 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
         profile = read_icc(np.asarray(icc, np.uint8).tobytes())
     pixels = _upright(pixels, int(spec.get_int_attribute("Orientation", 1)))
     alpha = _alpha(spec, pixels)
+    if alpha is not None and not transparency:
+        raise ImageError(
+            "has a channel beside its colours that is no transparency: delete it, or export a PNG"
+        )
     integer = np.issubdtype(pixels.dtype, np.integer)
     return Bitmap(
         kind,
         _rgb(spec, pixels),
         alpha,
-        premultiplied=kind == "tiff" and not spec.get_int_attribute("oiio:UnassociatedAlpha", 0),
+        premultiplied=alpha is not None
+        and kind == "tiff"
+        and not spec.get_int_attribute("oiio:UnassociatedAlpha", 0),
         codes=_largest(pixels.dtype) if integer else None,
         profile=profile,
         lossy=kind == "jpeg" or spec.get_int_attribute("tiff:Compression", 1) in (6, 7, 34887),
@@ -145,10 +161,15 @@ def _check_tiff(spec: Any) -> None:
     if colours not in TIFF_COLOURS:
         named = TIFF_OTHERS.get(colours, f"colours of kind {colours}")
         raise ImageError(f"holds {named}: convert it to RGB and export it again")
+    if (TIFF_COLOURS[colours] == "grey") != (spec.channelnames[0] == "Y"):
+        raise ImageError(f"is damaged: {spec.nchannels} channels of {TIFF_COLOURS[colours]}")
 
 
-def _check_psd(path: Path) -> None:
-    """Refuse Photoshop files of other colours, and those without the merged picture."""
+def _check_psd(path: Path) -> bool:
+    """Refuse Photoshop files of other colours, and those without the merged picture.
+
+    Returns whether a channel beside the colours is transparency, and not a saved selection.
+    """
     with path.open("rb") as file:
         head = file.read(26)
         if len(head) < 26:
@@ -161,13 +182,33 @@ def _check_psd(path: Path) -> None:
         if height * width > MAX_PIXELS:
             raise ImageError(f"declares {width}x{height} pixels: too many to read")
         file.seek(int.from_bytes(file.read(4), "big"), 1)
-        resources = file.read(min(int.from_bytes(file.read(4), "big"), 2**26))
+        length = int.from_bytes(file.read(4), "big")
+        resources = file.read(min(length, 2**26))
+        file.seek(length - len(resources), 1)
+        length = int.from_bytes(file.read(4), "big")
+        layers = file.read(min(length, 6))
+        file.seek(length - len(layers), 1)
+        _check_packed_rows(file, head)
     for ident, data in _resources(resources):
         # VersionInfo: a version, then whether the merged picture is there.
         if ident == 1057 and len(data) >= 5 and not data[4]:
             raise ImageError(
                 "has no merged picture: save it with maximised compatibility, or export a PNG"
             )
+    # The number of layers is negative then.
+    return len(layers) == 6 and layers[4] >= 0x80
+
+
+def _check_packed_rows(file: BinaryIO, head: bytes) -> None:
+    """Refuse rows that are too short for their pixels: the library leaves them out in silence."""
+    if file.read(2) != b"\0\1":
+        return
+    channels, height, width, depth = struct.unpack(">HIIH", head[12:24])
+    table = file.read(2 * channels * height)
+    lengths = np.frombuffer(table[: len(table) // 2 * 2], ">u2")
+    shortest = 2 * -(-width * depth // 8 // 128)
+    if lengths.size < channels * height or (lengths < shortest).any():
+        raise ImageError("is damaged: rows of its merged picture are missing")
 
 
 def _resources(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -209,15 +250,21 @@ def _png_says(path: Path) -> tuple[str | None, Profile | None]:
 
 
 def _png_chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Type and content of the chunks before the pixels, of which only ours of the texts."""
+    """Type and content of the chunks before the pixels, of which only ours of the texts.
+
+    Raises ImageError where a checksum is wrong: the library would do without that chunk.
+    """
     with path.open("rb") as file:
         file.seek(8)
         while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
             length = int.from_bytes(head[:4], "big")
-            content = file.read(length) if length <= 4096 else b""
+            if length > MAX_CHUNK:
+                raise ImageError("is damaged: a part of its head is too long")
+            content, checksum = file.read(length), file.read(4)
+            if zlib.crc32(content, zlib.crc32(head[4:])) != int.from_bytes(checksum, "big"):
+                raise ImageError("is damaged: a checksum is wrong")
             if head[4:] != b"tEXt" or content.startswith(VIEW_KEY.encode() + b"\0"):
                 yield head[4:], content
-            file.seek(length - len(content) + 4, 1)
 
 
 def _of_cicp(content: bytes) -> Profile | None:

@@ -5,14 +5,7 @@ reference library lets pass silently (a cut-off file, missing parts, deep pixels
 ImageError here.
 """
 
-import errno
-import fcntl
-import io
-import os
-import sys
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,13 +16,17 @@ import OpenEXR
 
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing
+from lightpaint.images.silence import silenced
 
 Floats = npt.NDArray[np.floating[Any]]
 
 #: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
 #: is refused before any is decoded. Pictures compress to less only where they are empty.
-MAX_BYTES = 2**30
+MAX_BYTES = 2**29
 MAX_COMPRESSION = 64
+
+#: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … on each side.
+CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 0.002128)
 
 #: How other files begin that people take for paintings.
 MAGICS = {
@@ -99,7 +96,7 @@ class Part:
 
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
     """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
-    with _silenced():
+    with silenced():
         try:
             headers = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
             size, _ = _windows(headers[0])
@@ -134,7 +131,7 @@ def read_parts(path: Path) -> list[Part]:
     """
     path = Path(path)
     _check_is_exr(path)
-    with _silenced():
+    with silenced():
         try:
             header = OpenEXR.File(str(path), header_only=True)
         except Exception as error:
@@ -182,16 +179,27 @@ def _part(path: Path, part: Any) -> Part:
 
 
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:
-    """A channel stored for every so-manieth pixel, linearly between those and constant beyond."""
+    """A channel stored for every so-manieth pixel, at all of them.
+
+    Of every other pixel, as chroma is stored, by the filter that OpenEXR reads it with; else
+    linearly. Beyond the last it is constant.
+    """
     result = pixels.astype(np.float32)
     for axis, (length, step) in enumerate(zip(size, sampling, strict=True)):
-        last = result.shape[axis] - 1
+        result = np.moveaxis(result, axis, 0)
+        last = len(result) - 1
         at = np.minimum(np.arange(length) / step, last)
         below = at.astype(int)
-        share = (at - below).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
-        above = np.minimum(below + 1, last)
-        low, high = result.take(below, axis), result.take(above, axis)
-        result = low * (1 - share) + high * share
+        share = (at - below).astype(np.float32)[:, None]
+        between = np.zeros_like(result[below])
+        for k, weight in enumerate(CHROMA_FILTER if step == 2 else (0.5,)):
+            left, right = np.maximum(below - k, 0), np.minimum(below + 1 + k, last)
+            between += np.float32(weight) * (result[left] + result[right])
+        if step == 2:
+            result = np.where(share > 0, between, result[below])
+        else:
+            result = result[below] * (1 - share) + result[np.minimum(below + 1, last)] * share
+        result = np.moveaxis(result, 0, axis)
     return result
 
 
@@ -272,51 +280,3 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
 def _first_line(error: BaseException) -> str:
     text = str(error).strip()
     return text.splitlines()[0] if text else type(error).__name__
-
-
-#: The descriptors belong to the whole process: two threads would put back each other's.
-_silencing = threading.Lock()
-
-
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Keep what the C++ library prints about damaged files off the user's terminal.
-
-    It writes to the process's own descriptors and, by way of Python, to `sys.stdout`, which
-    is another place in a notebook. The same news comes as an ImageError. A descriptor that
-    the process was started without stays closed.
-    """
-    with _silencing:
-        _flush_standard_streams()
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        saved = [(fd, _copy_if_open(fd)) for fd in (1, 2) if fd != nowhere]
-        try:
-            for fd, _ in saved:
-                os.dup2(nowhere, fd)
-            with redirect_stdout(io.StringIO()):
-                yield
-        finally:
-            _flush_standard_streams()
-            for fd, copy in saved:
-                if copy is None:
-                    os.close(fd)
-                else:
-                    os.dup2(copy, fd)
-                    os.close(copy)
-            os.close(nowhere)
-
-
-def _flush_standard_streams() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # which is how Python shows that it is closed
-            stream.flush()
-
-
-def _copy_if_open(fd: int) -> int | None:
-    try:
-        # Above the standard ones, of which another may be closed and would be taken for it.
-        return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 3)
-    except OSError as error:
-        if error.errno != errno.EBADF:
-            raise
-        return None

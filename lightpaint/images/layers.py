@@ -29,7 +29,7 @@ class Layer:
     prefix: str
 
     def rgb(self) -> Floats:
-        """(h, w, 3) float32, linear Rec.709. See `linear_rgb`."""
+        """(h, w, 3) float32, linear Rec.709, a copy. See `linear_rgb`."""
         return linear_rgb(self.part, self.prefix)
 
     def channel(self, *names: str) -> npt.NDArray[np.float32] | None:
@@ -50,8 +50,9 @@ def linear_rgb(part: Part, layer: str = "") -> Floats:
     primaries = part.primaries
     for names in RGB_NAMES:
         if all(_joined(layer, name) in part.channels for name in names):
-            planes = [part.channels[_joined(layer, name)] for name in names]
-            image = np.stack(planes, axis=-1).astype(np.float32, copy=False)
+            image = np.empty((*part.size, 3), np.float32)
+            for k, name in enumerate(names):
+                image[..., k] = part.channels[_joined(layer, name)]
             return image if is_rec709(primaries) else converted(image, _matrix(part))
     luminance = part.channels.get(_joined(layer, "Y"))
     if luminance is None:

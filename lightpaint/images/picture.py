@@ -1,5 +1,6 @@
 """A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
 
+import struct
 import tempfile
 import zipfile
 import zlib
@@ -11,10 +12,9 @@ import numpy.typing as npt
 
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.display import encode_display
-from lightpaint.images.exr import Floats, read_parts
+from lightpaint.images.exr import Floats, Part, read_parts
 from lightpaint.images.layers import Layer, choose_layer
-from lightpaint.images.primaries import converted
+from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
 from lightpaint.images.view import View
 
 Mask = npt.NDArray[np.bool_]
@@ -49,11 +49,20 @@ MERGED = "mergedimage.png"
 #: Longest merged picture that is unpacked, in bytes.
 MAX_MERGED = 2**30
 
+#: What reading a damaged archive raises: its places and lengths may be any numbers.
+DAMAGES = (
+    zipfile.BadZipFile,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    ValueError,
+    OverflowError,
+    struct.error,
+    zlib.error,
+)
+
 #: JPEG's rounding keeps white within so many codes of the top.
 JPEG_WHITE = 2
-
-#: Pixels that are converted at once.
-STRIP = 2**18
 
 
 @dataclass(frozen=True)
@@ -210,8 +219,9 @@ def _bitmap(path: Path, kind: str) -> Bitmap:
             return replace(read_bitmap(merged, "png"), kind=kind)
     except KeyError:
         raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
-        raise ImageError(f"is damaged: {error}") from error
+    except DAMAGES as error:
+        # The archive's own names stand in the message, and may be anything.
+        raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
 
 
 def _copy(source: object, target: object, length: int) -> None:
@@ -236,20 +246,26 @@ def _of_layer(layer: Layer) -> Picture:
                 "there is colour where alpha is 0: if it is not premultiplied, as OpenEXR "
                 "prescribes, edges of strokes are read too bright",
             )
-        image = _unpremultiplied(image, alpha)
+        unpremultiply(image, alpha)
     is_half = any(c.dtype == np.float16 for c in stored_part.channels.values())
-    ones = replace(stored_part, channels={"Y": np.ones(stored_part.size, np.bool_)})
-    finite = np.asarray(np.isfinite(image).all(axis=-1))
     return Picture(
         kind="exr",
-        image=np.where(finite[..., None], image, np.float32(0)),
-        finite=finite,
+        image=image,
+        finite=_only_finite(image),
         alpha=alpha,
         weight=weight,
-        stored=ones.in_display_window().channels["Y"],
+        stored=_stored(stored_part),
         mantissa=11 if is_half else 24,
         notes=notes,
     )
+
+
+def _stored(part: Part) -> Mask | None:
+    """Where in its display window a part has pixels; None if everywhere."""
+    if part.display in (None, part.size) and part.offset == (0, 0):
+        return None
+    ones = replace(part, channels={"Y": np.ones(part.size, np.bool_)})
+    return ones.in_display_window().channels["Y"]
 
 
 def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
@@ -260,21 +276,18 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
     if bitmap.kind == "psd" and alpha is not None:
         alpha, notes = _without_partial(alpha)
     if bitmap.codes is None:
-        image = _light_of_floats(bitmap, alpha)
+        image = light_of_floats(bitmap, alpha)
         saturated, used = None, None
     else:
-        used = view or _view_of(bitmap)
-        image = _decoded(bitmap, alpha, used)
+        used = view or view_of(bitmap)
+        image = light_of_integers(bitmap, alpha, used)
         top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
         saturated = bitmap.values >= top
-    finite = np.asarray(np.isfinite(image).all(axis=-1))
-    if not finite.all():
-        image = np.where(finite[..., None], image, np.float32(0))
     floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
     return Picture(
         kind=bitmap.kind,
         image=image,
-        finite=finite,
+        finite=_only_finite(image),
         alpha=alpha,
         saturated=saturated,
         view=used,
@@ -301,62 +314,6 @@ def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
     return np.where(partial, np.float32(0), alpha), (note,)
 
 
-def _view_of(bitmap: Bitmap) -> View:
-    if bitmap.shown is None:
-        return View()
-    name, _, stops = bitmap.shown.rpartition(" ")
-    try:
-        return View(name, float(stops))
-    except ValueError:
-        raise ImageError(f"says that it was shown through {bitmap.shown!r}, no view") from None
-
-
-def _light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
-    image = bitmap.values.astype(np.float32)
-    if bitmap.profile is not None:
-        if not bitmap.profile.is_linear:
-            raise ImageError(
-                f"holds floats of the profile {bitmap.profile.name!r}, which is not linear: "
-                "convert it to linear light and export it again"
-            )
-        image = converted(image, bitmap.profile.matrix)
-    if alpha is not None and bitmap.premultiplied:
-        image = _unpremultiplied(image, alpha)
-    return image
-
-
-def _decoded(bitmap: Bitmap, alpha: Floats | None, view: View) -> Floats:
-    """Linear Rec.709 of the integers, strip by strip."""
-    assert bitmap.codes is not None
-    profile = bitmap.profile
-    if profile is not None and profile.is_srgb:
-        profile = None
-    image = np.empty(bitmap.values.shape, np.float32)
-    rows = max(1, STRIP // bitmap.values.shape[1])
-    for top in range(0, len(image), rows):
-        strip = slice(top, top + rows)
-        display = bitmap.values[strip] / np.float32(bitmap.codes)
-        if bitmap.premultiplied and alpha is not None:
-            display = np.clip(_unpremultiplied(display, alpha[strip]), 0, 1)
-        if profile is None:
-            image[strip] = view.decode(display)
-            continue
-        curved = [curve(display[..., k]) for k, curve in enumerate(profile.curves)]
-        shown = converted(np.stack(curved, axis=-1), profile.matrix)
-        image[strip] = _through(view, shown, is_linear=profile.is_linear, name=profile.name)
-    return image
-
-
-def _through(view: View, shown: Floats, *, is_linear: bool, name: str) -> Floats:
-    """Scene light of what a display is to show, in linear Rec.709."""
-    scale = np.float32(2.0**view.stops)
-    if view.name == "srgb" or (view.name == "linear" and is_linear):
-        return shown / scale  # Beyond Rec.709 as well, for which display values have no room.
-    if view.name == "linear":
-        raise ImageError(f"has the colour profile {name!r}, but its numbers are said to be linear")
-    return view.decode(encode_display(shown))
-
-
 def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
     scale = np.float32(bitmap.codes or 1)
     mask = bitmap.values.max(axis=-1) / scale
@@ -365,17 +322,18 @@ def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
     return np.asarray(mask, np.float32)
 
 
-def _unpremultiplied(image: Floats, alpha: Floats) -> Floats:
-    safe = np.where(alpha > 0, alpha, 1)
-    # Over next to no alpha a colour may become infinite, and is then counted as such.
-    with np.errstate(over="ignore", invalid="ignore"):
-        return image / safe[..., None]
+def _only_finite(image: Floats) -> Mask:
+    """Where all channels are finite; elsewhere the image is made 0, in place."""
+    finite = np.asarray(np.isfinite(image).all(axis=-1))
+    if not finite.all():
+        image[~finite] = 0
+    return finite
 
 
 def _looks_straight(image: Floats, alpha: Floats) -> bool:
     """Whether most of what is transparent has a colour, which premultiplied light rarely has."""
     clear = alpha == 0
-    return bool(clear.any() and (image[clear] != 0).any(axis=-1).mean() > 0.5)
+    return bool((image.any(axis=-1) & clear).sum() > clear.sum() / 2)
 
 
 def _naming(path: Path, error: ImageError) -> str:

@@ -66,15 +66,10 @@ def is_rec709(primaries: Sequence[float] | None) -> bool:
 
 
 def converted(image: Floats, matrix: Floats) -> Floats:
-    """Each pixel of (h, w, 3) by a (3, 3) matrix, as float32, in strips to save memory."""
-    result = np.empty(image.shape, np.float32)
-    rows = max(1, 2**20 // max(image.shape[1], 1))
+    """Each pixel of (h, w, 3) by a (3, 3) matrix, as float32."""
     # NaN and Inf are found, and counted, afterwards.
     with np.errstate(invalid="ignore", over="ignore"):
-        for top in range(0, image.shape[0], rows):
-            strip = image[top : top + rows]
-            result[top : top + rows] = np.einsum("hwc,dc->hwd", strip.astype(np.float64), matrix)
-    return result
+        return np.asarray(image.astype(np.float32, copy=False) @ matrix.T.astype(np.float32))
 
 
 def _listed(xy: Floats) -> str:

@@ -95,6 +95,12 @@ class View:
         """Linear light of the grey at which the display is white: it shows nothing brighter."""
         return _transform(self.name).white / float(2.0**self.stops)
 
+    @property
+    def is_per_channel(self) -> bool:
+        """Whether each display value depends on its own channel alone, by the same curve."""
+        transform = _transform(self.name)
+        return isinstance(transform, _Curve) and transform.matrix is None
+
     def encode(self, image: Floats) -> Floats:
         """Display values in [0, 1] of a linear Rec.709 image (..., 3)."""
         return _transform(self.name).encode(image * 2.0**self.stops)

@@ -5,6 +5,7 @@ report_tables.py. Pictures are data: URIs; nothing is loaded from anywhere, and 
 content policy forbids it.
 """
 
+from collections.abc import Sequence
 from html import escape
 from importlib import resources
 from string import Template
@@ -17,6 +18,7 @@ from lightpaint.relight.pictures import exposure_of, spoken_stops, target_pictur
 from lightpaint.relight.report_constraints import constraints_section
 from lightpaint.relight.report_diagnosis import missed_section, sure_section
 from lightpaint.relight.report_pictures import Picture, maps, wipe
+from lightpaint.relight.report_suggestion import suggestion_section
 from lightpaint.relight.report_tables import (
     amounts_heading,
     fit_table,
@@ -25,6 +27,7 @@ from lightpaint.relight.report_tables import (
     verification_table,
     versions,
 )
+from lightpaint.relight.suggestion import Suggestion
 from lightpaint.relight.verdict import verdict
 from lightpaint.relight.verify import Verification
 from lightpaint.solve.diagnosis import Diagnosis
@@ -44,12 +47,13 @@ def report_page(
     command: str,
     uncertainty: Uncertainty | None = None,
     diagnosis: Diagnosis | None = None,
+    suggestions: Sequence[Suggestion] | None = None,
 ) -> str:
     """The page as HTML text.
 
     verification: None where nothing was rendered to check the prediction.
     command: the shell command that made the result.
-    uncertainty, diagnosis: without them the page has no section on what they tell.
+    uncertainty, diagnosis, suggestions: without them the page has no section on what they tell.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -70,6 +74,9 @@ def report_page(
         maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
         missed=missed_section(solution, diagnosis, current, stops=stops)
         + constraints_section(basis, solution, stops=stops),
+        suggestions=suggestion_section(
+            suggestions, stops=stops, cd_per_unit=solution.lighting.cd_per_unit
+        ),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
         amounts=amounts_heading(solution),

@@ -5,12 +5,14 @@ adjusted comes last, as one light that is fixed.
 """
 
 import difflib
+import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.emitters import AS_AUTHORED, MULTIPLE, RGB, EmissionKind, Scaling
+from lightpaint.images.photometry import point_flux
+from lightpaint.scene.emitters import AS_AUTHORED, MULTIPLE, PLUGINS, RGB, EmissionKind, Scaling
 
 #: Name of the fixed light, with underscores added should another have it.
 REST = "rest"
@@ -51,6 +53,30 @@ class Emitter:
         with them on which other lights are on.
         """
         return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
+
+
+def point_emitter(name: str, node: int, position: tuple[float, float, float]) -> Emitter:
+    """A point light of intensity 1 that stands in no file."""
+    parameter, unit = PLUGINS["point"]
+    x, y, z = position
+    return Emitter(
+        name=name,
+        plugin="point",
+        kind=EmissionKind(Scaling.COLOUR, parameter, unit),
+        emission=AS_AUTHORED,
+        form=f"at ({x:.2f}, {y:.2f}, {z:.2f})",
+        sampling_weight=1.0,
+        node=node,
+        file=0,
+        offset=-1,
+        unit_flux=point_flux(),
+    )
+
+
+def free_names(stem: str, count: int, taken: Collection[str]) -> list[str]:
+    """`stem_1`, `stem_2` … without those that are taken."""
+    numbered = (f"{stem}_{k}" for k in itertools.count(1))
+    return list(itertools.islice((name for name in numbered if name not in taken), count))
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,16 @@ import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
 from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
+
+#: A place in units of the scene.
+Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -171,6 +175,34 @@ class ParsedScene:
             props["film"] = view.film()
         with self._resolving(), mitsuba_errors(self.path):
             return mi.parser.instantiate(self.config, state)
+
+    def lit_by_points(
+        self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
+    ) -> "ParsedScene":
+        """This scene with point lights of intensity 1 added, and the settings `dark` made.
+
+        positions: by the names of the new lights, which no other has. The nodes of these come
+        last, in that order.
+        """
+        import mitsuba as mi
+
+        other = copy(self)
+        other.state = mi.parser.ParserState(self.state)
+        for node, setting in dark.items():
+            other._apply(other.state, node, setting)
+        other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
+        for name, position in positions.items():
+            node = mi.parser.SceneNode()
+            node.type = mi.ObjectType.Emitter
+            node.props = mi.Properties("point")
+            node.props["position"] = mi.ScalarPoint3f(*position)
+            node.props["intensity"] = mi.ScalarColor3f(1)
+            other.state.nodes.append(node)
+            k = len(other.state.nodes) - 1
+            other.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
+            other.emitter_nodes.append(k)
+            other.names[k] = name
+        return other
 
     def _apply(self, state: Any, node: int, setting: EmitterSetting) -> None:
         import mitsuba as mi

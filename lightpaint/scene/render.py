@@ -31,6 +31,7 @@ class Stream(IntEnum):
     REFINEMENT = 5
     VIEW = 6
     SURFACES = 7
+    CANDIDATES = 8
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:

@@ -25,9 +25,17 @@ from lightpaint.scene.emitters import (
     read_emission,
     why_not_adjusted,
 )
-from lightpaint.scene.lights import Emitter, Light, choose_lights, lights_of
+from lightpaint.scene.lights import (
+    REST,
+    Emitter,
+    Light,
+    choose_lights,
+    free_names,
+    lights_of,
+    point_emitter,
+)
 from lightpaint.scene.lights_file import LightsFile, lights_file_beside, read_lights_file
-from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, View
+from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, Position, View
 from lightpaint.scene.resolution import reduced, reduction
 from lightpaint.scene.variant import use_variant
 
@@ -131,6 +139,33 @@ class Scene:
     def eye(self, loaded: Any) -> Any:
         """Where that sensor stands, as an `mi.Point3f`."""
         return self.camera(loaded).world_transform().translation()
+
+    def lit_by_points(self, positions: Sequence[Position]) -> "Scene":
+        """This scene under point lights alone, one at each of `positions`, in their order.
+
+        Its own emitters stay where they are, black: what blocks or reflects light still does.
+        They are the last light, which is fixed.
+        """
+        names = free_names("candidate", len(positions), [x.name for x in self.emitters])
+        dark = {x.node: EmitterSetting(x.kind, (0.0, 0.0, 0.0), 0.0) for x in self.emitters}
+        parsed = self._parsed.lit_by_points(dark, dict(zip(names, positions, strict=True)))
+        points = tuple(
+            point_emitter(name, node, position)
+            for name, node, position in zip(
+                names, parsed.emitter_nodes[-len(names) :], positions, strict=True
+            )
+        )
+        members = {name: [name] for name in names}
+        members |= {free_names(REST, 1, members)[0]: [x.name for x in self.emitters]}
+        lit_by = hashlib.sha256(repr((self.content, positions)).encode()).hexdigest()[:32]
+        emitters = (*self.emitters, *points)
+        return replace(
+            self,
+            emitters=emitters,
+            lights=lights_of(emitters, members, fixed=[*members][-1:]),
+            content=lit_by,
+            _parsed=parsed,
+        )
 
     @property
     def originals(self) -> tuple[Path, ...]:

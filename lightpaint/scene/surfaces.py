@@ -26,9 +26,9 @@ class Surfaces:
 
     albedo: (h, w, 3) float32 in [0, 1], share of light that is reflected diffusely, as the
     materials say it. normal: (h, w, 3), shading normal in world space, of unit length; 0 where
-    there is nothing. depth: (h, w), distance from the camera in scene units, of the nearest
-    sample; NOTHING where there is none. coverage: by name of shape, (h, w) in [0, 1], how much
-    of the pixel it fills. Shapes out of sight are left out.
+    there is nothing. depth: (h, w), distance from the camera along its axis in scene units, of
+    the nearest sample; NOTHING where there is none. coverage: by name of shape, (h, w) in
+    [0, 1], how much of the pixel it fills. Shapes out of sight are left out.
     """
 
     albedo: Floats
@@ -44,7 +44,7 @@ def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent)
     loaded = scene.load()
     try:
         integrator = mi.load_dict(
-            {"type": "aov", "aovs": "a:albedo,n:sh_normal,d:depth,i:shape_index"}
+            {"type": "aov", "aovs": "a:albedo,n:sh_normal,p:position,i:shape_index"}
         )
         samples = []
         with interruptible_between_pieces() as let_interrupts_through:
@@ -59,21 +59,28 @@ def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent)
                 samples.append(np.array(image))
                 progress("surfaces", k + 1, SAMPLES)
                 let_interrupts_through()
-        return _averaged(np.stack(samples), _names_by_index(loaded))
+        to_world = np.array(scene.camera(loaded).world_transform().matrix).reshape(4, 4)
+        return _averaged(np.stack(samples), np.linalg.inv(to_world), _names_by_index(loaded))
     finally:
         del loaded
         gc.collect()
 
 
-def _averaged(samples: npt.NDArray[np.float32], names: Mapping[int, str]) -> Surfaces:
-    """samples: (k, h, w, 8): albedo, normal, depth, index of shape, 0 where there is none."""
-    indices = samples[..., 7].astype(np.int64)
+def _averaged(
+    samples: npt.NDArray[np.float32], to_camera: Floats, names: Mapping[int, str]
+) -> Surfaces:
+    """samples: (k, h, w, 10): albedo, normal, position, index of shape, 0 where there is none.
+
+    to_camera: (4, 4), world to camera, which looks along +z.
+    """
+    indices = samples[..., 9].astype(np.int64)
     there = indices > 0
     # Of materials whose reflection is no share, as of metals, the number has no bound.
     albedo = np.clip(samples[..., :3], 0, 1) * there[..., None]
     normal = (samples[..., 3:6] * there[..., None]).sum(axis=0)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    depth = np.where(there, samples[..., 6], NOTHING).min(axis=0)
+    along = samples[..., 6:9] @ to_camera[2, :3] + to_camera[2, 3]
+    depth = np.where(there, along, NOTHING).min(axis=0)
     coverage: dict[str, Floats] = {}
     for index in np.unique(indices[there]).tolist():
         name = names.get(index, f"shape {index}")

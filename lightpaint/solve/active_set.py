@@ -4,12 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lightpaint.solve.clipped_newton import RIDGE
 from lightpaint.solve.quadratic import EPSILON, Bools, Doubles, Quadratic
-
-#: Times √n, added to the unit diagonal of M, so that no set of lights, coincident ones
-#: included, is singular. A step then is that of the proximal-point method: repeated, it loses
-#: nothing.
-RIDGE = 8 * EPSILON
 
 
 @dataclass
@@ -89,7 +85,8 @@ def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> D
     if f == 0:
         return move
     matrix = np.zeros((f + k, f + k))
-    matrix[:f, :f] = q.M[free[:, None], free]
+    # Rows, then columns: many times faster than the two at once.
+    matrix[:f, :f] = q.M[free][:, free]
     matrix.flat[: f * (f + k) : f + k + 1] += RIDGE * np.sqrt(f)
     rest = np.zeros(f + k)
     rest[:f] = -gradient[free]

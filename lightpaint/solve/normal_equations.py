@@ -4,6 +4,7 @@ The objective is ‖Ψ − Σ w_i Φ_i‖² under ⟨f, g⟩ = Σ_pixels D f g, 
 channel. All sums run in float64 over float32 pixels.
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,16 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.exr import Floats
+from lightpaint.solve.threads import one_thread
 from lightpaint.target.target import Target
 
 Doubles = npt.NDArray[np.float64]
 
 #: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
 BLOCK = 2**13
+
+#: Lights up to which the product of a block is too small for BLAS to share it out to threads.
+FEW_LIGHTS = 256
 
 
 @dataclass(frozen=True)
@@ -88,21 +93,22 @@ def inner_products(
     colours = target.reshape(-1, 3)
     gram = np.zeros((3, n + 1, n + 1))
     room = np.empty((n + 1, min(BLOCK, counted.size)))
-    for start in range(0, counted.size, BLOCK):
-        pixels = counted[start : start + BLOCK]
-        first, last = int(pixels[0]), int(pixels[-1])
-        # Pixels in one run are looked at where they are; others have to be gathered.
-        in_one_run = last - first + 1 == pixels.size
-        where = slice(first, last + 1) if in_one_run else pixels
-        lit, painted = rows[:, where], colours[where]
-        root = np.sqrt(weights[where].astype(np.float64))
-        # (n + 1, block): the target goes along as one more row.
-        block = room[:, : pixels.size]
-        for c in range(3):
-            its = root[:, c * apart]
-            np.multiply(lit[..., c], its, out=block[:n])
-            np.multiply(painted[:, c], its, out=block[n])
-            gram[c] += block @ block.T
+    with one_thread() if n <= FEW_LIGHTS else nullcontext():
+        for start in range(0, counted.size, BLOCK):
+            pixels = counted[start : start + BLOCK]
+            first, last = int(pixels[0]), int(pixels[-1])
+            # Pixels in one run are looked at where they are; others have to be gathered.
+            in_one_run = last - first + 1 == pixels.size
+            where = slice(first, last + 1) if in_one_run else pixels
+            lit, painted = rows[:, where], colours[where]
+            root = np.sqrt(weights[where].astype(np.float64))
+            # (n + 1, block): the target goes along as one more row.
+            block = room[:, : pixels.size]
+            for c in range(3):
+                its = root[:, c * apart]
+                np.multiply(lit[..., c], its, out=block[:n])
+                np.multiply(painted[:, c], its, out=block[n])
+                gram[c] += block @ block.T
     return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.solve.active_set import polish
+from lightpaint.solve.clipped_newton import clipped_newton
 from lightpaint.solve.gauss_seidel import sweep
 from lightpaint.solve.quadratic import Cap, Doubles, Quadratic, scaled
 from lightpaint.solve.threads import one_thread
@@ -99,9 +100,21 @@ def minimise(
 def _polished(
     q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int
 ) -> tuple[Doubles, int, int]:
-    """(x, sweeps, steps): the polish from the start; sweeps before each further try."""
+    """(x, sweeps, steps): Newton's clipped steps, or else the polish with sweeps between tries."""
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
+    if residual > tolerance and max_sweeps > 0 and not q.groups:
+        trial, left, steps = clipped_newton(
+            q.M[None],
+            q.b[None],
+            q.lower[None],
+            q.upper[None],
+            x[None],
+            np.array([q.size]),
+            tolerance=tolerance,
+        )
+        if left[0] <= tolerance:
+            return trial[0], 0, steps
     count = 0
     while residual > tolerance and sweeps < max_sweeps:
         gradient = q.gradient(x)

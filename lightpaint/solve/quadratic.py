@@ -137,12 +137,17 @@ def kkt_residual(
     It is 0 exactly if the gradient vanishes for every unknown between its bounds, is not
     negative at lower and not positive at upper ones. All scaled to a unit diagonal of M.
     """
-    if x.size == 0:
-        return 0.0
-    step = np.minimum(np.maximum(x - gradient, lower), upper) - x
+    return float(np.abs(kkt_step(gradient, x, lower, upper)).max(initial=0) / size)
+
+
+def kkt_step(
+    gradient: Doubles, x: Doubles, lower: Doubles | float, upper: Doubles | float
+) -> Doubles:
+    """x − P(x − gradient), up to its sign; of the shape of x."""
+    target = x - gradient
+    inside = (target > lower) & (target < upper)
     # x − (x − gradient) would lose what is small beside x.
-    inside = (x - gradient > lower) & (x - gradient < upper)
-    return float(np.abs(np.where(inside, gradient, step)).max() / size)
+    return np.where(inside, gradient, np.minimum(np.maximum(target, lower), upper) - x)
 
 
 def scaled(

@@ -1,14 +1,22 @@
 """The non-negative least-squares solve of all channels: one problem each, or one for three."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from lightpaint.solve.clipped_newton import clipped_newton
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
-from lightpaint.solve.optimum import Method, minimise
-from lightpaint.solve.quadratic import UNREACHED
+from lightpaint.solve.optimum import Method, Optimum, minimise
+from lightpaint.solve.quadratic import UNREACHED, Bools
+from lightpaint.solve.threads import one_thread, side_by_side
+
+#: Lights up to which the channels are solved in the same calls; beyond, each on a thread.
+FEW = 64
+
+#: (light, channels it moves together) of each unknown weight.
+_Unknowns = list[tuple[int, list[int]]]
 
 
 @dataclass(frozen=True)
@@ -53,39 +61,104 @@ def solve_normal_equations(
     weights = np.array(start, dtype=np.float64)
     power = np.einsum("cii->ic", equations.M)
     lit = power > UNREACHED * power.max(initial=0)  # (n, 3)
-    residuals, sweeps, needed = np.zeros(3), [0, 0, 0], tolerance
-    for channels in ([0, 1, 2],) if any(is_scalar) else ([0], [1], [2]):
-        problem = _unknowns(lit, channels, is_scalar)
-        M, b = _assemble(equations, problem)
-        begin = np.array([weights[i, cs[0]] for i, cs in problem])
-        best = minimise(
-            M, b, start=begin, method=method, tolerance=tolerance, max_sweeps=max_sweeps
-        )
-        for (i, cs), value in zip(problem, best.x, strict=True):
-            weights[i, cs] = value
-        for c in channels:
-            residuals[c], sweeps[c] = best.kkt_residual, best.sweeps
+    best_of = partial(minimise, method=method, tolerance=tolerance, max_sweeps=max_sweeps)
+    residuals = np.zeros(3)
+    if any(is_scalar):
+        best = _coupled(equations, weights, lit, is_scalar, best_of)
+        found = dict.fromkeys(range(3), best)
+    else:
+        left, few = [0, 1, 2], len(lit) <= FEW
+        if few and method == "polished" and max_sweeps > 0:
+            weights, residuals, is_solved = _at_once(equations, weights, lit, tolerance)
+            left = np.flatnonzero(~is_solved).tolist()
+        found = _apart(equations, weights, lit, left, best_of, in_threads=not few)
+    sweeps, needed = [0, 0, 0], tolerance
+    for c, best in found.items():
+        residuals[c], sweeps[c] = best.kkt_residual, best.sweeps
         needed = max(needed, best.tolerance)
     reached = tuple(lit.any(axis=1).tolist())
     return SolverResult(weights, residuals, (sweeps[0], sweeps[1], sweeps[2]), reached, needed)
 
 
-def _unknowns(
-    lit: npt.NDArray[np.bool_], channels: list[int], is_scalar: Sequence[bool]
-) -> list[tuple[int, list[int]]]:
+def _apart(
+    equations: NormalEquations,
+    weights: Doubles,
+    lit: Bools,
+    channels: list[int],
+    best_of: Callable[..., Optimum],
+    *,
+    in_threads: bool,
+) -> dict[int, Optimum]:
+    """The optimum of each of these channels, written into the weights (n, 3)."""
+
+    def solve(c: int) -> Optimum:
+        lights = np.flatnonzero(lit[:, c])
+        M, b = equations.M[c], equations.b[c]
+        if lights.size < b.size:
+            M, b = M[np.ix_(lights, lights)], b[lights]
+        best = best_of(M, b, start=weights[lights, c])
+        weights[lights, c] = best.x
+        return best
+
+    found = side_by_side(solve, channels) if in_threads else map(solve, channels)
+    return dict(zip(channels, found, strict=True))
+
+
+def _coupled(
+    equations: NormalEquations,
+    weights: Doubles,
+    lit: Bools,
+    is_scalar: Sequence[bool],
+    best_of: Callable[..., Optimum],
+) -> Optimum:
+    """The optimum of the three channels as one problem, written into the weights (n, 3)."""
+    unknowns = _unknowns(lit, is_scalar)
+    M, b = _assemble(equations, unknowns)
+    best = best_of(M, b, start=np.array([weights[i, cs[0]] for i, cs in unknowns]))
+    for (i, cs), value in zip(unknowns, best.x, strict=True):
+        weights[i, cs] = value
+    return best
+
+
+def _at_once(
+    equations: NormalEquations, start: Doubles, lit: Bools, tolerance: float
+) -> tuple[Doubles, Doubles, Bools]:
+    """(weights, KKT residuals, which channels that solved); the other channels as at the start."""
+    weights = start.copy()
+    # What reaches nothing is left out: the others then have the bits that they have without it.
+    reached = np.flatnonzero(lit.any(axis=1))
+    M, b = equations.M, equations.b
+    if reached.size < len(lit):
+        M, b = np.ascontiguousarray(M[:, reached][:, :, reached]), b[:, reached]
+    # A channel in which nothing asks for light has an answer that takes no steps.
+    asks = np.any((b > 0) & lit[reached].T, axis=1)
+    if not (asks.any() and np.isfinite(M).all() and np.isfinite(b).all()):
+        return weights, np.zeros(3), np.zeros(3, bool)
+    counts = lit[reached].T & asks[:, None]
+    root = np.sqrt(np.where(counts, np.einsum("cii->ci", M), 1))
+    scale = np.where(counts, 1 / root, 0)
+    M, b = (M * scale[:, :, None]) * scale[:, None, :], b * scale
+    size = np.where(asks, np.abs(b).max(axis=1), 1)
+    begin = np.where(counts, np.maximum(start[reached].T, 0) * root, 0)
+    with one_thread():
+        x, residuals, _ = clipped_newton(M, b, 0.0, np.inf, begin, size, tolerance=tolerance)
+    is_solved = asks & (residuals <= tolerance)
+    weights[reached] = np.where(counts & is_solved[:, None], x * scale, start[reached].T).T
+    return weights, residuals, is_solved
+
+
+def _unknowns(lit: Bools, is_scalar: Sequence[bool]) -> _Unknowns:
     """(light, channels it moves together) of each unknown weight."""
-    unknowns: list[tuple[int, list[int]]] = []
-    for i in range(len(lit)):
-        if is_scalar and is_scalar[i]:
-            unknowns += [(i, channels)] if lit[i].any() else []
+    unknowns: _Unknowns = []
+    for i, in_channel in enumerate(lit.tolist()):
+        if is_scalar[i]:
+            unknowns += [(i, [0, 1, 2])] if any(in_channel) else []
         else:
-            unknowns += [(i, [c]) for c in channels if lit[i, c]]
+            unknowns += [(i, [c]) for c in range(3) if in_channel[c]]
     return unknowns
 
 
-def _assemble(
-    equations: NormalEquations, unknowns: list[tuple[int, list[int]]]
-) -> tuple[Doubles, Doubles]:
+def _assemble(equations: NormalEquations, unknowns: _Unknowns) -> tuple[Doubles, Doubles]:
     """M and b in the unknowns: those of the channels, summed where one weight serves several."""
     size = len(unknowns)
     M, b = np.zeros((size, size)), np.zeros(size)

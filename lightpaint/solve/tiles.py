@@ -6,19 +6,28 @@ subtracted, so that nothing drifts: undoing a stroke gives back the very same bi
 updated problem is bit for bit the one built from scratch.
 """
 
+from functools import partial
+from itertools import pairwise, product
+
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import SizeError
 from lightpaint.images.exr import Floats
-from lightpaint.solve.normal_equations import NormalEquations
-from lightpaint.solve.threads import one_thread
+from lightpaint.solve.normal_equations import Doubles, NormalEquations
+from lightpaint.solve.threads import one_thread, side_by_side
 
-#: Pixels along the side of a tile.
-SIDE = 32
+#: Pixels along the side of a tile. Smaller ones fit a brush better and are more to add.
+SIDE = 16
 
 #: Bytes that the sums of all tiles may take; tiles are larger if they would take more.
-ROOM = 2**28
+ROOM = 2**29
+
+#: Bytes of pixels, in float64, that are summed at a time: they stay in the processor's cache.
+CHUNK = 2**21
+
+#: Lights up to which a tile takes the time of the calls and not of the arithmetic.
+FEW_LIGHTS = 32
 
 
 class TiledEquations:
@@ -27,9 +36,9 @@ class TiledEquations:
     images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), >= 0. The images are not
     copied, target and importance are.
 
-    The sums of the tiles are the leaves of a binary tree whose nodes are the sums of their
-    two children: a dirty tile costs its own sum and one addition per level, and the order of
-    summation does not depend on what has been painted when.
+    The sums of the tiles are the base of a pyramid, each of whose nodes is the sum of two by
+    two below it: a dirty tile costs its own sum and three additions per level, and the order
+    of summation does not depend on what has been painted when.
     """
 
     def __init__(
@@ -45,19 +54,18 @@ class TiledEquations:
         self._target = np.array(target)
         self._importance = np.array(importance)
         self.side = side_for(n, height, width) if side is None else side
-        self._rows, self._columns = -(-height // self.side), -(-width // self.side)
-        self._leaves = 1 << max(self._rows * self._columns - 1, 0).bit_length()
-        # Node 1 is the root. What a stroke of colour leaves as it is, M, is kept apart from what
-        # it changes, b and ‖Ψ‖².
-        self._M = np.zeros((2 * self._leaves, 3, n, n))
-        self._b = np.zeros((2 * self._leaves, 3, n + 1))
+        # What a stroke of colour leaves as it is, M, is kept apart from what it changes, b and
+        # ‖Ψ‖².
+        shape = -(-height // self.side), -(-width // self.side)
+        self._M = _pyramid(shape, (3, n, n))
+        self._b = _pyramid(shape, (3, n + 1))
         self._update((slice(0, height), slice(0, width)), with_M=True)
 
     @property
     def equations(self) -> NormalEquations:
         """M, b and ‖Ψ‖² as they are now."""
-        b = self._b[1]
-        return NormalEquations(self._M[1].copy(), b[:, :-1].copy(), b[:, -1].copy())
+        M, b = self._M[-1][0, 0], self._b[-1][0, 0]
+        return NormalEquations(M.copy(), b[:, :-1].copy(), b[:, -1].copy())
 
     def update(
         self,
@@ -83,45 +91,90 @@ class TiledEquations:
     def _update(self, region: tuple[slice, slice], *, with_M: bool) -> None:
         rows = _tiles(region[0], self._importance.shape[0], self.side)
         columns = _tiles(region[1], self._importance.shape[1], self.side)
-        dirty = np.array(
-            sorted(self._leaves + r * self._columns + c for r in rows for c in columns), int
-        )
-        with one_thread():
-            for node in dirty.tolist():
-                self._sum(node, with_M)
-        while dirty.size and dirty[0] > 1:
-            dirty = np.unique(dirty // 2)
-            for sums in (self._M, self._b) if with_M else (self._b,):
-                for node in dirty.tolist():
-                    np.add(sums[2 * node], sums[2 * node + 1], out=sums[node])
-
-    def _sum(self, node: int, with_M: bool) -> None:
-        """Σ D f g over one tile: of images and target, and of all pairs of images."""
-        row, column = divmod(node - self._leaves, self._columns)
-        top, left = row * self.side, column * self.side
-        where = slice(top, top + self.side), slice(left, left + self.side)
-        weights = self._importance[where].ravel()
-        counted = np.flatnonzero(weights)
-        if counted.size == 0:
-            self._M[node], self._b[node] = 0, 0
+        if not (rows and columns):
             return
-        n = len(self._images)
-        D = weights[counted].astype(np.float64)
-        lit = self._images[(slice(None), *where)].reshape(n, -1, 3)
-        painted = self._target[where].reshape(-1, 3)
-        if counted.size < weights.size:
-            # Pixels without weight are not read: they may hold anything.
-            lit, painted = lit[:, counted], painted[counted]
-        colours = painted.T.astype(np.float64)
-        weighted = colours * D
-        root = np.sqrt(D)
-        for c in range(3):
-            block = lit[..., c].astype(np.float64)
-            self._b[node, c, :n] = block @ weighted[c]
-            self._b[node, c, n] = colours[c] @ weighted[c]
-            if with_M:
-                block *= root
-                np.matmul(block, block.T, out=self._M[node, c])
+        few = max(CHUNK // (8 * 3 * (len(self._images) + 1) * self.side**2), 1)
+        wide = min(few, len(columns))
+        blocks = product(_parts(rows, few // wide), _parts(columns, wide))
+        sum_block = partial(self._sum, with_M=with_M)
+        if with_M and len(self._images) > FEW_LIGHTS:
+            side_by_side(sum_block, blocks)
+        else:
+            with one_thread():
+                for block in blocks:
+                    sum_block(block)
+        for pyramid in (self._M, self._b) if with_M else (self._b,):
+            _add_up(pyramid, rows, columns)
+
+    def _sum(self, block: tuple[range, range], *, with_M: bool) -> None:
+        """Σ D f g over each of a block of tiles: of images and target, and of pairs of images."""
+        n, side = len(self._images), self.side
+        tiles = len(block[0]), len(block[1])
+        rows, columns = (slice(part.start, part.stop) for part in block)
+        where = (
+            slice(rows.start * side, rows.stop * side),
+            slice(columns.start * side, columns.stop * side),
+        )
+        # The target goes along as one more image.
+        D = np.empty((*tiles, 1, side * side))
+        pixels = np.empty((*tiles, 3, n + 1, side * side))
+        _cut(self._importance[where][None, ..., None], side, out=D[:, :, :, None])
+        _cut(self._images[(slice(None), *where)], side, out=pixels[:, :, :, :n])
+        _cut(self._target[where][None], side, out=pixels[:, :, :, n:])
+        if not D.all():
+            # Pixels without weight may hold anything.
+            np.copyto(pixels, 0, where=(D == 0)[:, :, :, None])
+        painted = pixels[:, :, :, n] * D
+        self._b[0][rows, columns] = np.matmul(pixels, painted[..., None])[..., 0]
+        if with_M:
+            lit = pixels[:, :, :, :n]
+            lit *= np.sqrt(D)[:, :, :, None]
+            # Of one array and itself numpy forms half of the product, of two all of it, which is
+            # faster for few lights.
+            other = lit.copy() if n <= FEW_LIGHTS else lit
+            np.matmul(lit, other.swapaxes(-1, -2), out=self._M[0][rows, columns])
+
+
+def _parts(whole: range, size: int) -> list[range]:
+    """Ranges of `size`, the last one shorter, that make up the whole."""
+    starts = range(whole.start, whole.stop, size)
+    return [range(first, min(first + size, whole.stop)) for first in starts]
+
+
+def _cut(pictures: Floats, side: int, out: Doubles) -> None:
+    """Cut a block of tiles apart: (n, h, w, channels) into (rows, columns, channels, n, side²).
+
+    Tiles that the border of the picture cuts off are 0 beyond it.
+    """
+    n, height, width, channels = pictures.shape
+    rows, columns = out.shape[:2]
+    if (height, width) != (rows * side, columns * side):
+        part = pictures
+        pictures = np.zeros((n, rows * side, columns * side, channels), part.dtype)
+        pictures[:, :height, :width] = part
+    apart = pictures.reshape(n, rows, side, columns, side, channels).transpose(1, 3, 5, 0, 2, 4)
+    out.reshape(rows, columns, channels, n, side, side)[...] = apart
+
+
+def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:
+    """Zeros for rows and columns of nodes, for each two by two of these, and so on up to one."""
+    rows, columns = shape
+    levels = []
+    while rows * columns > 1:
+        # Of every node there are both pairs, if only of zeros.
+        levels.append(np.zeros((rows + rows % 2, columns + columns % 2, *node)))
+        rows, columns = -(-rows // 2), -(-columns // 2)
+    return [*levels, np.zeros((1, 1, *node))]
+
+
+def _add_up(pyramid: list[Doubles], rows: range, columns: range) -> None:
+    """Form anew all that stands on these nodes of the base."""
+    top, bottom, left, right = rows.start, rows.stop, columns.start, columns.stop
+    for below, above in pairwise(pyramid):
+        top, bottom, left, right = top // 2, -(-bottom // 2), left // 2, -(-right // 2)
+        four = below[2 * top : 2 * bottom, 2 * left : 2 * right]
+        two = four[0::2] + four[1::2]
+        np.add(two[:, 0::2], two[:, 1::2], out=above[top:bottom, left:right])
 
 
 def side_for(n: int, height: int, width: int) -> int:

@@ -5,34 +5,40 @@ that differs by more is paint. Faint paint counts for less, so that a soft brush
 importance.
 """
 
+import io
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
+from PIL import Image, JpegImagePlugin
 
 from lightpaint.errors import SizeError
+from lightpaint.images.display import to_8_bit
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.exr import Floats
 from lightpaint.images.picture import Picture
 from lightpaint.target.template import Template
 
-#: Difference at which paint counts fully, of the display's range or, in linear light, of the
-#: brighter of both.
-FULL = 0.04
+#: Difference at which paint counts fully: of the display's range; and, about the same for the eye,
+#: of the brighter of two linear values.
+FULL, FULL_OF_LIGHT = 0.04, 0.09
 
 #: Codes by which programs differ in rounding: half a code each, and dithering.
 ROUNDING = 1.6
 
-#: Pixels on either side over which what a lossy compression did to single ones averages out, and
-#: what is left of it then.
+#: Pixels on either side over which what compressors do differently to single ones averages out,
+#: and what is left of it then.
 LOSSY_RADIUS, LOSSY = 4, 2.5 / 255
 
 #: Light below this share of display white is compared as if it were that: deep shadows are noise.
 DARK = 0.002
 
 
-def painted_where(picture: Picture, template: Template) -> npt.NDArray[np.float32]:
+def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
     """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
 
-    Raises SizeError if they differ in size.
+    path: the file of the picture, which says how it was compressed. Raises SizeError if the two
+    differ in size.
     """
     if picture.size != template.size:
         raise SizeError(
@@ -40,13 +46,12 @@ def painted_where(picture: Picture, template: Template) -> npt.NDArray[np.float3
             f"{template.size[1]}x{template.size[0]}: export it at that size, or say by alpha or "
             "--mask what was painted"
         )
-    difference, tolerance = (
-        _difference_of_light(picture, template)
-        if picture.codes is None
-        else _difference_of_codes(picture, template)
-    )
+    if picture.codes is None:
+        (difference, tolerance), full = _difference_of_light(picture, template), FULL_OF_LIGHT
+    else:
+        (difference, tolerance), full = _difference_of_codes(path, picture, template), FULL
     # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.
-    share = np.clip((difference - tolerance) / (FULL - tolerance), 0, 1)
+    share = np.clip((difference - tolerance) / (full - tolerance), 0, 1)
     return _without_pinholes((share * share * (3 - 2 * share)).astype(np.float32))
 
 
@@ -62,21 +67,37 @@ def _difference_of_light(picture: Picture, template: Template) -> tuple[Floats, 
         size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), dark)
         relative = np.max(np.abs(picture.image - look) / size, axis=-1)
         found.append((relative, allowed))
-    return min(found, key=lambda pair: float(np.median(np.minimum(pair[0], FULL))))
+    return min(found, key=lambda pair: float(np.median(np.minimum(pair[0], FULL_OF_LIGHT))))
 
 
-def _difference_of_codes(picture: Picture, template: Template) -> tuple[Floats, float]:
+def _difference_of_codes(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
     """Difference of display values, largest of the channels, and what rounding makes."""
     assert picture.codes is not None
     view = picture.view or template.view
     mine, its = view.encode(picture.image), view.encode(template.image)
-    difference = np.asarray(mine - its, np.float64)
     if picture.lossy:
-        smooth = box_mean(difference, LOSSY_RADIUS)
+        smooth = box_mean(np.asarray(mine - _compressed_like(path, its), np.float64), LOSSY_RADIUS)
         return np.abs(smooth).max(axis=-1), LOSSY
+    difference = np.asarray(mine - its, np.float64)
     codes = 255 if _is_8_bit(mine) else picture.codes
     # Some programs reckon in 15 bits when they say 16.
     return np.abs(difference).max(axis=-1), ROUNDING / min(codes, 2**15)
+
+
+def _compressed_like(path: Path, display: Floats) -> Floats:
+    """`display` after the compression that the JPEG at `path` has gone through."""
+    eight = Image.fromarray(to_8_bit(display))
+    with Image.open(path) as file:
+        tables = getattr(file, "quantization", None)
+        if file.format != "JPEG" or not tables:
+            return display
+        sampling = JpegImagePlugin.get_sampling(file)
+    buffer = io.BytesIO()
+    try:
+        eight.save(buffer, "JPEG", qtables=list(tables.values()), subsampling=sampling)
+    except (OSError, ValueError):
+        return display  # tables that this encoder does not take
+    return np.asarray(Image.open(buffer), np.float32) / 255
 
 
 def _is_8_bit(display: Floats) -> bool:

@@ -1,7 +1,6 @@
 """A painting as the solve sees it: linear pixels and how much each of them counts."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +9,6 @@ from PIL import Image
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_any, block_mean, whole_factor
 from lightpaint.images.exr import Floats
-from lightpaint.images.picture import read_mask, read_picture
 from lightpaint.images.view import View
 
 
@@ -24,6 +22,9 @@ class Target:
     not_finite: number of pixels with NaN or Inf, which have no importance.
     at_least: (h, w, 3) bool, where the painting was at the top of what its file can say, so that
         this or anything brighter was meant; None if it can say everything.
+    notes: what a person should know of how it was read, a sentence each.
+    content, sensor: of the scene and view that it was painted on, where a template says.
+    view: what its numbers were encoded by, in the file; None where they were light.
     """
 
     name: str
@@ -32,6 +33,10 @@ class Target:
     everything: bool
     not_finite: int = 0
     at_least: npt.NDArray[np.bool_] | None = None
+    notes: tuple[str, ...] = ()
+    content: str = ""
+    sensor: str = ""
+    view: View | None = None
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
@@ -133,47 +138,6 @@ class Target:
                 f"{width}x{height}: crop it to that shape, --resize does not stretch"
             )
         return self.resized(size)
-
-
-def read_target(
-    path: str | Path,
-    *,
-    mask: str | Path | None = None,
-    layer: str | None = None,
-    view: View | None = None,
-) -> Target:
-    """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
-
-    What counts is, in this order: `mask`; an EXR's W channel; alpha; without any of them, every
-    pixel alike. Where alpha is 0 no colour was painted, and a mask does not make one.
-
-    layer: which layer, part or view of an EXR. view: what 8 and 16 bits were encoded by (see
-    `read_picture`). Raises ImageError for files that cannot be read, TargetError for what
-    cannot be solved for, SizeError if target and mask differ in size.
-    """
-    path = Path(path)
-    picture = read_picture(path, layer=layer, view=view)
-    importance = picture.alpha if picture.weight is None else picture.weight
-    if mask is not None:
-        importance = read_mask(mask)
-        if importance.shape != picture.size:
-            raise SizeError(
-                f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
-                f"is {picture.size[1]}x{picture.size[0]}: export both at one size"
-            )
-        if picture.alpha is not None and picture.weight is None:
-            importance = np.where(picture.alpha > 0, importance, np.float32(0))
-    # Pixels that the file does not store were not painted.
-    stored = np.ones(picture.size, bool) if picture.stored is None else picture.stored
-    weights = stored if importance is None else importance
-    return Target(
-        name=path.stem,
-        image=picture.image,
-        importance=np.where(picture.finite, weights, 0).astype(np.float32),
-        everything=importance is None,
-        not_finite=int(picture.finite.size - picture.finite.sum()),
-        at_least=picture.saturated,
-    )
 
 
 def _overlap(old: int, new: int) -> Floats:

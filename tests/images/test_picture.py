@@ -471,6 +471,15 @@ def test_no_file(tmp_path: Path):
         read_picture(tmp_path)
 
 
+def test_libraries_keep_quiet(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    content = bytearray(png(_pixels()))
+    content[16:20] = b"\xff" * 4
+    content[29:33] = struct.pack(">I", zlib.crc32(content[12:29]))
+    with pytest.raises(ImageError):
+        _read(tmp_path, bytes(content))
+    assert capfd.readouterr() == ("", "")
+
+
 def test_layers_are_of_exr_files(tmp_path: Path):
     with pytest.raises(ImageError, match="has no layers to choose 'a' from"):
         _read(tmp_path, png(_pixels()), layer="a")

@@ -13,6 +13,7 @@ from picture_files import luminance_chroma
 from lightpaint.errors import ImageError
 from lightpaint.images.picture import Picture, read_picture
 
+DATA = Path(__file__).parent / "data"
 SIZE = (9, 7)
 
 
@@ -138,12 +139,23 @@ def test_luminance_and_chroma(tmp_path: Path):
 
 
 def test_chroma_between_its_samples(tmp_path: Path):
-    """It lies on every other pixel, and halfway between on the others."""
+    """It lies on every other pixel, and between those on the others."""
     ramp = np.linspace(-0.3, 0.3, 5)[None].repeat(4, axis=0)
-    picture = _chroma(tmp_path, np.ones((8, 10)), ramp, 0 * ramp)
-    expected = 1 + np.interp(np.arange(10), np.arange(0, 10, 2), ramp[0])
-    np.testing.assert_allclose(picture.image[..., 0], expected[None].repeat(8, axis=0), atol=3e-4)
-    np.testing.assert_allclose(picture.image[..., 2], 1, atol=1e-6)
+    image = _chroma(tmp_path, np.ones((8, 10)), ramp, 0 * ramp).image
+    # Rounded to half.
+    np.testing.assert_allclose(image[:, ::2, 0], 1 + ramp[:1].repeat(8, axis=0), atol=3e-4)
+    assert (np.diff(image[..., 0])[:, :-1] > 0).all()
+    np.testing.assert_allclose(image[..., 2], 1, atol=1e-6)
+
+
+def test_the_librarys_own_reader_agrees_on_chroma():
+    """Both files are the C++ library's (RgbaOutputFile, WRITE_YC; RgbaInputFile)."""
+    mine = read_picture(DATA / "luminance_chroma.exr").image
+    theirs = read_picture(DATA / "luminance_chroma_as_rgb.exr").image
+    # The library computes in half. In the last row and column, past the last chroma, it pads
+    # otherwise.
+    np.testing.assert_allclose(mine[:-1, :-1], theirs[:-1, :-1], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(mine, theirs, rtol=0, atol=2e-2)
 
 
 def test_xyz_is_not_adapted(tmp_path: Path):

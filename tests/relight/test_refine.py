@@ -12,7 +12,9 @@ from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.solve.solve import solve
 from lightpaint.solve.uncertainty import correct_noise, error_bars
 
-SEEDS = 12
+SEEDS = 40
+#: A refinement renders the scene once more, so fewer of them.
+REFINED = 12
 
 
 @pytest.fixture(scope="module")
@@ -27,9 +29,11 @@ def target(scene: lp.Scene) -> lp.Target:
 
 
 def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.Target):
-    """In 85 % of all lights, channels and seeds or more; what improves the answer, does.
+    """The 95 % intervals, in 85 to 99 % of all lights, channels and seeds; and what improves does.
 
-    Of 40 seeds it is 92 % (docs/method.md); with twelve, one bad seed is 8 %.
+    The fifteen intervals of a seed err together. From one seed to another their share varies by
+    11 points, so that over forty it is known to two: 93.5 ± 1.7 % as solved, 96.0 ± 1.2 %
+    corrected. What is refined holds the answer rather too often (99.0 ± 0.5 % over forty).
     """
     many = lp.render_basis(scene, spp=4096, seed=999)
     best = solve(many, target)
@@ -40,17 +44,23 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
         basis = lp.render_basis(scene, spp=16, seed=seed)
         plain = solve(basis, target)
         found = {"plain": plain, "corrected": correct_noise(basis, plain)}
-        found["refined"] = refine_by_rendering([(scene, basis)], basis, plain, rounds=1, seed=seed)
+        if seed < REFINED:
+            found["refined"] = refine_by_rendering(
+                [(scene, basis)], basis, plain, rounds=1, seed=seed
+            )
         for name, solution in found.items():
             low, high = error_bars(basis, solution).interval
             inside = (low <= truth + 1e-12) & (truth <= high + 1e-12)
             held.setdefault(name, []).append(float(inside.mean()))
             w = solution.lighting.weights_for(basis)
             objective.setdefault(name, []).append(float(best.equations.objective(w).sum()))
-    for name, shares in held.items():
-        assert np.mean(shares) >= 0.85, name
+    for name in ("plain", "corrected"):
+        assert len(held[name]) == SEEDS
+        assert 0.85 <= np.mean(held[name]) <= 0.99, name
+    assert np.mean(held["refined"]) >= 0.85
     least = sum(best.quality.objective)
-    excess = {name: np.mean(values) - least for name, values in objective.items()}
+    # Of the same seeds.
+    excess = {name: np.mean(values[:REFINED]) - least for name, values in objective.items()}
     assert excess["refined"] < 0.9 * excess["plain"]
     assert excess["corrected"] < 0.9 * excess["plain"]
 

@@ -10,7 +10,7 @@ from lightpaint.basis.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import block_mean, enlarged, whole_factor
 from lightpaint.scene.parsed import View
-from lightpaint.scene.quality import PRESETS, with_quality
+from lightpaint.scene.quality import PRESETS, on_film, samples
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.resolution import reduced, reduction, reductions
 from lightpaint.scene.scene import load_scene
@@ -64,13 +64,14 @@ def test_presets_take_the_smallest_reduction_that_is_small_enough(tmp_path: Path
     assert preview.reduction(View(0, (1366, 768), (1366, 768), (0, 0))) == 2
     assert final.reduction(FULL_HD) == 1
     scene = load_scene(write_room(tmp_path), parameters={"width": 4000})
-    assert with_quality(scene, None) == (scene, None)
-    small, spp = with_quality(scene, "preview")
-    assert (small.size, spp) == ((10, 2000), 64)
+    assert on_film(scene, None, None) is scene
+    assert samples(None, spp=None, time_s=None) is None
+    assert on_film(scene, "preview", None).size == (10, 2000)
+    assert samples("preview", spp=None, time_s=None) == 64
     # What is given goes before the preset.
-    small, spp = with_quality(scene, "preview", resolution="1/4", spp=3)
-    assert (small.size, spp) == ((5, 1000), 3)
-    assert with_quality(scene, "preview", time_s=1.0)[1] is None
+    assert on_film(scene, "preview", "1/4").size == (5, 1000)
+    assert samples("preview", spp=3, time_s=None) == 3
+    assert samples("preview", spp=None, time_s=1.0) is None
 
 
 @pytest.mark.parametrize("cropped", [False, True])

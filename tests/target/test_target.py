@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.display import choose_exposure, encode_display
+from lightpaint.images.display import encode_display
 from lightpaint.images.exr import read_parts
 from lightpaint.images.view import View
-from lightpaint.target.target import Target, read_target
-from lightpaint.target.template import write_template
+from lightpaint.target.read import read_target
+from lightpaint.target.target import Target
+from lightpaint.target.template import write_look
 
 # Resampling runs in float32.
 PRECISION = 1e-6
@@ -158,26 +159,27 @@ def test_resampling_keeps_everything_else():
 
 def test_template(tmp_path: Any):
     image = np.random.default_rng(0).random((4, 5, 3)).astype(np.float32)
-    picture = write_template(tmp_path / "a.template.exr", image)
+    picture = write_look(tmp_path / "a.template.exr", image, View("srgb"))
     assert picture == tmp_path / "a.template.png"
     np.testing.assert_array_equal(read_parts(tmp_path / "a.template.exr")[0].rgb(), image)
     from PIL import Image
 
     with Image.open(picture) as png:
-        # Rounding to 8 bits.
-        np.testing.assert_allclose(np.asarray(png) / 255, encode_display(image), atol=0.5001 / 255)
+        # Pillow reads the upper 8 of the 16 bits.
+        np.testing.assert_allclose(np.asarray(png) / 255, encode_display(image), atol=1.001 / 255)
 
 
-@pytest.mark.parametrize("view", [None, View("agx", 1.5), View("filmic", -0.25)])
-def test_a_painted_template_is_read_through_its_own_view(tmp_path: Any, view: View | None):
+@pytest.mark.parametrize(
+    "view", [View("srgb", 1.0), View("agx", 1.5), View("filmic", -0.25), View("linear")]
+)
+def test_a_painted_template_is_read_through_its_own_view(tmp_path: Any, view: View):
     image = np.exp2(np.random.default_rng(0).uniform(-4, 2, (9, 7, 1))) * [[[0.8, 0.9, 1]]] / 64
-    picture = write_template(tmp_path / "a.template.exr", image, view=view)
+    picture = write_look(tmp_path / "a.template.exr", image, view)
     target = read_target(picture)
-    shown = (view or View("srgb", choose_exposure(image))).encode(image)
-    np.testing.assert_array_equal(target.at_least, shown >= 254.5 / 255)
-    # What 8 bits round away in display values, at the curves' slopes.
-    again = (view or View("srgb", choose_exposure(image))).encode(target.image)
-    np.testing.assert_allclose(again, shown, atol=0.5001 / 255)
+    shown = view.encode(image)
+    np.testing.assert_array_equal(target.at_least, shown >= 65534.5 / 65535)
+    # What 16 bits round away in display values.
+    np.testing.assert_allclose(view.encode(target.image), shown, atol=0.51 / 65535)
 
 
 def test_at_least_follows_resampling():

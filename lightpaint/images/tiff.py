@@ -1,0 +1,110 @@
+"""Whether the numbers in a TIFF's head agree with each other and with the file.
+
+The library fills what is missing by rules of its own, in silence: a head that has lost a field, or
+names fewer strips than the picture needs, would be read as another picture.
+"""
+
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+from lightpaint.errors import ImageError
+
+#: Fields of a directory (TIFF 6.0, section 8), and types of their values: format and size.
+WIDTH, HEIGHT, BITS, COMPRESSION, SAMPLES, PLANAR = 256, 257, 258, 259, 277, 284
+STRIPS = (273, 279)  # offsets, lengths
+TILES = (324, 325)
+ROWS_PER_STRIP, TILE_WIDTH, TILE_HEIGHT = 278, 322, 323
+TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 16: ("Q", 8)}
+
+#: More values than a field of these has in any picture that is read.
+MAX_COUNT = 2**22
+
+Fields = dict[int, tuple[int, ...]]
+
+
+def check_tiff(path: Path) -> None:
+    """Raise ImageError unless the first picture of a TIFF is all there, as its head says."""
+    size = path.stat().st_size
+    try:
+        with path.open("rb") as file:
+            fields = _first_directory(file)
+    except (struct.error, ValueError, OverflowError, OSError):
+        # Too short, or a place that no file has.
+        raise ImageError("is cut off or damaged") from None
+    if not {WIDTH, HEIGHT, BITS} <= fields.keys():
+        raise ImageError("is damaged: its head does not give width, height and bits")
+    width, height = _one(fields, WIDTH), _one(fields, HEIGHT)
+    samples, planar = _one(fields, SAMPLES, 1), _one(fields, PLANAR, 1)
+    bits = fields[BITS]
+    if len(set(bits)) != 1 or len(bits) not in (1, samples):
+        raise ImageError(f"has {len(bits)} depths for {samples} channels: expected one for all")
+    if bits[0] not in ((8, 16, 32) if samples > 1 else (1, 2, 4, 8, 16, 32)):
+        raise ImageError(f"has {bits[0]} bits: export it with 8 or 16")
+    _check_chunks(fields, (height, width), samples, planar, bits[0], size)
+
+
+def _check_chunks(
+    fields: Fields, image: tuple[int, int], samples: int, planar: int, bits: int, size: int
+) -> None:
+    """All strips or tiles are there, within the file, and as long as their pixels need."""
+    height, width = image
+    if TILE_WIDTH in fields:
+        chunk = _one(fields, TILE_HEIGHT), _one(fields, TILE_WIDTH)
+        names = TILES if TILES[0] in fields else STRIPS
+    else:
+        chunk = min(_one(fields, ROWS_PER_STRIP, height), height), width
+        names = STRIPS
+    if min(*chunk, width, height, samples) < 1 or planar not in (1, 2):
+        raise ImageError("is damaged: its head makes no sense")
+    count = -(-height // chunk[0]) * -(-width // chunk[1]) * (samples if planar == 2 else 1)
+    offsets, lengths = (fields.get(name, ()) for name in names)
+    if not len(offsets) == len(lengths) == count:
+        raise ImageError(
+            f"is damaged: it needs {count} strips or tiles, and names {len(offsets)} places and "
+            f"{len(lengths)} lengths"
+        )
+    if any(start + length > size for start, length in zip(offsets, lengths, strict=True)):
+        raise ImageError("is cut off")
+    if _one(fields, COMPRESSION, 1) != 1:
+        return
+    row = -(-chunk[1] * bits * (samples if planar == 1 else 1) // 8)
+    for k, length in enumerate(lengths):
+        rows = chunk[0]
+        if names == STRIPS:
+            strips = -(-height // chunk[0])
+            rows = min(rows, height - k % strips * chunk[0])
+        if length < rows * row:
+            raise ImageError("is damaged: a strip or tile is too short for its pixels")
+
+
+def _one(fields: Fields, name: int, default: int = 0) -> int:
+    return fields.get(name, (default,))[0]
+
+
+def _first_directory(file: BinaryIO) -> Fields:
+    head = file.read(16)
+    order = {b"II": "<", b"MM": ">"}[head[:2]]
+    big = struct.unpack(order + "H", head[2:4]) == (43,)
+    place = struct.unpack(order + ("Q" if big else "I"), head[8:16] if big else head[4:8])[0]
+    file.seek(place)
+    entry, inline = (20, 8) if big else (12, 4)
+    (count,) = struct.unpack(order + ("Q" if big else "H"), file.read(8 if big else 2))
+    if count > 4096:
+        raise ImageError("is damaged: its head has too many fields")
+    entries = file.read(count * entry)
+    fields: Fields = {}
+    for k in range(count):
+        name, kind = struct.unpack_from(order + "HH", entries, k * entry)
+        (length,) = struct.unpack_from(order + ("Q" if big else "I"), entries, k * entry + 4)
+        if kind not in TYPES or length > MAX_COUNT:
+            continue
+        letter, width = TYPES[kind]
+        value = entries[(k + 1) * entry - inline : (k + 1) * entry]
+        if length * width > inline:
+            (place,) = struct.unpack(order + ("Q" if big else "I"), value)
+            file.seek(place)
+            value = file.read(length * width)
+        if length and name not in fields:
+            fields[name] = struct.unpack_from(f"{order}{length}{letter}", value)
+    return fields

@@ -1,0 +1,167 @@
+"""From files that people paint to targets: what was meant, and where."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lightpaint.errors import SizeError, TargetError
+from lightpaint.images.color import luminance
+from lightpaint.images.exr import Floats
+from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.images.view import View
+from lightpaint.target.painted import painted_where
+from lightpaint.target.target import Target
+from lightpaint.target.template import Template, find_template, read_template
+
+#: What a brush puts down: how the picture is to look, or the light that is to fall there.
+Paint = Literal["look", "light"]
+
+#: Beyond this share of the picture, a comparison more likely found a conversion than paint.
+NEARLY_ALL = 0.97
+
+#: Times the light of the brightest parts of the template that no lamp is meant to give, and the
+#: share of the paint that may ask for that without a word.
+BEYOND, FEW = 10.0, 0.01
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What is known on the way. template, folder: what it was painted on, if that is known."""
+
+    path: Path
+    picture: Picture
+    template: Template | None
+    folder: Path | None
+
+
+def read_target(
+    path: str | Path,
+    *,
+    mask: str | Path | None = None,
+    layer: str | None = None,
+    view: View | None = None,
+    template: str | Path | None = None,
+    find: bool = True,
+    paint: Paint = "look",
+) -> Target:
+    """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
+
+    What counts is, in this order: `mask`; an EXR's W channel; alpha; where the picture differs
+    from the template it was painted on; without any of them, every pixel alike. Where alpha is 0
+    no colour was painted, and a mask does not make one.
+
+    layer: which layer, part or view of an EXR. view: what 8 and 16 bits were encoded by; by
+    default what the template or the file says, else sRGB. template: folder that `lightpaint
+    template` wrote; find: whether one is looked for beside the painting if none is given.
+    paint: `light` takes colours for the light that falls on a surface, 1 being what makes white
+    look like 1, and multiplies them by its albedo (Schoeneman et al. 1993, section 3).
+
+    Raises ImageError for files that cannot be read, TargetError for what cannot be solved for,
+    SizeError if target and mask or template differ in size.
+    """
+    path = Path(path)
+    folder = find_template(path) if template is None and find else template
+    made = None if folder is None else read_template(Path(folder))
+    picture = read_picture(path, layer=layer, view=view or (None if made is None else made.view))
+    notes = list(picture.notes)
+    if made is not None and made.size != picture.size and template is None:
+        notes.append(f"not compared with {folder}, which has another size")
+        made = None
+    reading = _Reading(path, picture, made, None if made is None else Path(str(folder)))
+    importance, note = _importance(reading, mask)
+    notes += note
+    # Pixels that the file does not store were not painted.
+    stored = np.ones(picture.size, bool) if picture.stored is None else picture.stored
+    counted = np.where(picture.finite, stored if importance is None else importance, 0)
+    image = picture.image
+    if paint == "light":
+        image, counted, note = _lit(reading, counted)
+    else:
+        note = _beyond(reading, counted)
+    return Target(
+        name=path.stem,
+        image=image,
+        importance=counted.astype(np.float32),
+        everything=importance is None,
+        not_finite=int(picture.finite.size - picture.finite.sum()),
+        at_least=picture.saturated,
+        notes=(*notes, *note),
+        content="" if made is None else made.content,
+        sensor="" if made is None else made.sensor,
+        view=picture.view,
+    )
+
+
+def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:
+    """(h, w), what counts; None if nobody says. And what is to be said of it."""
+    path, picture, template = reading.path, reading.picture, reading.template
+    if mask is not None:
+        importance = read_mask(mask)
+        if importance.shape != picture.size:
+            raise SizeError(
+                f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
+                f"is {picture.size[1]}x{picture.size[0]}: export both at one size"
+            )
+        if picture.alpha is not None and picture.weight is None:
+            importance = np.where(picture.alpha > 0, importance, np.float32(0))
+        return importance, []
+    if picture.weight is not None:
+        return picture.weight, []
+    is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
+    if template is None or not is_opaque:
+        return picture.alpha, []
+    importance = painted_where(path, picture, template)
+    share = float((importance > 0).mean())
+    if share == 0:
+        raise TargetError(
+            f"nothing in {path} differs from the template in {reading.folder}: paint over it, or "
+            "pass --no-template if all of it counts"
+        )
+    note = f"{100 * share:.3g} % painted: what differs from the template in {reading.folder}"
+    if share > NEARLY_ALL:
+        note += "; if you painted less, it was saved with another view or profile (--view, --mask)"
+    return importance, [note]
+
+
+def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:
+    """The look of surfaces under the light that was painted: image and importance."""
+    if reading.template is None or reading.template.albedo is None:
+        raise TargetError(
+            f"to take {reading.path} for light its template is needed, which knows what surfaces "
+            "reflect: give the folder that lightpaint template wrote, --template DIR"
+        )
+    albedo = reading.template.albedo
+    # Metals, glass and what is not there reflect no diffuse light: nothing can be said of it.
+    blind = (albedo.max(axis=-1) <= 0) & (counted > 0)
+    seen = np.where(blind, 0, counted)
+    if not seen.any():
+        raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
+    lost = int(blind.sum())
+    note = [f"{lost} painted pixels show no surface that reflects light"] if lost else []
+    return (reading.picture.image * albedo).astype(np.float32), seen, note
+
+
+def _beyond(reading: _Reading, counted: Floats) -> list[str]:
+    """Says so where paint asks a surface for a colour that it hardly reflects."""
+    template = reading.template
+    if template is None or template.albedo is None:
+        return []
+    albedo = np.maximum(template.albedo, 1e-3)
+    painted = (counted > 0) & (template.albedo.max(axis=-1) > 0)
+    if not painted.any():
+        return []
+    light = np.maximum(reading.picture.image, 0) / albedo
+    there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
+    bright = float(np.percentile(there[template.albedo.max(axis=-1) > 0], 95))
+    # What is nearly black anyway needs little, however it is divided.
+    asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.view.white)
+    share = float((asks.any(axis=-1) & painted).sum() / painted.sum())
+    if share <= FEW:
+        return []
+    return [
+        f"{100 * share:.2g} % of the paint asks surfaces for a colour that they hardly reflect, so "
+        f"for more than {BEYOND:g} times the light of the template's brightest parts: --paint "
+        "light paints the light instead"
+    ]

@@ -1,0 +1,152 @@
+"""Thousands of damaged, truncated and lying pictures: each is refused clearly or read right.
+
+Read right is what can be known: the same picture as before the damage, or what another program
+sees in the damaged file too. Where pixels have no checksum no reader can know of a turned bit.
+"""
+
+import io
+import tempfile
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+import tifffile
+from damage import Outcome, counted, outcomes
+from picture_files import P3, SRGB_CURVE, icc, layered, luminance_chroma, para, png, psd
+from PIL import Image
+
+from lightpaint.errors import ImageError
+from lightpaint.images.picture import read_picture
+
+RNG = np.random.default_rng(0)
+BYTES = RNG.integers(0, 256, (8, 8, 3), dtype=np.uint8)
+WORDS = RNG.integers(0, 65536, (8, 8, 4), dtype=np.uint16)
+FLOATS = RNG.random((8, 8, 3)).astype(np.float32)
+
+
+def _tiff(pixels: Any, **options: Any) -> bytes:
+    buffer = io.BytesIO()
+    tifffile.imwrite(buffer, pixels, photometric="rgb", metadata=None, **options)
+    return buffer.getvalue()
+
+
+def _jpeg(**options: Any) -> bytes:
+    buffer = io.BytesIO()
+    Image.fromarray(BYTES).save(buffer, "JPEG", quality=90, **options)
+    return buffer.getvalue()
+
+
+def _exr(*parts: Any) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        OpenEXR.File([OpenEXR.Part(dict(h), c, n) for h, c, n in parts]).write(f"{folder}/a.exr")
+        return Path(folder, "a.exr").read_bytes()
+
+
+def _channels(dtype: str = "f4") -> dict[str, Any]:
+    return {c: np.ascontiguousarray(FLOATS[..., k].astype(dtype)) for k, c in enumerate("RGB")}
+
+
+def _compressed(name: str, dtype: str = "f2") -> bytes:
+    compression = getattr(OpenEXR, f"{name}_COMPRESSION")
+    header = {"type": OpenEXR.scanlineimage, "compression": compression}
+    return _exr((header, _channels(dtype), "x"))
+
+
+def _checked() -> dict[str, bytes]:
+    """Formats whose every byte of pixels is under a checksum."""
+    profile = b"x\0\0" + zlib.compress(icc(para(3, *SRGB_CURVE), P3))
+    words = png(WORDS, (b"iCCP", profile), (b"tEXt", b"lightpaint.view\0agx 1.0"))
+    return {
+        "words.png": words,
+        "bytes.png": png(BYTES, (b"gAMA", (55_000).to_bytes(4, "big"))),
+        "stored.ora": layered(png(WORDS)),
+        "packed.kra": layered(png(BYTES), b"application/x-krita", compression=zipfile.ZIP_DEFLATED),
+    }
+
+
+def _unchecked() -> dict[str, bytes]:
+    return {
+        "plain.tif": _tiff(WORDS[..., :3]),
+        "zip.tif": _tiff(WORDS, compression="zlib", extrasamples=["unassalpha"]),
+        "tiles.tif": _tiff(
+            np.tile(WORDS[..., :3], (4, 4, 1)), tile=(16, 16), compression="zlib", predictor=True
+        ),
+        "floats.tif": _tiff(FLOATS),
+        "big.tif": _tiff(WORDS[..., :3], bigtiff=True),
+        "plain.jpg": _jpeg(),
+        "progressive.jpg": _jpeg(progressive=True),
+        "plain.psd": psd(WORDS[..., :3], merged=True),
+        "packed.psd": psd(BYTES, packed=True),
+    }
+
+
+def _exrs() -> dict[str, bytes]:
+    plain = {"type": OpenEXR.scanlineimage}
+    tiled = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+    names = ("NO", "RLE", "ZIP", "PIZ", "B44", "DWAA")
+    rec709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+    return {f"{name}.exr": _compressed(name) for name in names} | {
+        "PXR24.exr": _compressed("PXR24", "f4"),
+        "tiles.exr": _exr((tiled, _channels(), "x")),
+        "parts.exr": _exr((plain, _channels(), "x"), (plain, {"Z": FLOATS[..., 0].copy()}, "y")),
+        "chroma.exr": luminance_chroma(
+            FLOATS[..., 0], FLOATS[:4, :4, 0], FLOATS[:4, :4, 1], rec709
+        ),
+    }
+
+
+def _assert_right(results: list[Outcome], *, known: bool) -> None:
+    """Every one is refused or right; of those that are cut, only what lacks nothing is read."""
+    right = ("same", "refused") if known else ("same", "refused", "agreed", "alone")
+    wrong = [r for r in results if r.said not in right]
+    assert wrong == []
+    assert [r for r in results if r.kind == "cut" and r.said not in ("same", "refused")] == []
+    assert len(results) > 1500
+
+
+def test_what_has_checksums(tmp_path: Path):
+    results = outcomes(_checked(), tmp_path, flips=250, lies=250)
+    print(dict(counted(results)))
+    _assert_right(results, known=True)
+
+
+def test_what_has_none(tmp_path: Path):
+    results = outcomes(_unchecked(), tmp_path, flips=120, lies=120)
+    print(dict(counted(results)))
+    _assert_right(results, known=False)
+    # Few are such that the other reader has no opinion.
+    assert sum(r.said == "alone" for r in results) < len(results) / 50
+
+
+def test_exr(tmp_path: Path):
+    results = outcomes(_exrs(), tmp_path, flips=100, lies=100)
+    print(dict(counted(results)))
+    _assert_right(results, known=False)
+    # The other reader has none of luminance and chroma.
+    alone = [r for r in results if r.said == "alone" and r.name != "chroma.exr"]
+    assert len(alone) < len(results) / 50
+
+
+def _declaring(content: bytes, at: int, order: Any, width: int, height: int) -> bytes:
+    size = width.to_bytes(4, order) + height.to_bytes(4, order)
+    return content[:at] + size + content[at + 8 :]
+
+
+@pytest.mark.parametrize(("width", "height"), [(2**31 - 1, 1), (60_000, 60_000), (2**20, 2**20)])
+def test_sizes_that_no_picture_has(tmp_path: Path, width: int, height: int):
+    whole = png(BYTES)
+    bent = _declaring(whole, 16, "big", width, height)
+    checksum = zlib.crc32(bent[12:29]).to_bytes(4, "big")
+    photoshop = psd(BYTES)
+    files = {
+        "a.png": bent[:29] + checksum + bent[33:],
+        "a.psd": _declaring(photoshop, 14, "big", height, width),
+    }
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ImageError, match=name):
+            read_picture(tmp_path / name)

@@ -1,0 +1,229 @@
+"""What was painted, found by comparing a file that came back with its template."""
+
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from lightpaint.errors import SizeError, TargetError
+from lightpaint.images.display import decode_display
+from lightpaint.images.exr import write_rgb
+from lightpaint.images.png import write_png_16
+from lightpaint.images.view import View
+from lightpaint.target.read import read_target
+from lightpaint.target.template import Template, write_template
+
+SIZE = (60, 80)
+
+
+def template_of(view: View = View("srgb")) -> Template:  # noqa: B008 (frozen)
+    """A red wall and a grey one, like a render of few samples, a little of it beyond white."""
+    rng = np.random.default_rng(0)
+    ramp = np.linspace(0.02, 0.9, SIZE[1])[None, :, None] * np.array([1, 0.8, 0.6])
+    albedo = np.broadcast_to(np.float32([0.6, 0.06, 0.05]), (*SIZE, 3)).copy()
+    albedo[:, 40:] = 0.7
+    image = (2 * ramp * albedo * rng.gamma(8, 1 / 8, (*SIZE, 3))).astype(np.float32)
+    return Template(image, view, "room.xml", "abc", "camera", albedo)
+
+
+def write(folder: Path, template: Template) -> Path:
+    height, width = template.size
+    write_template(
+        folder,
+        template,
+        normals=np.zeros((height, width, 3)),
+        depth=np.ones((height, width)),
+        mattes={},
+        lights={},
+    )
+    return folder
+
+
+def brushed(shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Display values under a soft brush, and its coverage (h, w)."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    coverage = np.clip((18 - np.hypot(x - 40, y - 30)) / 8, 0, 1)
+    paint = np.array([0.9, 0.7, 0.3]) * (0.5 + 0.5 * shown)
+    return shown + coverage[..., None] * (paint - shown), coverage
+
+
+def save(path: Path, display: np.ndarray, view: View) -> None:
+    eight = np.round(display * 255).astype(np.uint8)
+    if path.suffix == ".exr":
+        light = view.decode(display).astype(np.float16 if "half" in path.stem else np.float32)
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"RGB": light}).write(str(path))
+    elif "16" in path.stem:
+        write_png_16(path, display)
+    elif path.suffix == ".jpg":
+        Image.fromarray(eight).save(path, quality=92)
+    else:
+        Image.fromarray(eight).save(path)
+
+
+@pytest.mark.parametrize("view", [View("srgb"), View("srgb", -1.5), View("agx", 0.5)])
+@pytest.mark.parametrize("name", ["p16.png", "p8.png", "p8.tif", "p.jpg", "half.exr", "float.exr"])
+def test_in_every_format_the_brush_is_found(tmp_path: Path, name: str, view: View) -> None:
+    template = template_of(view)
+    write(tmp_path, template)
+    display, coverage = brushed(template.shown)
+    save(tmp_path / name, display, view)
+    target = read_target(tmp_path / name)
+    assert not target.everything
+    assert "painted" in target.notes[0]
+    # A JPEG is compared over 9 x 9 pixels, and so finds paint up to 4 pixels away.
+    reach = 6 if name.endswith("jpg") else 1
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    away = np.hypot(x - 40, y - 30) > 18 + reach
+    assert target.importance[away].max() < (0.05 if name.endswith("jpg") else 1e-6)
+    assert target.importance[coverage > 0.6].min() > 0.9
+    # A soft brush leaves soft importance, where it is not widened.
+    edge = target.importance[(coverage > 0) & (coverage < 0.2)]
+    assert edge.mean() > 0.02
+    assert name.endswith("jpg") or edge.mean() < 0.98
+
+
+def test_a_file_that_was_only_saved_again_is_no_painting(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    for name in ("p16.png", "p8.png", "p8.tif", "p.jpg", "half.exr", "float.exr"):
+        save(tmp_path / name, template.shown, template.view)
+        with pytest.raises(TargetError, match=r"nothing in .* differs from the template"):
+            read_target(tmp_path / name)
+        assert read_target(tmp_path / name, find=False).everything
+
+
+def test_mask_and_alpha_go_before(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    display, _ = brushed(template.shown)
+    save(tmp_path / "p8.png", display, template.view)
+    mask = np.zeros(SIZE, np.uint8)
+    mask[:5] = 255
+    Image.fromarray(mask).save(tmp_path / "mask.png")
+    counted = read_target(tmp_path / "p8.png", mask=tmp_path / "mask.png").importance
+    assert counted[:5].min() == 1
+    assert counted[5:].max() == 0
+    layer = np.dstack([np.round(display * 255).astype(np.uint8), mask])
+    Image.fromarray(layer).save(tmp_path / "layer.png")
+    np.testing.assert_array_equal(read_target(tmp_path / "layer.png").importance, counted)
+
+
+def test_the_template_is_found_where_people_keep_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    template = template_of()
+    display, _ = brushed(template.shown)
+    for folder, painting in (("a/template", "a/p8.png"), ("template", "elsewhere/p8.png")):
+        write(tmp_path / folder, template)
+        (tmp_path / painting).parent.mkdir(exist_ok=True)
+        save(tmp_path / painting, display, template.view)
+    monkeypatch.chdir(tmp_path)
+    for painting in ("a/p8.png", "elsewhere/p8.png"):
+        assert not read_target(painting).everything
+    assert read_target("a/p8.png").content == "abc"
+    assert read_target("a/p8.png").sensor == "camera"
+
+
+def test_of_another_size(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path / "template", template)
+    Image.new("RGB", (31, 17), "red").save(tmp_path / "p.png")
+    target = read_target(tmp_path / "p.png")
+    assert target.everything
+    assert "another size" in target.notes[0]
+    with pytest.raises(SizeError, match="31x17 but its template is 80x60"):
+        read_target(tmp_path / "p.png", template=tmp_path / "template")
+
+
+def test_nearly_all_painted_is_doubted(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    save(tmp_path / "p16.png", 0.8 * template.shown, template.view)
+    assert "another view or profile" in read_target(tmp_path / "p16.png").notes[0]
+
+
+def test_paint_as_light_is_multiplied_by_albedo(tmp_path: Path) -> None:
+    template = template_of()
+    assert template.albedo is not None
+    write(tmp_path, template)
+    painted = template.image.copy()
+    painted[10:50, 30:50] = 0.1, 0.2, 0.8
+    write_rgb(tmp_path / "p.exr", painted)
+    target = read_target(tmp_path / "p.exr", paint="light")
+    inside = target.importance > 0
+    np.testing.assert_allclose(
+        target.image[inside], painted[inside] * template.albedo[inside], rtol=1e-6
+    )
+    assert inside[12:48, 32:48].all()
+
+
+def test_where_nothing_reflects_light_cannot_be_painted(tmp_path: Path) -> None:
+    template = template_of()
+    assert template.albedo is not None
+    template.albedo[:, :40] = 0
+    write(tmp_path, template)
+    painted = template.image.copy()
+    painted[10:50, 30:50] = 0.1, 0.2, 0.8
+    write_rgb(tmp_path / "p.exr", painted)
+    target = read_target(tmp_path / "p.exr", paint="light")
+    assert target.importance[:, :40].max() == 0
+    assert any("no surface that reflects" in note for note in target.notes)
+    template.albedo[:] = 0
+    write(tmp_path, template)
+    with pytest.raises(TargetError, match="no painted pixel shows a surface"):
+        read_target(tmp_path / "p.exr", paint="light")
+
+
+def test_light_needs_a_template(tmp_path: Path) -> None:
+    write_rgb(tmp_path / "p.exr", np.ones((4, 4, 3)))
+    with pytest.raises(TargetError, match="its template is needed"):
+        read_target(tmp_path / "p.exr", paint="light")
+
+
+def test_blue_paint_on_a_red_wall_is_remarked(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    painted = template.image.copy()
+    painted[10:50, 10:30] = 0.05, 0.1, 0.9
+    write_rgb(tmp_path / "red.exr", painted)
+    assert any("hardly reflect" in note for note in read_target(tmp_path / "red.exr").notes)
+    painted = template.image.copy()
+    painted[10:50, 50:70] = 0.05, 0.1, 0.9
+    write_rgb(tmp_path / "grey.exr", painted)
+    assert not any("hardly" in note for note in read_target(tmp_path / "grey.exr").notes)
+
+
+def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    write_rgb(tmp_path / "p.exr", np.ones((*SIZE, 3)))
+    about = tmp_path / "template.json"
+    good = about.read_text(encoding="utf-8")
+    for bad, words in (
+        ("{", "no template"),
+        ("[]", "no template"),
+        (good.replace("template 1", "template 9"), "its format is"),
+        (good.replace('"srgb"', '"srgbb"'), "no view transform"),
+        (good.replace('"stops": 0.0', '"stops": 1e999'), "out of range"),
+        (good.replace('"sensor": "camera"', '"sensor": 7'), "texts"),
+    ):
+        about.write_text(bad, encoding="utf-8")
+        with pytest.raises(TargetError, match=words):
+            read_target(tmp_path / "p.exr")
+    about.write_text(good, encoding="utf-8")
+    (tmp_path / "template.exr").unlink()
+    with pytest.raises(TargetError, match=r"template\.exr"):
+        read_target(tmp_path / "p.exr")
+
+
+def test_png_holds_what_the_view_shows(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    target = read_target(tmp_path / "template.png", find=False)
+    shown = np.clip(template.image, 0, 1)
+    # Half a code of 16 bits, in light.
+    np.testing.assert_allclose(target.image, shown, atol=2e-5)
+    np.testing.assert_allclose(decode_display(template.shown), shown, atol=2e-5)
