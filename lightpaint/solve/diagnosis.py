@@ -7,7 +7,7 @@ With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to 
 exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
 noise of the prediction adds to the first is taken out of it. Where the lighting answers several
 views, part of the second is what the best lighting for this view alone would not have missed.
-After reweighting, all of it is of the last linear problem.
+After reweighting, all of it is of the last linear problem: without what a display clips.
 """
 
 from dataclasses import dataclass, replace

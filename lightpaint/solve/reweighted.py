@@ -24,8 +24,12 @@ STEP = 1e-6
 #: Part of what the gradient promises that a step has to keep, and the shortest step.
 KEPT, SHORTEST = 1e-4, 2.0**-20
 
-#: Part of the loss that is round-off of its sums, and of views that are known as float32 only.
+#: Part of the loss that is round-off of its sums.
 ROUND_OFF = 1e-12
+
+#: Part of the loss that a whole step would promise at most where no step falls any more: views of
+#: OpenColorIO are float32, and their slopes quotients of differences.
+FLAT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ def descend(
             done = False
         if done or part == 0 or count >= ROUNDS:
             stays = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
-            small = done or fall <= 1e-9 * value
+            small = done or fall <= FLAT * value
             return Descent(
                 w if stays else best,
                 squares,
