@@ -11,16 +11,16 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.basis.basis import Basis
 from lightpaint.files import write_bytes
 from lightpaint.images.blocks import block_mean, enlarged
-from lightpaint.images.display import encode_display, png_bytes, to_8_bit
+from lightpaint.images.display import png_bytes, to_8_bit
 from lightpaint.images.exr import Floats
 from lightpaint.relight.pictures import (
     diverging,
-    exposure_of,
     painted,
     residual_limit,
     residual_picture,
-    spoken_stops,
+    spoken_view,
     target_picture,
+    view_of,
 )
 from lightpaint.relight.verdict import relative_residual
 from lightpaint.solve.lighting import Lighting, combine
@@ -63,19 +63,19 @@ def comparison_image(
     """
     target = target.fitted_to(basis.size, resize=False)
     current = combine(basis, Lighting.present(basis)).image
-    stops = exposure_of(predicted, verified)
+    view = view_of(target, predicted, verified)
     share = float(painted(target, solution).mean())
-    at = f" ({spoken_stops(stops)})" if stops else ""
+    at = f" ({spoken_view(view)})" if spoken_view(view) else ""
     tiles = [
         Tile(
             f"target: {target.name}",
             f"{_percent(share)} painted{', the rest hatched' if share < 0.995 else ''}",
-            target_picture(target, solution, current, stops=stops),
+            target_picture(target, solution, current, view=view),
         ),
         Tile(
             f"predicted{at}",
             f"misses {_percent(relative_residual(solution))} of the target (RMS, with noise)",
-            encode_display(predicted, stops=stops),
+            view.encode(predicted),
         ),
     ]
     if verified is not None:
@@ -86,11 +86,11 @@ def comparison_image(
             Tile(
                 f"verified{at}",
                 f"independent render, {rmse:.2g} RMS off the prediction",
-                encode_display(verified, stops=stops),
+                view.encode(verified),
             )
         )
-    limit = residual_limit(solution, predicted, stops=stops)
-    picture = residual_picture(solution, predicted, current, stops=stops, limit=limit)
+    limit = residual_limit(solution, predicted, view=view)
+    picture = residual_picture(solution, predicted, current, view=view, limit=limit)
     tiles.append(Tile("residual", "luminance, predicted - target", picture, limit))
     return compose(tiles)
 

@@ -9,8 +9,9 @@ import math
 import numpy as np
 
 from lightpaint.images.color import luminance
-from lightpaint.images.display import choose_exposure, encode_display
+from lightpaint.images.display import choose_exposure
 from lightpaint.images.exr import Floats
+from lightpaint.images.view import View
 from lightpaint.solve.solve import Solution
 from lightpaint.target.target import Target
 
@@ -30,9 +31,12 @@ DIVERGING = np.array(
 FINEST_SCALE = 0.01
 
 
-def exposure_of(predicted: Floats, verified: Floats | None) -> float:
-    """The one exposure, in stops, for all pictures of a result: that of its best render."""
-    return choose_exposure(predicted if verified is None else verified)
+def view_of(target: Target, predicted: Floats, verified: Floats | None) -> View:
+    """The one view for all pictures of a result: that of the painting, if it was seen through one.
+
+    Else sRGB at the exposure that suits its best render.
+    """
+    return target.view or View("srgb", choose_exposure(predicted if verified is None else verified))
 
 
 def coverage(importance: Floats) -> Floats:
@@ -49,10 +53,10 @@ def painted(target: Target, solution: Solution) -> Floats:
     return np.where(solution.importance > 0, coverage(target.importance), 0)
 
 
-def unpainted_look(current: Floats, *, stops: float) -> Floats:
+def unpainted_look(current: Floats, *, view: View) -> Floats:
     """The current look as the background of what counts: grey, dim, with diagonal lines."""
     height, width = current.shape[:2]
-    grey = luminance(encode_display(current, stops=stops))
+    grey = luminance(view.encode(current))
     period = max(6, width // 80)
     y, x = np.mgrid[:height, :width]
     lines = (x + y) % period < max(1, period // 5)
@@ -60,23 +64,23 @@ def unpainted_look(current: Floats, *, stops: float) -> Floats:
     return np.repeat(dim[..., None], 3, axis=-1)
 
 
-def target_picture(target: Target, solution: Solution, current: Floats, *, stops: float) -> Floats:
+def target_picture(target: Target, solution: Solution, current: Floats, *, view: View) -> Floats:
     """The painting, laid over the dimmed current look by its importance.
 
     current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
     display encoding of the target.
     """
     share = painted(target, solution)[..., None]
-    paint = encode_display(target.image, stops=stops)
-    return np.asarray(share * paint + (1 - share) * unpainted_look(current, stops=stops))
+    paint = view.encode(target.image)
+    return np.asarray(share * paint + (1 - share) * unpainted_look(current, view=view))
 
 
-def importance_picture(importance: Floats, current: Floats, *, stops: float) -> Floats:
+def importance_picture(importance: Floats, current: Floats, *, view: View) -> Floats:
     """The current look in pale yellow where it counts; dimmed and hatched where not."""
     share = coverage(importance)[..., None]
-    grey = luminance(encode_display(current, stops=stops))[..., None]
+    grey = luminance(view.encode(current))[..., None]
     counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
-    return np.asarray(share * counted + (1 - share) * unpainted_look(current, stops=stops))
+    return np.asarray(share * counted + (1 - share) * unpainted_look(current, view=view))
 
 
 def residual(solution: Solution, predicted: Floats) -> Floats:
@@ -84,19 +88,19 @@ def residual(solution: Solution, predicted: Floats) -> Floats:
     return luminance(predicted.astype(np.float64) - solution.meant(predicted))
 
 
-def residual_limit(solution: Solution, predicted: Floats, *, stops: float) -> float:
+def residual_limit(solution: Solution, predicted: Floats, *, view: View) -> float:
     """The end of the residual's scale: its 99th percentile where it counts, rounded up."""
     counted = np.abs(residual(solution, predicted))[solution.importance > 0]
-    return round_up(max(float(np.percentile(counted, 99)), FINEST_SCALE * 2.0**-stops))
+    return round_up(max(float(np.percentile(counted, 99)), FINEST_SCALE * 2.0**-view.stops))
 
 
 def residual_picture(
-    solution: Solution, predicted: Floats, current: Floats, *, stops: float, limit: float
+    solution: Solution, predicted: Floats, current: Floats, *, view: View, limit: float
 ) -> Floats:
     """False colours of the residual from −limit to +limit, dimmed where it does not count."""
     share = coverage(solution.importance)[..., None]
     colours = diverging(residual(solution, predicted) / limit)
-    return np.asarray(share * colours + (1 - share) * unpainted_look(current, stops=stops))
+    return np.asarray(share * colours + (1 - share) * unpainted_look(current, view=view))
 
 
 def diverging(values: Floats) -> Floats:
@@ -116,6 +120,7 @@ def round_up(value: float) -> float:
     return 10 * power
 
 
-def spoken_stops(stops: float) -> str:
-    """`exposure +1.5 stops`, or nothing where the picture is shown as it is."""
-    return f"exposure {stops:+.1f} stops" if stops else ""
+def spoken_view(view: View) -> str:
+    """`agx, exposure +1.5 stops`, or nothing where sRGB shows the picture as it is."""
+    name = [] if view.name == "srgb" else [view.name]
+    return ", ".join([*name, *([f"exposure {view.stops:+.1f} stops"] if view.stops else [])])

@@ -11,10 +11,10 @@ from importlib import resources
 from string import Template
 
 from lightpaint.basis.basis import Basis
-from lightpaint.images.display import encode_display
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
-from lightpaint.relight.pictures import exposure_of, spoken_stops, target_picture
+from lightpaint.images.view import View
+from lightpaint.relight.pictures import target_picture, view_of
 from lightpaint.relight.report_constraints import constraints_section
 from lightpaint.relight.report_diagnosis import missed_section, sure_section
 from lightpaint.relight.report_pictures import Picture, maps, wipe
@@ -60,8 +60,8 @@ def report_page(
     target = target.fitted_to(basis.size, resize=False)
     current = combine(basis, Lighting.present(basis)).image
     verified = None if verification is None else verification.verified.image
-    stops = exposure_of(predicted.image, verified)
-    looks = _looks(target, solution, current, predicted.image, verified, stops=stops)
+    view = view_of(target, predicted.image, verified)
+    looks = _looks(target, solution, current, predicted.image, verified, view=view)
     template = resources.files("lightpaint.relight").joinpath("report.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(f"{target.name} · {basis.origin.scene}"),
@@ -70,12 +70,12 @@ def report_page(
         verdict=escape(verdict(solution, predicted, verification)),
         banner=_banner(verification),
         wipe=wipe(looks),
-        exposure=_exposure(stops, predicted.image),
-        maps=maps(solution, predicted.image, current, verification=verification, stops=stops),
-        missed=missed_section(solution, diagnosis, current, stops=stops)
-        + constraints_section(basis, solution, stops=stops),
+        exposure=_exposure(view, predicted.image),
+        maps=maps(solution, predicted.image, current, verification=verification, view=view),
+        missed=missed_section(solution, diagnosis, current, view=view)
+        + constraints_section(basis, solution, view=view),
         suggestions=suggestion_section(
-            suggestions, stops=stops, cd_per_unit=solution.lighting.cd_per_unit
+            suggestions, view=view, cd_per_unit=solution.lighting.cd_per_unit
         ),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
@@ -95,24 +95,24 @@ def _looks(
     predicted: Floats,
     verified: Floats | None,
     *,
-    stops: float,
+    view: View,
 ) -> list[Picture]:
     """What can be put side by side under the wipe, in the order of its lists."""
     looks = [
-        Picture("current look", "The scene as it is.", encode_display(current, stops=stops)),
+        Picture("current look", "The scene as it is.", view.encode(current)),
         Picture(
             "target",
             "The painting. Unpainted pixels are grey, dim and hatched.",
-            target_picture(target, solution, current, stops=stops),
+            target_picture(target, solution, current, view=view),
         ),
         Picture(
             "predicted",
             "The solved lighting, as the sum of the basis images.",
-            encode_display(predicted, stops=stops),
+            view.encode(predicted),
         ),
     ]
     if verified is not None:
-        shown = encode_display(verified, stops=stops)
+        shown = view.encode(verified)
         looks.append(Picture("verified", "An independent render of the relit scene.", shown))
     return looks
 
@@ -134,11 +134,11 @@ def _banner(verification: Verification | None) -> str:
     )
 
 
-def _exposure(stops: float, predicted: Floats) -> str:
+def _exposure(view: View, predicted: Floats) -> str:
     """How linear light became these pictures, and what of it they cannot show."""
-    text = f"All at {spoken_stops(stops)}" if stops else "All at the scene's own exposure"
-    clipped = float((predicted.max(axis=-1) * 2.0**stops > 1).mean())
-    text += ", sRGB."
+    at = f"exposure {view.stops:+.1f} stops" if view.stops else "the scene's own exposure"
+    clipped = float((predicted.max(axis=-1) > view.white).mean())
+    text = f"All at {at}, {'sRGB' if view.name == 'srgb' else view.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
     return text

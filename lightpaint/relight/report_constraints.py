@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.blocks import block_mean
-from lightpaint.images.display import encode_display
+from lightpaint.images.view import View
 from lightpaint.relight.explanation import spoken_percent
 from lightpaint.relight.report_pictures import Picture, figure
 from lightpaint.relight.verdict import relative_residual
@@ -20,7 +20,7 @@ WIDTH = 320
 AROUND = 2
 
 
-def constraints_section(basis: Basis, solution: Solution, *, stops: float) -> str:
+def constraints_section(basis: Basis, solution: Solution, *, view: View) -> str:
     """The best lighting without constraints beside the one as asked, both from the basis.
 
     With `sparse`, what other numbers of lights would miss. Empty where nothing is asked, and for
@@ -41,7 +41,7 @@ def constraints_section(basis: Basis, solution: Solution, *, stops: float) -> st
         f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
         f"painted light (RMS). As asked, they miss {asked}. Both pictures are sums of the "
         f"basis images.</p></div>{_curve(solution, free)}</div>"
-        f'<div class="maps">{_figures(basis, pictures, stops)}{_numbers(basis, solution, stops)}'
+        f'<div class="maps">{_figures(basis, pictures, view)}{_numbers(basis, solution, view)}'
         "</div></section>"
     )
 
@@ -71,7 +71,7 @@ def _row(what: str, missed: float) -> str:
     )
 
 
-def _numbers(basis: Basis, solution: Solution, stops: float) -> str:
+def _numbers(basis: Basis, solution: Solution, view: View) -> str:
     """With `sparse`, pictures with fewer and with more lights."""
     used, missed_with = _used(solution), dict(solution.quality.curve)
     pictures = [
@@ -79,10 +79,10 @@ def _numbers(basis: Basis, solution: Solution, stops: float) -> str:
         for count, weights in solution.tried
         if count in missed_with and 0 < abs(count - used) <= AROUND
     ]
-    return _figures(basis, pictures, stops)
+    return _figures(basis, pictures, view)
 
 
-def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], stops: float) -> str:
+def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], view: View) -> str:
     """Pictures of weights (n, 3), each with its name and a caption."""
     height, width = basis.size
     factor = max(1, width // WIDTH)
@@ -91,7 +91,7 @@ def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], stops: floa
     for weights, name, caption in pictures:
         # What does not make a whole block at the border is left out; it is for looking at.
         image = block_mean(basis.mix(weights)[whole], factor)
-        pixels = encode_display(np.asarray(image, np.float32), stops=stops)
+        pixels = view.encode(np.asarray(image, np.float32))
         figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
     return "".join(figures)
 

@@ -7,6 +7,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.images.color import luminance
 from lightpaint.images.exr import Floats
+from lightpaint.images.view import View
 from lightpaint.relight.explanation import (
     how_sure,
     relative_errors,
@@ -83,7 +84,7 @@ def _steps(solution: Solution) -> str:
 
 
 def missed_section(
-    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, stops: float
+    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, view: View
 ) -> str:
     """Why it does not look like the painting: sentences, shares, maps and bounds."""
     if diagnosis is None:
@@ -92,7 +93,7 @@ def missed_section(
     return (
         f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"
-        f'<div class="maps">{_maps(solution, diagnosis, current, stops=stops)}</div>'
+        f'<div class="maps">{_maps(solution, diagnosis, current, view=view)}</div>'
         f"{_bounds(diagnosis)}</section>"
     )
 
@@ -122,7 +123,7 @@ def _shares(diagnosis: Diagnosis) -> str:
     return f"<table><tbody>{''.join(rows)}</tbody></table>"
 
 
-def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: float) -> str:
+def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, view: View) -> str:
     parts = [
         (
             "Out of reach",
@@ -138,9 +139,9 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, stops: f
     ]
     counted = solution.importance > 0
     sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]
-    limit = round_up(max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-stops))
+    limit = round_up(max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-view.stops))
     share = coverage(solution.importance)[..., None]
-    grey = unpainted_look(current, stops=stops)
+    grey = unpainted_look(current, view=view)
     figures = []
     for name, image, caption in parts:
         if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:

@@ -10,6 +10,7 @@ from PIL import Image
 
 from lightpaint.images.display import encode_display, png_bytes, to_8_bit
 from lightpaint.images.exr import Floats
+from lightpaint.images.view import View
 from lightpaint.relight.pictures import (
     DIVERGING,
     diverging,
@@ -112,14 +113,14 @@ def maps(
     current: Floats,
     *,
     verification: Verification | None,
-    stops: float,
+    view: View,
 ) -> str:
     """False-colour pictures: what is missed, what counts, and where the render disagrees.
 
     predicted, current: (h, w, 3) linear.
     """
-    limit = residual_limit(solution, predicted, stops=stops)
-    picture = residual_picture(solution, predicted, current, stops=stops, limit=limit)
+    limit = residual_limit(solution, predicted, view=view)
+    picture = residual_picture(solution, predicted, current, view=view, limit=limit)
     figures = [
         figure(
             Picture("Residual", "False-colour map of the residual.", picture),
@@ -130,7 +131,7 @@ def maps(
             Picture(
                 "Importance",
                 "Map of how much each pixel counts.",
-                importance_picture(solution.importance, current, stops=stops),
+                importance_picture(solution.importance, current, view=view),
             ),
             f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
             f"{solution.importance.max():.3g} at most.",

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from html import escape
 
-from lightpaint.images.display import encode_display, to_8_bit
+from lightpaint.images.display import to_8_bit
 from lightpaint.images.exr import Floats
+from lightpaint.images.view import View
 from lightpaint.relight.explanation import spoken_percent
 from lightpaint.relight.report_pictures import data_uri
 from lightpaint.relight.suggestion import Suggestion
@@ -37,7 +38,7 @@ def spoken_position(suggestion: Suggestion) -> str:
 def suggestion_section(
     suggestions: Sequence[Suggestion] | None,
     *,
-    stops: float,
+    view: View,
     cd_per_unit: float | None = None,
 ) -> str:
     """Each suggested light: the picture without and with it, where it is, what to paste.
@@ -54,7 +55,7 @@ def suggestion_section(
         else ""
     )
     shown = "".join(
-        _shown(x, before=k > 0, stops=stops, cd_per_unit=cd_per_unit)
+        _shown(x, before=k > 0, view=view, cd_per_unit=cd_per_unit)
         for k, x in enumerate(suggestions)
     )
     return (
@@ -63,7 +64,7 @@ def suggestion_section(
     )
 
 
-def _shown(suggestion: Suggestion, *, before: bool, stops: float, cd_per_unit: float | None) -> str:
+def _shown(suggestion: Suggestion, *, before: bool, view: View, cd_per_unit: float | None) -> str:
     """before: whether others are suggested before it, which then are in both pictures."""
     seen = suggestion.photometry(cd_per_unit)
     amounts = ", ".join(filter(None, seen.amounts))
@@ -86,22 +87,22 @@ def _shown(suggestion: Suggestion, *, before: bool, stops: float, cd_per_unit: f
     name = escape(suggestion.name)
     return (
         f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
-        f"{_picture(suggestion.without, f'Without {name}', without, None, stops)}"
-        f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, stops)}"
+        f"{_picture(suggestion.without, f'Without {name}', without, None, view)}"
+        f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, view)}"
         f"<div>{swatch}<dl>{listed}</dl></div></div>"
         f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'
     )
 
 
 def _picture(
-    image: Floats, name: str, caption: str, at: tuple[float, float] | None, stops: float
+    image: Floats, name: str, caption: str, at: tuple[float, float] | None, view: View
 ) -> str:
     height, width = image.shape[:2]
     ring = ""
     if at is not None:
         place = f"left:{100 * at[0]:.2f}%;top:{100 * at[1]:.2f}%"
         ring = f'<span style="{RING};{place}" aria-hidden="true"></span>'
-    source = data_uri(to_8_bit(encode_display(image, stops=stops)))
+    source = data_uri(to_8_bit(view.encode(image)))
     return (
         f'<figure><div style="position:relative"><img width="{width}" height="{height}" '
         f'alt="{name}: {caption}." src="{source}">{ring}</div>'

@@ -101,19 +101,25 @@ def _asked(setting: LightSetting) -> str:
 
 
 def fit_table(solution: Solution) -> str:
-    """Objective, optimality and sweeps, per channel and in all."""
+    """Objective with its standard error, optimality and sweeps, per channel and in all."""
     q = solution.quality
+    norm2 = np.where(solution.equations.target_norm2 > 0, solution.equations.target_norm2, 1)
+    errors = None if q.objective_error is None else np.array(q.objective_error)
+    each = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
     columns = zip(
-        ("red", "green", "blue"), q.relative_objective, q.kkt_residual, q.sweeps, strict=True
+        ("red", "green", "blue"), q.relative_objective, each, q.kkt_residual, q.sweeps, strict=True
     )
     rows = [
-        f'<tr><th scope="row">{name}</th><td>{objective:.3g}</td><td>{np.sqrt(objective):.3g}</td>'
-        f"<td>{kkt:.1e}</td><td>{sweeps}</td></tr>"
-        for name, objective, kkt, sweeps in columns
+        f'<tr><th scope="row">{name}</th><td>{objective:.3g}{error}</td>'
+        f"<td>{np.sqrt(objective):.3g}</td><td>{kkt:.1e}</td><td>{sweeps}</td></tr>"
+        for name, objective, error, kkt, sweeps in columns
     ]
     total = relative_residual(solution)
+    # One path carries all channels, so that their errors go together.
+    whole = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
     rows.append(
-        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}</td><td>{total:.3g}</td>'
+        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}{whole}</td>'
+        f"<td>{total:.3g}</td>"
         f"<td>{max(q.kkt_residual):.1e}</td><td>{max(q.sweeps)}</td></tr>"
     )
     return "".join(rows)

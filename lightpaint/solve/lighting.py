@@ -81,6 +81,8 @@ class Quality:
     curve: where only some lights may be on, numbers of lights and the relative residual,
     √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
     bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
+    objective_error: standard error of `objective`, from the noise it was solved with, where that
+    is known.
     display: the view through which the objective is seen; "" where it is of linear light.
     rounds: linear problems solved one after the other, the last of which is the certified one.
     """
@@ -93,6 +95,7 @@ class Quality:
     unreached: tuple[str, ...] = ()
     curve: tuple[tuple[int, float], ...] = ()
     bounds: tuple[Bound, ...] = ()
+    objective_error: RGB | None = None
     display: str = ""
     rounds: int = 1
 
@@ -260,6 +263,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             "unreached": list(q.unreached),
             **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
             **({"bounds": [bound.fields() for bound in q.bounds]} if q.bounds else {}),
+            **({"objective_error": list(q.objective_error)} if q.objective_error else {}),
             **({"display": q.display} if q.display else {}),
             **({"rounds": q.rounds} if q.rounds > 1 else {}),
         }
@@ -373,6 +377,7 @@ def _read_quality(data: dict[str, Any]) -> Quality:
         tuple(str(name) for name in unreached),
         tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
         tuple(Bound.of_fields(bound) for bound in data.get("bounds", [])),
+        _read_rgb(data["objective_error"]) if "objective_error" in data else None,
         _read_text(data, "display"),
         int(data.get("rounds", 1)),
     )

@@ -240,7 +240,7 @@ def _best_share(basis: Basis, solution: Solution, noise: Noise, least: Doubles) 
 
 
 def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solution:
-    """`solution` with the standard error of each light in its lighting, where it is known."""
+    """`solution` with the standard errors of lights and objective, where they are known."""
     if uncertainty is None:
         return solution
     lights: list[LightSetting] = []
@@ -248,7 +248,10 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
         r, g, b = (float(v) for v in error)
         kept = light.is_fixed or light.name in solution.quality.unreached
         lights.append(light if kept else replace(light, standard_error=(r, g, b)))
-    return replace(solution, lighting=replace(solution.lighting, lights=tuple(lights)))
+    r, g, b = (float(v) for v in uncertainty.objective_error)
+    quality = replace(solution.quality, objective_error=(r, g, b))
+    lighting = replace(solution.lighting, lights=tuple(lights), quality=quality)
+    return replace(solution, lighting=lighting)
 
 
 def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:

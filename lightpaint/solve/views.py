@@ -193,7 +193,10 @@ def parted(joint: Solution, problems: Sequence[Solution], bases: Sequence[Basis]
         lighting = replace(
             joint.lighting,
             target=problem.lighting.target,
-            quality=with_objective(basis, problem, joint.quality, weights),
+            # The error of the joint objective is not this view's.
+            quality=replace(
+                with_objective(basis, problem, joint.quality, weights), objective_error=None
+            ),
         )
         views.append(replace(problem, lighting=lighting, tried=joint.tried, is_one_of_several=True))
     return views

@@ -90,7 +90,7 @@ def read_target(
         notes=(*notes, *note),
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
-        view=picture.view,
+        view=view or picture.view or (None if made is None else made.view),
     )
 
 

@@ -24,7 +24,7 @@ class Target:
         this or anything brighter was meant; None if it can say everything.
     notes: what a person should know of how it was read, a sentence each.
     content, sensor: of the scene and view that it was painted on, where a template says.
-    view: what its numbers were encoded by, in the file; None where they were light.
+    view: what a display showed it through when it was painted; None if nobody knows.
     """
 
     name: str

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.images.view import View
 from lightpaint.relight.explanation import (
     halving_spp,
     how_sure,
@@ -157,11 +158,11 @@ def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
     basis, solution, _, found = _solved(make_basis)
     bound = _bound("limits", "a", gain=0.5 * found.total, multiplier=(-2.5,))
     current = basis.mix(basis.present_weights)
-    page = missed_section(solution, replace(found, bounds=(bound,)), current, stops=0.0)
+    page = missed_section(solution, replace(found, bounds=(bound,)), current, view=View())
     assert "−2.5<small>per unit of luminance" in page
     assert "not looked into" not in page
     found = replace(found, bounds=(bound,), bounds_left_out=7)
-    page = missed_section(solution, found, current, stops=0.0)
+    page = missed_section(solution, found, current, view=View())
     assert "7 more seem to matter less, and were not looked into" in page
 
 
@@ -172,6 +173,6 @@ def test_names_are_escaped(make_basis: Any):
     diagnosis = replace(diagnosis, bounds=(bound,))
     current = basis.mix(basis.present_weights)
     page = sure_section(basis, solution, found)
-    page += missed_section(solution, diagnosis, current, stops=0.0)
+    page += missed_section(solution, diagnosis, current, view=View())
     assert "<b>" not in page
     assert "&lt;b&gt;2" in page

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.images.view import View
 from lightpaint.relight.report_constraints import constraints_section
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.solve import solve
@@ -30,7 +31,7 @@ def _missed(solution: Any) -> float:
 
 
 def _section(basis: Any, target: Target, solution: Any) -> str:
-    return constraints_section(basis, solution, stops=0.0)
+    return constraints_section(basis, solution, view=View())
 
 
 def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear, minimize, nnls
+from qp import least
+from scipy.optimize import lsq_linear, nnls
 
 from lightpaint.errors import ConstraintError
 from lightpaint.images.color import hex_to_rgb, kelvin_to_rgb
@@ -68,23 +69,11 @@ def _best(A: Any, y: Any, C: Any, w0: Any, low: Any = 0.0, high: Any = np.inf) -
     return float(2 * found.cost)
 
 
-def _best_capped(A: Any, y: Any, C: Any, rows: Any, least: float, most: float) -> float:
-    """The same under least ≤ rows · x ≤ most, x ≥ 0, by sequential quadratic programming."""
-    AC, limits = A @ C, []
-    if least > 0:
-        limits.append({"type": "ineq", "fun": lambda x: rows @ x - least, "jac": lambda x: rows})
-    if np.isfinite(most):
-        limits.append({"type": "ineq", "fun": lambda x: most - rows @ x, "jac": lambda x: -rows})
-    found = minimize(
-        lambda x: ((AC @ x - y) ** 2).sum(),
-        np.full(C.shape[1], 0.1),
-        jac=lambda x: 2 * AC.T @ (AC @ x - y),
-        bounds=[(0, None)] * C.shape[1],
-        constraints=limits,
-        method="SLSQP",
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
-    return float(found.fun)
+def _best_capped(A: Any, y: Any, C: Any, row: Any, least_of: float, most: float) -> float:
+    """The same under least_of ≤ row · x ≤ most, x ≥ 0, by quadprog."""
+    AC = A @ C
+    x = least(AC.T @ AC, AC.T @ y, rows=[row], limits=[(least_of, most)])
+    return float(((AC @ x - y) ** 2).sum())
 
 
 def _columns(n: int, light: int, colours: Any) -> Any:
@@ -147,7 +136,7 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
     A, y = _stacked(basis, target)
     present = float(_present(basis)[1] @ LUMINANCE)
     ends = [kelvin_to_rgb(2700), kelvin_to_rgb(6500)]
-    for limits, least, most in (
+    for limits, lowest, most in (
         ({"max": 0.2}, 0.0, 0.2),
         ({"max": "40%"}, 0.0, 0.4 * present),
         ({"min": 0.5, "max": 0.9}, 0.5, 0.9),
@@ -155,12 +144,10 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
         for extra, colours in (({}, np.eye(3)), ({"kelvin": [2700, 6500]}, ends)):
             w, mine, _ = _solved(basis, target, light={"l1": {"limits": limits, **extra}})
             # Round-off of a sum of three.
-            assert least - 1e-12 <= w[1] @ LUMINANCE <= most + 1e-12
+            assert lowest - 1e-12 <= w[1] @ LUMINANCE <= most + 1e-12
             C = _columns(4, 1, colours)
             row = LUMINANCE @ C[3:6]
-            # SLSQP stops at a relative 1e-8 or so; mine may be better, and keeps the limits.
-            oracle = _best_capped(A, y, C, row, least, most)
-            assert (oracle - mine) / (y @ y) >= -1e-7
+            _check_close(mine, _best_capped(A, y, C, row, lowest, most), y)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
