@@ -87,7 +87,7 @@ def descend(
         # A problem that is exact all the way has its optimum where the true one has it.
         done = step <= STEP or loss.same_squares(x, ahead)
         fall = _fall(loss, pull, squares, x, ahead, w, best)
-        part = _part_of_step(loss, pull, (w, best), (x, ahead), value, fall)
+        part, reached = _part_of_step(loss, pull, (w, best), (x, ahead), value, fall)
         if from_clipping and (done or part == 0):
             from_clipping = False
             if part == 0:
@@ -95,15 +95,14 @@ def descend(
             done = False
         if done or part == 0 or count >= ROUNDS:
             stays = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
-            small = done or fall <= FLAT * value
+            small = done or (part == 0 and fall <= FLAT * value)
             return Descent(
                 w if stays else best,
                 squares,
                 equations,
                 Reweighting(squares.factor, w, count, step, small),
             )
-        w, x = w + part * (best - w), x + part * (ahead - x)
-        value = _value(loss, pull, w, x)
+        w, x, value = w + part * (best - w), x + part * (ahead - x), reached
 
 
 def equations_of(basis: Basis, loss: Loss, squares: Squares) -> NormalEquations:
@@ -154,16 +153,19 @@ def _part_of_step(
     pictures: tuple[Doubles, Doubles],
     value: float,
     fall: float,
-) -> float:
-    """How much of a step to take: half of it until the loss falls enough; 0 if it never does."""
+) -> tuple[float, float]:
+    """How much of a step to take, and the loss there: half of it until the loss falls enough.
+
+    0 if it never does.
+    """
     (w, best), (x, ahead) = weights, pictures
     part = 1.0
     while part >= SHORTEST:
         reached = _value(loss, pull, w + part * (best - w), x + part * (ahead - x))
         if reached <= value - KEPT * part * max(fall, 0):
-            return part if reached < value else 0.0
+            return (part, reached) if reached < value else (0.0, value)
         part /= 2
-    return 0.0
+    return 0.0, value
 
 
 def _change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:
