@@ -18,8 +18,9 @@ from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
 #: Rounds at most.
 ROUNDS = 100
 
-#: Change of a light's picture in a round, beside the brightest light's, that ends them.
-STEP = 1e-6
+#: Change of a light's picture in a round, beside the brightest light's, that ends them, and part of
+#: the loss that a whole step promises. Problems that become exact go on until they are.
+STEP, FALL = 1e-6, 1e-11
 
 #: Part of what the gradient promises that a step has to keep, and the shortest step.
 KEPT, SHORTEST = 1e-4, 2.0**-20
@@ -84,9 +85,10 @@ def descend(
         count += 1
         ahead = predicted(basis, best)
         step = _change(equations, w, best)
-        # A problem that is exact all the way has its optimum where the true one has it.
-        done = step <= STEP or loss.same_squares(x, ahead)
         fall = _fall(loss, pull, squares, x, ahead, w, best)
+        # A problem that is exact all the way has its optimum where the true one has it.
+        is_exact = loss.same_squares(x, ahead)
+        done = is_exact if loss.view is None else step <= STEP or fall <= FALL * value
         part, reached = _part_of_step(loss, pull, (w, best), (x, ahead), value, fall)
         if from_clipping and (done or part == 0):
             from_clipping = False
