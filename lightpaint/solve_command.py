@@ -158,6 +158,8 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     return {
         "unpainted": options.unpainted,
         "method": options.method,
+        "space": options.space,
+        "view": view_of(options),
         "suggest": options.suggest,
         "spp": options.spp,
         "time_s": options.time_s,
