@@ -157,6 +157,13 @@ def _parser() -> argparse.ArgumentParser:
         "the answer by what that shows (default: %(default)s)",
     )
     solve.add_argument(
+        "--space",
+        choices=("linear", "display"),
+        default="linear",
+        help="linear: come closest in light; display: in what the eye sees of it through --view, "
+        "where dark parts count for more (default: %(default)s)",
+    )
+    solve.add_argument(
         "--method",
         choices=("polished", "gauss-seidel"),
         default="polished",

@@ -180,16 +180,18 @@ def _paint(
             constraints=constraints,
             unpainted=settings.unpainted,
             method=settings.method,
+            view=_fitted_in(views, settings),
         )
         for view in views
     ]
-    solution = solution_of(whole, joint_problem(problems), start=whole.present_weights)
+    problem = joint_problem(problems, bases)
+    solution = solution_of(whole, problem, start=whole.present_weights)
     solution, uncertainty = _improved(whole, solution, views, settings, progress)
     alike = () if constraints else ambiguities(whole, solution)
     joint = (whole, solution) if len(views) > 1 else None
     diagnoses = [
         diagnose(_basis(view), view.target, its, whole=joint)
-        for view, its in zip(views, parted(solution, problems), strict=True)
+        for view, its in zip(views, parted(solution, problems, bases), strict=True)
     ]
     solution = with_diagnosis(solution, diagnoses[0])
     with restoring(folder, written):
@@ -199,8 +201,18 @@ def _paint(
         relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
         return [
             _finished(view, its, uncertainty, told, alike, relit, settings, progress)
-            for view, its, told in zip(views, parted(solution, problems), diagnoses, strict=True)
+            for view, its, told in zip(
+                views, parted(solution, problems, bases), diagnoses, strict=True
+            )
         ]
+
+
+def _fitted_in(views: list[PaintedView], settings: Settings) -> View | None:
+    """The one view through which all paintings are compared, None for linear light."""
+    if settings.space == "linear":
+        return None
+    given = settings.view or next((v.target.view for v in views if v.target.view), None)
+    return given or View("srgb", choose_exposure(views[0].target.image))
 
 
 def _to_be_written(views: list[PaintedView], folder: Path) -> list[Path]:

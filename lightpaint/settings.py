@@ -1,10 +1,14 @@
 """What can be asked of a solve beside scene and painting."""
 
 from dataclasses import dataclass
+from typing import get_args
 
+from lightpaint.errors import LightpaintError
+from lightpaint.images.view import View
 from lightpaint.scene.quality import Quality
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.optimum import Method
+from lightpaint.solve.solve import Space
 
 
 @dataclass(frozen=True)
@@ -16,6 +20,8 @@ class Settings:
     unpainted: weight of unpainted pixels against the current look.
     method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
     resize: whether a target of another size is resampled.
+    space: `linear`, or `display` to come closest in what a display shows, which is `view`; None
+    for that of the painting or, where it holds light, sRGB at an exposure that shows something.
 
     What is rendered:
     spp, seed: of the basis and, with other random numbers, of the verification.
@@ -42,6 +48,8 @@ class Settings:
     unpainted: float = 0.0
     method: Method = "polished"
     resize: bool = False
+    space: Space = "linear"
+    view: View | None = None
     spp: int | None = None
     time_s: float | None = None
     seed: int = 0
@@ -53,6 +61,11 @@ class Settings:
     suggest: int = 0
     cd_per_unit: float | None = None
     command: str = ""
+
+    def __post_init__(self) -> None:
+        if self.space not in get_args(Space):
+            known = " or ".join(get_args(Space))
+            raise LightpaintError(f"no space {self.space!r} to fit in: expected {known}")
 
     @property
     def checks_as_basis(self) -> bool:

@@ -88,7 +88,7 @@ def _solve_each(
         check_writable(folder)
         if scene is not None:
             check_relightable(scene, folder / "relit.xml")
-    _say_how_read(targets)
+    _say_how_read(targets, options)
     for target, folder in zip(targets, folders, strict=True):
         if made is None and scene is not None:
             made = render_or_find(scene, options)
@@ -134,7 +134,7 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
     targets = [_fitted(t, s.size, options) for t, s in zip(targets, scenes, strict=True)]
     check_writable(folder)
     check_relightable(scenes[0], folder / "relit.xml")
-    _say_how_read(targets)
+    _say_how_read(targets, options)
     share_s = None if options.time_s is None else options.time_s / len(scenes)
     made = [render_or_find(scene, options, time_s=share_s) for scene in scenes]
     with console.progress() as progress:
@@ -158,6 +158,8 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     return {
         "unpainted": options.unpainted,
         "method": options.method,
+        "space": options.space,
+        "view": view_of(options),
         "suggest": options.suggest,
         "spp": options.spp,
         "time_s": options.time_s,
@@ -170,8 +172,14 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     }
 
 
-def _say_how_read(targets: list[Target]) -> None:
+def _say_how_read(targets: list[Target], options: Namespace) -> None:
     for target in targets:
+        name = "srgb" if target.view is None else target.view.name
+        if options.space == "linear" and name not in ("srgb", "linear"):
+            console.say(
+                f"{target.name}: painted through {name}, whose highlights stand for very much "
+                "light and rule the fit: --space display fits what the eye sees"
+            )
         for note in target.notes:
             console.say(f"{target.name}: {note}")
         if target.not_finite:

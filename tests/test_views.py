@@ -136,7 +136,7 @@ def test_error_bars_are_those_of_all_views_together(bases: list[Basis]) -> None:
     def errors(*views: int) -> np.ndarray:
         whole, parts = joint_basis([bases[k] for k in views])
         problems = [problem_of(p, targets[k]) for p, k in zip(parts, views, strict=True)]
-        solution = solution_of(whole, joint_problem(problems), start=whole.present_weights)
+        solution = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
         return error_bars(whole, solution).standard_error
 
     alone = errors(0)
@@ -157,7 +157,7 @@ def test_error_bars_of_two_views_hold(room: Path) -> None:
     for seed in range(12):
         whole, parts = joint_basis([render_basis(s, spp=16, seed=seed) for s in scenes])
         problems = [problem_of(p, t) for p, t in zip(parts, targets, strict=True)]
-        solution = solution_of(whole, joint_problem(problems), start=whole.present_weights)
+        solution = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
         low, high = error_bars(whole, solution).interval
         inside.append((low <= weights) & (weights <= high))
     # 95 % are to be; 144 values, those of one seed and light together, so that some 36 count.

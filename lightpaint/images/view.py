@@ -86,6 +86,11 @@ class View:
         return View(name if name.lower().startswith("ocio:") else name.lower(), stops)
 
     @property
+    def spoken(self) -> str:
+        """`srgb`, or with its exposure, `srgb at +1.5 stops`."""
+        return f"{self.name} at {self.stops:+.1f} stops" if self.stops else self.name
+
+    @property
     def white(self) -> float:
         """Linear light of the grey at which the display is white: it shows nothing brighter."""
         return _transform(self.name).white / float(2.0**self.stops)

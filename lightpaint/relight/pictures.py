@@ -85,7 +85,7 @@ def importance_picture(importance: Floats, current: Floats, *, view: View) -> Fl
 
 def residual(solution: Solution, predicted: Floats) -> Floats:
     """Luminance of prediction minus what was solved for, (h, w), in scene units."""
-    return luminance(predicted.astype(np.float64) - solution.image)
+    return luminance(predicted.astype(np.float64) - solution.meant(predicted))
 
 
 def residual_limit(solution: Solution, predicted: Floats, *, view: View) -> float:

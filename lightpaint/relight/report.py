@@ -82,7 +82,7 @@ def report_page(
         amounts=amounts_heading(solution),
         fit=fit_table(solution),
         verification=verification_table(verification),
-        render=render_table(basis, target, solution, verification),
+        render=render_table(basis, target, solution, predicted, verification),
         command=escape(command or "(made from Python, without a command line)"),
         again=_paint_again(basis, target, verification),
         versions=escape(versions(basis)),

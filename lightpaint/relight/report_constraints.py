@@ -29,7 +29,8 @@ def constraints_section(basis: Basis, solution: Solution, *, view: View) -> str:
     if not solution.constraints or solution.is_one_of_several:
         return ""
     start = solution.lighting.weights_for(basis)
-    free = solution_of(basis, replace(solution, constraints=None, method="polished"), start=start)
+    anew = replace(solution, constraints=None, method="polished", reweighting=None)
+    free = solution_of(basis, anew, start=start)
     without, asked = (spoken_percent(relative_residual(x)) for x in (free, solution))
     pictures = [
         (free.lighting.weights_for(basis), "Without constraints", f"{without} missed."),

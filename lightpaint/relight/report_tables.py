@@ -13,10 +13,16 @@ import numpy as np
 from lightpaint.basis.basis import RGB, Basis, BasisLight
 from lightpaint.images.color import luminance, rgb_to_hex
 from lightpaint.images.display import to_8_bit
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.photometry import Photometry
 from lightpaint.relight.explanation import relative_errors, spoken_error
 from lightpaint.relight.report_pictures import data_uri, thumbnail
-from lightpaint.relight.verdict import energy_shares, relative_residual
+from lightpaint.relight.verdict import (
+    codes_missed,
+    energy_shares,
+    linear_residual,
+    relative_residual,
+)
 from lightpaint.relight.verify import LIMIT, Verification
 from lightpaint.solve.lighting import LightSetting
 from lightpaint.solve.solve import Solution
@@ -138,7 +144,11 @@ def verification_table(verification: Verification | None) -> str:
 
 
 def render_table(
-    basis: Basis, target: Target, solution: Solution, verification: Verification | None
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
 ) -> str:
     """Where the basis comes from, and which pixels and lights took no part."""
     origin, q = basis.origin, solution.quality
@@ -153,6 +163,7 @@ def render_table(
         ("Basis", f"{origin.method}, {_samples(basis)}"),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
     ]
+    facts += _fitted_facts(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:
             facts.append(("Kept as they are", ", ".join(light.members)))
@@ -161,6 +172,37 @@ def render_table(
     if target.not_finite:
         facts.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
     return _facts(facts)
+
+
+def _fitted_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
+    """What was compared with the painting, where it was not plain light."""
+    if (loss := solution.loss) is None or solution.reweighting is None:
+        return []
+    q, facts = solution.quality, []
+    if q.display:
+        facts += [
+            ("Fitted in display space", f"as {q.display} shows it"),
+            (
+                "Missed on the display",
+                f"{codes_missed(solution):.1f} of 255 codes, {relative_residual(solution):.3g} of "
+                "the painting (RMS)",
+            ),
+            (
+                "Missed in linear light",
+                f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
+            ),
+        ]
+    if loss.at_least is not None and loss.at_least[solution.importance > 0].any():
+        its = loss.at_least & (solution.importance > 0)[..., None]
+        brighter = its & (predicted.image > loss.painted)
+        facts.append(
+            (
+                "Painted as at least so bright",
+                f"{its.any(axis=-1).sum()} pixels, {brighter.any(axis=-1).sum()} of which are "
+                "brighter now",
+            )
+        )
+    return [*facts, ("Linear problems solved", f"{q.rounds}, each certified")]
 
 
 def _samples(basis: Basis) -> str:

@@ -115,7 +115,7 @@ def suggest_lights(
         raise SceneError(f"--suggest {count}: ask for one light or more")
     check_suggestible(scene)
     total = sum(solution.quality.objective)
-    norm2 = float(solution.equations.target_norm2.sum())
+    norm2 = float(solution.norm2.sum())
     if total <= NOTHING_MISSED**2 * norm2:
         return ()
     small = _on_small_film(scene, basis)

@@ -40,8 +40,9 @@ def relative_residual(solution: Solution) -> float:
     """RMS of what the prediction misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
 
     E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
-    by importance. 0 is a perfect match, 1 is what all lights off would give. Without the
-    square root a miss of 10 % of the light would look like one of 1 %.
+    by importance; in display space, both of display values. 0 is a perfect match, 1 is what all
+    lights off would give. Without the square root a miss of 10 % of the light would look like
+    one of 1 %.
     """
     norm2 = _norm2(solution)
     # A painting that is black wherever it counts is met by darkness alone.
@@ -53,7 +54,7 @@ def noise_residual(solution: Solution, predicted: Estimate) -> float:
     """The part of `relative_residual` that is the basis' own noise, in the same measure."""
     norm2 = _norm2(solution)
     squares = np.square(predicted.half_difference, dtype=np.float64)
-    noise2 = float((solution.importance[..., None] * squares).sum())
+    noise2 = float((solution.weight * squares).sum())
     return float(np.sqrt(noise2 / norm2)) if norm2 > 0 else 0.0
 
 
@@ -67,6 +68,22 @@ def share_met(solution: Solution, predicted: Estimate) -> float:
     return max(0.0, 1.0 - float(np.sqrt(max(missed2, 0.0))))
 
 
+def linear_residual(solution: Solution, predicted: Estimate) -> float:
+    """`relative_residual` as it is in linear light, whatever was fitted."""
+    D = solution.importance[..., None]
+    meant = solution.meant(predicted.image)
+    missed2, norm2 = (
+        float((D * np.square(x, dtype=np.float64)).sum()) for x in (meant - predicted.image, meant)
+    )
+    return float(np.sqrt(missed2 / norm2)) if norm2 > 0 else float(missed2 > 0)
+
+
+def codes_missed(solution: Solution) -> float:
+    """What is missed in display space, RMS over pixels and channels, in codes of 255."""
+    mean = sum(solution.quality.objective) / (3 * float(solution.importance.sum()))
+    return 255 * float(np.sqrt(mean))
+
+
 def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
     """One plain sentence: how well the painting is met, and whether a render confirms it."""
     # No render is without noise: where there is none, nobody has measured it.
@@ -74,13 +91,20 @@ def verdict(solution: Solution, predicted: Estimate, verification: Verification 
     if predicted.half_difference.any():
         noise = f"noise adds {100 * noise_residual(solution, predicted):.0f} %"
     fit = f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting"
-    fit += f" (RMS; {noise})"
+    if solution.space == "linear":
+        fit += f" (RMS; {noise})"
+    else:
+        fit += f" as {solution.quality.display} shows it (RMS, {codes_missed(solution):.1f} of 255 "
+        fit += f"codes missed; {noise}) and "
+        fit += f"{100 * max(1 - linear_residual(solution, predicted), 0):.0f} % in linear light"
     if not solution.quality.converged:
         fit += ", from a solve that stopped before it converged"
     return f"{fit}; {agreement(verification)}."
 
 
 def _norm2(solution: Solution) -> float:
+    if solution.loss is not None:
+        return float(solution.norm2.sum())
     weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
     return float(weighted.sum())
 

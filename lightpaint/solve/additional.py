@@ -192,7 +192,7 @@ class _Fold:
         missed = c.image - mix(self.images[on], w[on])
         noise = mix(self.noise_images[on], w[on]).astype(np.float64)
         squared = np.square(missed) - np.square(noise)
-        return np.asarray(c.importance * squared.sum(axis=-1))
+        return np.asarray((c.importance * squared).sum(axis=-1))
 
 
 def _missed(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:

@@ -26,7 +26,8 @@ class Candidates:
 
     images, noise: (n + m, h, w, 3), the n lights of the basis and m candidates at unit emission,
     and half the differences of halves of their samples. halves: (n + m, 2), shares of the
-    samples in half A and B. image, importance: what is solved for. reduction: what may be done
+    samples in half A and B. image, (h, w, 3), and importance, (h, w, 1 or 3): what is solved
+    for; after reweighting, in the last linear problem. reduction: what may be done
     with the n lights. pull: of `prefer current`, for these.
     """
 
@@ -52,7 +53,7 @@ class Candidates:
                 f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
                 f"{basis.size[0]}: render them at a whole part of its size"
             )
-        image, importance = _reduced(solution.image, solution.importance, factor)
+        image, importance = _reduced(solution.image, solution.weight, factor)
         free = ~added.is_fixed
         count = int(free.sum())
         images, noise = (
@@ -133,8 +134,8 @@ def _pull(basis: Basis, solution: Solution, count: int) -> NormalEquations | Non
 def _reduced(image: Floats, importance: Floats, factor: int) -> tuple[Floats, Floats]:
     """Means of blocks, weighted with importance, and the importance of whole blocks."""
     weight = block_mean(importance.astype(np.float64), factor)
-    weighted = block_mean(image * importance[..., None].astype(np.float64), factor)
-    return weighted / np.where(weight > 0, weight, 1)[..., None], weight * factor**2
+    weighted = block_mean(image * importance.astype(np.float64), factor)
+    return weighted / np.where(weight > 0, weight, 1), weight * factor**2
 
 
 def _shares(basis: Basis, count: int) -> Doubles:

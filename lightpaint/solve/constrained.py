@@ -69,7 +69,7 @@ def free_directions(equations: NormalEquations, reduction: Reduction, start: Dou
         for light, rgb in unknown.columns:
             column[:, light] += rgb
         columns.append((column * lit.T).ravel())
-    C = np.array(columns).reshape(len(columns), -1).T
+    C = np.array(columns).reshape(len(columns), 3 * len(reduction.held)).T
     inside = np.array(
         [u.lower < value < u.upper for u, value in zip(reduction.unknowns, x, strict=True)],
         dtype=bool,

@@ -7,6 +7,7 @@ With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to 
 exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
 noise of the prediction adds to the first is taken out of it. Where the lighting answers several
 views, part of the second is what the best lighting for this view alone would not have missed.
+After reweighting, all of it is of the last linear problem: without what a display clips.
 """
 
 from dataclasses import dataclass, replace
@@ -114,7 +115,7 @@ def diagnose(
     weights = solution.lighting.weights_for(basis)
     predicted = combine(basis, solution.lighting)
     free = of_any_sign(basis, solution)
-    D = solution.importance[..., None].astype(np.float64)
+    D = solution.weight.astype(np.float64)
     missed = solution.image.astype(np.float64) - predicted.image
     # The difference of two mixes, so that both maps add up to what is missed, to the bit.
     forbidden = basis.mix(free - weights).astype(np.float64)
@@ -127,6 +128,7 @@ def diagnose(
     # Where nothing was painted no colour is missed either.
     uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
     outside = target.image.astype(np.float64) - predicted.image
+    seen = outside if solution.loss is None else solution.loss.missed(predicted.image)
     compromise = min(_given_up(basis, solution, weights), total - out_of_reach)
     bounds, left_out = bounds_of(*(whole or (basis, solution)))
     return Diagnosis(
@@ -134,8 +136,8 @@ def diagnose(
         unreachable=out_of_reach - noise,
         forbidden=total - out_of_reach - compromise,
         noise=noise,
-        ignored=float((uncounted[..., None] * np.square(outside)).sum()),
-        norm2=float((D * np.square(solution.image, dtype=np.float64)).sum()),
+        ignored=float((uncounted[..., None] * np.square(seen)).sum()),
+        norm2=_norm2(solution, D),
         unreachable_map=unreachable,
         forbidden_map=forbidden,
         ignored_map=uncounted * luminance(outside),
@@ -148,11 +150,17 @@ def diagnose(
     )
 
 
+def _norm2(solution: Solution, D: Floats) -> float:
+    if solution.loss is not None:
+        return float(solution.norm2.sum())
+    return float((D * np.square(solution.image, dtype=np.float64)).sum())
+
+
 def _given_up(basis: Basis, solution: Solution, weights: Doubles) -> float:
     """By how much the objective of this view exceeds that of the best lighting for it alone."""
     if not solution.is_one_of_several:
         return 0.0
-    alone = solution_of(basis, solution, start=weights)
+    alone = solution_of(basis, replace(solution, reweighting=None), start=weights)
     gap = sum(solution.quality.objective) - sum(alone.quality.objective)
     return max(gap, 0.0)
 
@@ -181,7 +189,7 @@ def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
 
 def _place(solution: Solution, unreachable: Floats) -> Place | None:
     """The region and block of the image with the most energy out of reach."""
-    D = solution.importance[..., None].astype(np.float64)
+    D = solution.weight.astype(np.float64)
     rows, columns = (_edges(length, BLOCKS) for length in solution.importance.shape)
 
     def block_sums(image: Floats) -> Floats:

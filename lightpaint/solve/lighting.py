@@ -83,6 +83,8 @@ class Quality:
     bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
     objective_error: standard error of `objective`, from the noise it was solved with, where that
     is known.
+    display: the view through which the objective is seen; "" where it is of linear light.
+    rounds: linear problems solved one after the other, the last of which is the certified one.
     """
 
     kkt_residual: RGB
@@ -94,6 +96,8 @@ class Quality:
     curve: tuple[tuple[int, float], ...] = ()
     bounds: tuple[Bound, ...] = ()
     objective_error: RGB | None = None
+    display: str = ""
+    rounds: int = 1
 
     def of(self, equations: NormalEquations, weights: Doubles) -> "Quality":
         """With the objective that `weights` (n, 3) have in `equations`."""
@@ -260,6 +264,8 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
             **({"bounds": [bound.fields() for bound in q.bounds]} if q.bounds else {}),
             **({"objective_error": list(q.objective_error)} if q.objective_error else {}),
+            **({"display": q.display} if q.display else {}),
+            **({"rounds": q.rounds} if q.rounds > 1 else {}),
         }
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
@@ -372,6 +378,8 @@ def _read_quality(data: dict[str, Any]) -> Quality:
         tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
         tuple(Bound.of_fields(bound) for bound in data.get("bounds", [])),
         _read_rgb(data["objective_error"]) if "objective_error" in data else None,
+        _read_text(data, "display"),
+        int(data.get("rounds", 1)),
     )
 
 

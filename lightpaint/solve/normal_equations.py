@@ -72,7 +72,7 @@ class NormalEquations:
 
     @classmethod
     def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":
-        """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w)."""
+        """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w) or (h, w, 3)."""
         return cls(*inner_products(basis.images, image, importance))
 
 
@@ -81,13 +81,15 @@ def inner_products(
 ) -> tuple[Doubles, Doubles, Doubles]:
     """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) under the pixel weights `importance`.
 
-    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), >= 0.
+    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), or (h, w, 3) where it differs
+    between the channels, >= 0.
     """
     n = images.shape[0]
     rows = images.reshape(n, -1, 3)
     # Pixels without weight contribute nothing and need not be read.
-    counted = np.flatnonzero(importance.ravel())
-    weights = importance.ravel()
+    apart = importance.shape[2:] == (3,)
+    weights = importance.reshape(rows.shape[1], 3 if apart else 1)
+    counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
     colours = target.reshape(-1, 3)
     gram = np.zeros((3, n + 1, n + 1))
     room = np.empty((n + 1, min(BLOCK, counted.size)))
@@ -103,8 +105,9 @@ def inner_products(
             # (n + 1, block): the target goes along as one more row.
             block = room[:, : pixels.size]
             for c in range(3):
-                np.multiply(lit[..., c], root, out=block[:n])
-                np.multiply(painted[:, c], root, out=block[n])
+                its = root[:, c * apart]
+                np.multiply(lit[..., c], its, out=block[:n])
+                np.multiply(painted[:, c], its, out=block[n])
                 gram[c] += block @ block.T
     return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 

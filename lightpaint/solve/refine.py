@@ -39,7 +39,7 @@ def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
         )
     w = solution.lighting.weights_for(basis)
     missed = solution.image.astype(np.float64) - mixed.image
-    _, rendered, _ = inner_products(basis.images, missed, solution.importance)
+    _, rendered, _ = inner_products(basis.images, missed, solution.weight)
     M = solution.solved.M
     known = solution.solved.b - np.einsum("cij,jc->ci", M, w)
 
@@ -78,14 +78,14 @@ def _share(
     as known so far and as rendered. All measured by M⁻¹ among the lights that are on.
     """
     weights = solution.lighting.weights_for(basis)
-    squared = np.square(solution.importance, dtype=np.float64)
+    squared = np.square(solution.weight, dtype=np.float64)
     bias, spread = 0.0, np.zeros(2)
     for c in range(3):
         on = np.flatnonzero((weights[:, c] > 0) & ~basis.is_fixed)
         inverse = pseudo_inverse(solution.solved.M[c][np.ix_(on, on)])
         bias += float(lacking[c, on] @ inverse @ lacking[c, on])
         for k, noise in enumerate((known, rendered)):
-            weighted = squared * np.square(noise[..., c])
+            weighted = squared[..., c % squared.shape[2]] * np.square(noise[..., c])
             gram, _, _ = inner_products(basis.images[on], solution.image, weighted)
             spread[k] += np.einsum("ij,ij->", inverse, gram[c])
     total = bias + spread.sum()

@@ -1,74 +1,33 @@
 """From basis and painting to lighting, in one call."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.images.exr import Floats
-from lightpaint.solve.constrained import preferring, pulled, solve_constrained, solve_sparse
+from lightpaint.images.view import View
+from lightpaint.solve.constrained import preferring
 from lightpaint.solve.constraints import Constraints
-from lightpaint.solve.lighting import Lighting, Quality
+from lightpaint.solve.lighting import Lighting
+from lightpaint.solve.linear import chosen_reduction, linear_solution, with_objective
+from lightpaint.solve.loss import Loss
 from lightpaint.solve.normal_equations import Doubles, NormalEquations, weighted_problem
 from lightpaint.solve.optimum import Method
-from lightpaint.solve.reduction import Reduction, reduce_to
-from lightpaint.solve.selection import only
-from lightpaint.solve.solver import SolverResult, solve_normal_equations
+from lightpaint.solve.reduction import Reduction
+from lightpaint.solve.reweighted import descend
+from lightpaint.solve.solution import Refinement, Solution, Space
 from lightpaint.target.target import Target
 
-
-@dataclass(frozen=True)
-class Refinement:
-    """What is known of the noise in the last step to an answer (see refine.py).
-
-    before: (n, 3), the weights that it went from.
-    noise: (h, w, 3), half difference of the prediction there, as far as it decided the step.
-    lacking: (3, n), what is still to be expected to lack in the gradient.
-    share: of the step that the render of the mix decided, 0 to 1; the basis did the rest.
-    """
-
-    before: Doubles
-    noise: Floats
-    lacking: Doubles
-    share: float
-
-
-@dataclass(frozen=True)
-class Solution:
-    """The lighting that comes closest to a target, and the problem it solves.
-
-    image: (h, w, 3), what was solved for; importance: (h, w), its weights. They differ from
-    the target's where unpainted pixels count or emitters are seen.
-    equations: of the basis as it is; solved: those that the weights solve, which differ where
-    noise was taken out of them.
-    current_share: (h, w), how much of `image` is the current look, as the basis has it.
-    constraints: what was asked of the lights beside being not negative.
-    noise_removed: the part of the noise in `equations` that is not in `solved`.
-    refinement: the last step by which the answer was improved, if it was.
-    is_one_of_several: whether the lighting answers other views too, so that it need not be the
-    best for this one.
-    method: what it was solved with (see `minimise`), and is again where it is improved.
-    tried: with `sparse`, numbers of lights and the weights (n, 3) of the best such.
-    """
-
-    lighting: Lighting
-    image: Floats
-    importance: Floats
-    equations: NormalEquations
-    solved: NormalEquations
-    current_share: Floats
-    constraints: Constraints | None = None
-    noise_removed: float = 0.0
-    refinement: Refinement | None = None
-    is_one_of_several: bool = False
-    method: Method = "polished"
-    tried: tuple[tuple[int, Doubles], ...] = ()
-
-    @property
-    def quality(self) -> Quality:
-        """How good the solve is."""
-        assert self.lighting.quality is not None
-        return self.lighting.quality
+__all__ = [
+    "Refinement",
+    "Solution",
+    "Space",
+    "chosen_reduction",
+    "problem_of",
+    "solution_of",
+    "solve",
+    "with_objective",
+]
 
 
 def solve(
@@ -79,6 +38,7 @@ def solve(
     unpainted: float = 0.0,
     start: Lighting | None = None,
     method: Method = "polished",
+    view: View | None = None,
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
@@ -88,13 +48,16 @@ def solve(
     the answer is the same.
     method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
     quality of the answer then says that it has not converged.
+    view: for an answer that comes closest in what this view shows, instead of in linear light.
 
     Lights that are kept have weight 1; the others make up what they leave of the target.
 
     Raises SizeError if basis and target differ in size, TargetError if nothing counts,
     ConstraintError if a constraint does not fit the lights.
     """
-    problem = problem_of(basis, target, constraints=constraints, unpainted=unpainted, method=method)
+    problem = problem_of(
+        basis, target, constraints=constraints, unpainted=unpainted, method=method, view=view
+    )
     begin = basis.present_weights if start is None else start.weights_for(basis)
     return solution_of(basis, problem, start=begin)
 
@@ -106,13 +69,14 @@ def problem_of(
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
     method: Method = "polished",
+    view: View | None = None,
 ) -> Solution:
     """What is to be solved, with the present lighting for an answer. As of `solve`."""
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     counted = np.where(importance > 0, importance, 1)
     equations = NormalEquations.of(basis, image, importance)
-    return Solution(
+    problem = Solution(
         lighting=Lighting.of_weights(basis, basis.present_weights, target=target.name),
         image=image,
         importance=importance,
@@ -122,82 +86,117 @@ def problem_of(
         constraints=constraints,
         method=method,
     )
+    if view is None and (target.at_least is None or not target.at_least[importance > 0].any()):
+        return problem
+    return _with_loss(basis, target, problem, view)
+
+
+def _with_loss(basis: Basis, target: Target, problem: Solution, view: View | None) -> Solution:
+    asked = problem.constraints
+    if view is not None and asked is not None:
+        # The pull to the present is of squared light: of light as bright as the view makes it.
+        pull = asked.prefer_current * 4.0**view.stops
+        asked = replace(asked, prefer_current=pull)
+    loss = Loss(
+        painted=target.image.astype(np.float64),
+        importance=problem.importance,
+        share=problem.current_share,
+        current=basis.mix(basis.present_weights),
+        at_least=target.at_least,
+        view=view,
+    )
+    return replace(problem, constraints=asked, loss=loss)
 
 
 def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
-    """`problem` with the weights that solve `problem.solved`. start: (n, 3), where to begin."""
-    equations = problem.equations
-    asked = None
-    tried: list[tuple[int, Doubles]] = []
-    if problem.constraints:
-        result, asked, tried = _solve_asked(problem, basis, problem.constraints, start)
-    else:
-        result = _solve_free(problem, basis, start)
-    weights = result.weights
+    """`problem` with the weights that solve `problem.solved`. start: (n, 3), where to begin.
 
-    norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
-    unreached = tuple(name for name, ok in zip(basis.names, result.reached, strict=True) if not ok)
-    quality = Quality(
-        kkt_residual=_rgb(result.kkt_residual),
-        objective=(0, 0, 0),
-        relative_objective=(0, 0, 0),
-        sweeps=result.sweeps,
-        converged=result.converged,
-        unreached=unreached,
-        curve=tuple(
-            (count, float(np.sqrt(equations.objective(w).sum() / norm.sum()))) for count, w in tried
-        ),
-    ).of(equations, weights)
-    target = problem.lighting.target
-    lighting = Lighting.of_weights(basis, weights, asked=asked, target=target, quality=quality)
-    return replace(problem, lighting=lighting, tried=tuple(tried))
-
-
-def _solve_free(problem: Solution, basis: Basis, start: Doubles) -> SolverResult:
-    """Every light that is not kept may have any colour."""
-    free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
-    result = solve_normal_equations(
-        problem.solved.holding(basis.is_fixed),
-        start[free],
-        is_scalar=[basis.lights[k].is_scalar for k in free],
-        method=problem.method,
-    )
-    weights, reached = start.copy(), np.ones(len(start), dtype=bool)
-    weights[free], reached[free] = result.weights, result.reached
-    return replace(result, weights=weights, reached=tuple(reached.tolist()))
-
-
-def _solve_asked(
-    problem: Solution, basis: Basis, constraints: Constraints, start: Doubles
-) -> tuple[SolverResult, list[tuple[str, bool]], list[tuple[int, Doubles]]]:
-    """Under constraints; with it, of each light, what is asked and whether that holds it.
-
-    Last, where only some lights may be on: numbers of lights and weights of the best such.
+    Where the problem has a loss that no linear problem stands for yet, one is found first.
     """
-    equations, reduction = problem.solved, reduce_to(constraints, basis.lights)
-    if constraints.prefer_current:
-        present = basis.present_weights
-        equations = preferring(equations, basis, present, constraints.prefer_current)
-    tried: list[tuple[int, Doubles]] = []
-    if constraints.sparse is not None:
-        reduction, tried = solve_sparse(equations, reduction, start, constraints.sparse)
-    result = solve_constrained(equations, reduction, start, method=problem.method)
-    active = pulled(equations, basis, result.weights)
-    labels = zip(reduction.labels, active, strict=True)
-    return result, [(label, bool(label) and holds) for label, holds in labels], tried
+    if problem.loss is not None and problem.reweighting is None:
+        return _reweighted(basis, problem, problem.loss, start)
+    solution = linear_solution(basis, problem, start=start)
+    if problem.reweighting is None:
+        return solution
+    # One more step of the last linear problem, in which lights may reach less than they do.
+    quality = replace(
+        solution.quality,
+        unreached=problem.quality.unreached,
+        converged=solution.quality.converged and problem.reweighting.converged,
+    )
+    return replace(solution, lighting=replace(solution.lighting, quality=quality))
 
 
-def chosen_reduction(basis: Basis, solution: Solution) -> Reduction:
-    """What constraints leave to solve for, with the lights that `sparse` has chosen."""
-    assert solution.constraints is not None
-    reduction = reduce_to(solution.constraints, basis.lights)
-    if solution.constraints.sparse is None:
-        return reduction
-    weights = solution.lighting.weights_for(basis)
-    on = [k for k, (lights, _) in enumerate(reduction.knobs) if weights[list(lights)].any()]
-    return only(reduction, on)
+def _reweighted(basis: Basis, problem: Solution, loss: Loss, start: Doubles) -> Solution:
+    """The solution that minimises `loss`, of the linear problem that stands for it there.
+
+    With `sparse` the lights are chosen where all of them would lead.
+    """
+    asked = problem.constraints
+    sparse = asked is not None and asked.sparse is not None
+    every = asked
+    if asked is not None and sparse:
+        every = replace(asked, sparse=None)
+    # Where the painting says "at least" it is first taken by its word, which also tells which
+    # lights reach something that counts.
+    first = linear_solution(basis, replace(problem, constraints=every), start=start)
+    weights = first.lighting.weights_for(basis)
+    solution = _descended(basis, replace(problem, constraints=every), loss, weights)
+    if sparse:
+        weights = solution.lighting.weights_for(basis)
+        chosen = linear_solution(basis, replace(solution, constraints=asked), start=weights)
+        reduction = chosen_reduction(basis, chosen)
+        weights = chosen.lighting.weights_for(basis)
+        solution = _descended(
+            basis, replace(problem, constraints=asked), loss, weights, reduction=reduction
+        )
+        solution = replace(solution, tried=chosen.tried)
+        first = replace(first, lighting=chosen.lighting)
+    quality = replace(
+        solution.quality, unreached=first.quality.unreached, curve=first.quality.curve
+    )
+    return replace(solution, lighting=replace(solution.lighting, quality=quality))
 
 
-def _rgb(values: Floats) -> tuple[float, float, float]:
-    r, g, b = (float(v) for v in values)
-    return r, g, b
+def _descended(
+    basis: Basis,
+    problem: Solution,
+    loss: Loss,
+    start: Doubles,
+    *,
+    reduction: Reduction | None = None,
+) -> Solution:
+    """From weights (n, 3) within what is asked to the least of `loss`."""
+
+    def linear(equations: NormalEquations, begin: Doubles) -> Solution:
+        one = replace(problem, loss=None, equations=equations, solved=equations)
+        return linear_solution(basis, one, start=begin, reduction=reduction)
+
+    def weights_of(equations: NormalEquations, begin: Doubles) -> Doubles:
+        return linear(equations, begin).lighting.weights_for(basis)
+
+    found = descend(basis, loss, start, weights_of, pull=_pull(basis, problem))
+    its = linear(found.equations, found.reweighting.at)
+    solution = replace(
+        problem,
+        image=found.squares.image,
+        current_share=found.squares.share,
+        equations=found.equations,
+        solved=found.equations,
+        reweighting=found.reweighting,
+    )
+    quality = with_objective(basis, solution, its.quality, found.weights)
+    quality = replace(quality, converged=quality.converged and found.reweighting.converged)
+    lighting = its.lighting
+    if (found.weights != lighting.weights_for(basis)).any():
+        lighting = Lighting.of_weights(basis, found.weights, target=lighting.target)
+    return replace(solution, lighting=replace(lighting, quality=quality))
+
+
+def _pull(basis: Basis, problem: Solution) -> NormalEquations | None:
+    """What the pull to the present adds to the objective, if it is asked for."""
+    if problem.constraints is None or not problem.constraints.prefer_current:
+        return None
+    e = problem.equations
+    nothing = NormalEquations(0 * e.M, 0 * e.b, 0 * e.target_norm2)
+    return preferring(nothing, basis, basis.present_weights, problem.constraints.prefer_current)

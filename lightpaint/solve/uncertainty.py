@@ -94,6 +94,7 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
     """Standard error and bias of every weight that `solve` or `refine` found.
 
     None where nothing is known of the noise of the basis: that is not the same as none.
+    After reweighting they are of the last linear problem.
 
     Lights that are kept or reach nothing have none. Under constraints, what a limit holds has
     none either: the error is of what is free to move there.
@@ -136,7 +137,7 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
         noise.objective_error,
         noise.objective_noise,
         excess,
-        equations.target_norm2,
+        solution.norm2,
     )
 
 
@@ -170,7 +171,7 @@ def _constrained_error_bars(
         noise.objective_error,
         noise.objective_noise,
         excess,
-        solution.equations.target_norm2,
+        solution.norm2,
     )
 
 
@@ -290,6 +291,8 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     """One pass over the pixels that count."""
     n = len(weights)
     importance = solution.importance.ravel()
+    # (pixels, 1), or (pixels, 3) where channels differ.
+    weight, share = (x.reshape(-1, x.shape[2]) for x in (solution.weight, solution.current_shares))
     residual, mixed = residual_and_noise(basis, solution, weights)
     present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
     images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
@@ -299,13 +302,13 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     counted = np.flatnonzero(importance)
     for start in range(0, counted.size, BLOCK):
         pixels = counted[start : start + BLOCK]
-        D = importance[pixels].astype(np.float64)
         rows = []
         for c in range(3):
+            D = weight[pixels, c % weight.shape[1]].astype(np.float64)
             h = halves[:, pixels, c].astype(np.float64)
             rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
             power[c] += (D * h) @ h.T
-            shared = D * solution.current_share.ravel()[pixels]
+            shared = D * share[pixels, c % share.shape[1]]
             drawn[c] += h @ (shared * present[pixels, c])
             gradient[c, :, c] += rows[c] @ rows[c].T
         if is_coupled:
@@ -314,7 +317,6 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
                 product = rows[c] @ rows[d].T
                 gradient[c, :, d] += product
                 gradient[d, :, c] += product.T
-    weight = importance[:, None]
     return Noise(
         power,
         drawn,
@@ -339,7 +341,7 @@ def residual_and_noise(
     else:
         noise = mix(basis.half_differences, weights).astype(np.float64)
         present = mix(basis.half_differences, basis.present_weights)
-        noise = np.asarray(noise - solution.current_share[..., None] * present, np.float64)
+        noise = np.asarray(noise - solution.current_shares * present, np.float64)
     return residual.reshape(-1, 3), noise.reshape(-1, 3)
 
 

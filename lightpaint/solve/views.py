@@ -16,10 +16,14 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import Estimate
+from lightpaint.images.exr import Floats
+from lightpaint.images.view import View
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting
+from lightpaint.solve.loss import Loss
+from lightpaint.solve.normal_equations import NormalEquations
 from lightpaint.solve.optimum import Method
-from lightpaint.solve.solve import Solution, problem_of, solution_of
+from lightpaint.solve.solve import Solution, problem_of, solution_of, with_objective
 from lightpaint.target.target import Target
 
 #: Pixels in a row of the long picture. The last row is filled with pixels that count nothing.
@@ -33,6 +37,7 @@ def solve_views(
     unpainted: float = 0.0,
     start: Lighting | None = None,
     method: Method = "polished",
+    view: View | None = None,
 ) -> list[Solution]:
     """Find the one lighting that comes closest to the targets of several views together.
 
@@ -43,11 +48,14 @@ def solve_views(
     """
     basis, bases = joint_basis([basis for basis, _ in views])
     problems = [
-        problem_of(basis, target, constraints=constraints, unpainted=unpainted, method=method)
+        problem_of(
+            basis, target, constraints=constraints, unpainted=unpainted, method=method, view=view
+        )
         for basis, (_, target) in zip(bases, views, strict=True)
     ]
     begin = basis.present_weights if start is None else start.weights_for(basis)
-    return parted(solution_of(basis, joint_problem(problems), start=begin), problems)
+    joint = solution_of(basis, joint_problem(problems, bases), start=begin)
+    return parted(joint, problems, bases)
 
 
 def check_same_lights(a: Basis, b: Basis) -> None:
@@ -96,8 +104,11 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, list[Basis]]:
     return joint, views
 
 
-def joint_problem(problems: Sequence[Solution]) -> Solution:
-    """The problem of all views together, for their joint basis; itself if there is one."""
+def joint_problem(problems: Sequence[Solution], bases: Sequence[Basis]) -> Solution:
+    """The problem of all views together, for their joint basis; itself if there is one.
+
+    bases: of the views, in the same order.
+    """
     first = problems[0]
     if len(problems) == 1:
         return first
@@ -113,6 +124,44 @@ def joint_problem(problems: Sequence[Solution]) -> Solution:
         current_share=_in_rows([problem.current_share for problem in problems]),
         equations=equations,
         solved=equations,
+        constraints=next((p for p in problems if p.loss is not None), first).constraints,
+        loss=_joint_loss(problems, bases),
+    )
+
+
+def _joint_loss(problems: Sequence[Solution], bases: Sequence[Basis]) -> Loss | None:
+    """What a pixel of the long picture costs; None where that is one square for each channel."""
+    view = next((p.loss.view for p in problems if p.loss is not None), None)
+    if all(problem.loss is None for problem in problems):
+        return None
+    losses = [
+        _loss_of_squares(problem, basis) if problem.loss is None else problem.loss
+        for problem, basis in zip(problems, bases, strict=True)
+    ]
+    nowhere = [np.zeros(loss.painted.shape, bool) for loss in losses]
+    at_least = [
+        none if loss.at_least is None else loss.at_least
+        for loss, none in zip(losses, nowhere, strict=True)
+    ]
+    return Loss(
+        painted=_in_rows([loss.painted for loss in losses]),
+        importance=_in_rows([loss.importance for loss in losses]),
+        share=_in_rows([loss.share for loss in losses]),
+        current=_in_rows([loss.current for loss in losses]),
+        at_least=_in_rows(at_least),
+        view=view,
+    )
+
+
+def _loss_of_squares(problem: Solution, basis: Basis) -> Loss:
+    """The loss of a view that has one square for each channel, beside others that have not."""
+    current, q = basis.mix(basis.present_weights), problem.current_share[..., None]
+    painted = (problem.image - q * current) / np.where(q < 1, 1 - q, 1)
+    return Loss(
+        painted=np.where(q < 1, painted, 0),
+        importance=problem.importance,
+        share=problem.current_share,
+        current=current,
     )
 
 
@@ -126,24 +175,55 @@ def joint_estimate(estimates: Sequence[Estimate]) -> Estimate:
     )
 
 
-def parted(joint: Solution, problems: Sequence[Solution]) -> list[Solution]:
+def parted(joint: Solution, problems: Sequence[Solution], bases: Sequence[Basis]) -> list[Solution]:
     """Of each view its own problem, with the lighting that solves all of them.
+
+    bases: of the views, in the same order.
 
     The quality says what that lighting misses of the view; its optimality is the joint one's.
     """
     if len(problems) == 1:
         return [joint]
     weights = np.array([light.weight for light in joint.lighting.lights])
-    views = []
-    for problem in problems:
+    views, start = [], 0
+    for problem, basis in zip(problems, bases, strict=True):
+        if joint.loss is not None:
+            problem = _reweighted_part(joint, problem, basis, start)
+            start += problem.importance.size
         lighting = replace(
             joint.lighting,
             target=problem.lighting.target,
             # The error of the joint objective is not this view's.
-            quality=replace(joint.quality.of(problem.equations, weights), objective_error=None),
+            quality=replace(
+                with_objective(basis, problem, joint.quality, weights), objective_error=None
+            ),
         )
         views.append(replace(problem, lighting=lighting, tried=joint.tried, is_one_of_several=True))
     return views
+
+
+def _reweighted_part(joint: Solution, problem: Solution, basis: Basis, start: int) -> Solution:
+    """The part of the last linear problem that is of one view, which begins at pixel `start`."""
+    assert joint.reweighting is not None
+    size = problem.importance.shape
+
+    def its(long: Floats) -> Floats:
+        pixels = long.reshape(-1, 3)[start : start + size[0] * size[1]]
+        return pixels.reshape(*size, 3)
+
+    reweighting = replace(joint.reweighting, factor=its(joint.reweighting.factor))
+    image, D = its(joint.image), problem.importance[..., None]
+    equations = NormalEquations.of(basis, image, D * reweighting.factor)
+    return replace(
+        problem,
+        image=image,
+        current_share=its(joint.current_share),
+        equations=equations,
+        solved=equations,
+        constraints=joint.constraints,
+        loss=problem.loss or _loss_of_squares(problem, basis),
+        reweighting=reweighting,
+    )
 
 
 def _in_rows(images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:

@@ -503,7 +503,7 @@ def test_no_constraints_take_the_plain_way(make_basis: Any, monkeypatch: Any) ->
     def never(*_: Any) -> Callable[..., Any]:
         raise AssertionError("reduced a problem with nothing asked")
 
-    monkeypatch.setattr(sys.modules["lightpaint.solve.solve"], "reduce_to", never)
+    monkeypatch.setattr(sys.modules["lightpaint.solve.linear"], "reduce_to", never)
     basis, target = _problem(make_basis, 0)
     solve(basis, target, constraints=Constraints())
     solve(basis, target)

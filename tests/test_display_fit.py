@@ -1,0 +1,136 @@
+"""Fits in display space and of saturated paintings, from files to results."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from renderer import LIGHTS, write_room
+
+import lightpaint as lp
+from lightpaint.basis.basis import Basis, write_basis
+from lightpaint.basis.render import render_basis
+from lightpaint.cli import main
+from lightpaint.errors import LightpaintError
+from lightpaint.images.exr import write_rgb
+from lightpaint.images.view import View
+from lightpaint.scene.scene import load_scene
+
+TRUTH = np.array([[5.0, 3, 2], [0.2, 0.9, 0.4], [1, 2, 0.5]])
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["beam"]
+    return write_room(tmp_path_factory.mktemp("display"), lights=lights)
+
+
+@pytest.fixture(scope="module")
+def basis(room: Path) -> Basis:
+    return render_basis(load_scene(room), spp=64)
+
+
+@pytest.fixture
+def folder(basis: Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """In it, room.basis.exr, a picture of known light, clip.png, and one out of reach, odd.exr."""
+    monkeypatch.chdir(tmp_path)
+    write_basis(tmp_path / "room.basis.exr", basis)
+    image = basis.mix(TRUTH)
+    codes = np.round(255 * View("srgb", 2.0).encode(image)).astype(np.uint8)
+    assert 0.02 < (codes == 255).mean() < 0.8
+    Image.fromarray(codes).save("clip.png")
+    y = np.linspace(0, 1, image.shape[0], dtype=np.float32)[:, None, None]
+    write_rgb(tmp_path / "odd.exr", image * y**2)
+    return tmp_path
+
+
+def _solved(name: str) -> dict[str, Any]:
+    return json.loads(Path(name, "lighting.json").read_text())
+
+
+def _weights(name: str) -> Any:
+    return np.array([light["weight"] for light in _solved(name)["lights"].values()])
+
+
+def test_the_light_of_a_picture_that_clips_is_found(folder: Path):
+    """By the command line, at the exposure it was saved with."""
+    assert main(["solve", "room.basis.exr", "clip.png", "--exposure", "2", "-o", "a"]) == 0
+    # Codes are light to 1 %, where they are some hundred.
+    np.testing.assert_allclose(_weights("a"), TRUTH, rtol=0.02, atol=0.02)
+    # Taken by its word, it asks for less light.
+    target = lp.read_target("clip.png", view=View("srgb", 2.0))
+    plain = lp.Target("t", target.image, target.importance, target.everything)
+    found = lp.solve(lp.read_basis("room.basis.exr"), plain)
+    dimmer = found.lighting.weights_for(lp.read_basis("room.basis.exr"))
+    assert (dimmer.sum(axis=0) < 0.9 * TRUTH.sum(axis=0)).any()
+    assert "at least so bright" in Path("a/report.html").read_text()
+    assert _solved("a")["solve"]["rounds"] > 1
+
+
+def test_display_space_on_the_command_line(folder: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["solve", "room.basis.exr", "odd.exr", "-o", "lin"]) == 0
+    assert "as srgb" not in capsys.readouterr().out
+    display = ["--space", "display", "--exposure", "1"]
+    assert main(["solve", "room.basis.exr", "odd.exr", "-o", "dis", *display]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "as srgb at +1.0 stops shows it" in told
+    assert "of 255 codes" in told
+    assert "in linear light" in told
+    page = Path("dis/report.html").read_text()
+    assert "Fitted in display space" in page
+    assert "Missed in linear light" in page
+    solved = _solved("dis")["solve"]
+    assert solved["display"] == "srgb at +1.0 stops"
+    assert solved["converged"]
+    assert "display" not in _solved("lin")["solve"]
+    lighting = lp.read_lighting("dis/lighting.json")
+    assert lighting.quality is not None
+    assert lighting.quality.display == "srgb at +1.0 stops"
+
+    # On the display it is closer, and in light it cannot be.
+    basis, painted = lp.read_basis("room.basis.exr"), lp.read_target("odd.exr").image
+    D = ~basis.emitters_seen[..., None]
+    view = View("srgb", 1.0)
+    off = {}
+    for name in ("lin", "dis"):
+        x = basis.mix(_weights(name))
+        shown = np.square(view.encode(x) - view.encode(painted))
+        off[name] = (D * shown).sum(), (D * np.square(x - painted)).sum()
+    assert off["dis"][0] < off["lin"][0]
+    assert off["dis"][1] > off["lin"][1]
+    assert sum(solved["objective"]) == pytest.approx(off["dis"][0], rel=1e-4)
+
+
+def test_the_view_is_that_of_the_picture(folder: Path):
+    assert main(["solve", "room.basis.exr", "clip.png", "--space", "display", "-o", "a"]) == 0
+    assert _solved("a")["solve"]["display"] == "srgb"
+    named = ["--view", "agx", "--space", "display", "-o", "b"]
+    assert main(["solve", "room.basis.exr", "clip.png", *named]) == 0
+    assert _solved("b")["solve"]["display"] == "agx"
+
+
+def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):
+    """Steps of the last linear problem: towards what a good basis gives."""
+    target = lp.read_target("odd.exr")
+    how: dict[str, Any] = {"space": "display", "view": View("srgb", 1.0)}
+    best = lp.solve(lp.read_basis("room.basis.exr"), target, view=how["view"])
+    truth = best.lighting.weights_for(lp.read_basis("room.basis.exr"))
+    for more in ({}, {"noise_correction": True}, {"refine": 1}):
+        look = lp.paint_with_light(
+            room, target, folder / "out", spp=16, seed=3, use_cache=False, **how, **more
+        )
+        assert look.verification is not None
+        assert look.verification.agrees
+        assert look.solution.quality.display == "srgb at +1.0 stops"
+        found = look.lighting.weights_for(look.basis)
+        assert look.uncertainty is not None
+        off = np.abs(found - truth) / np.maximum(look.uncertainty.standard_error, 1e-3)
+        # Of nine weights, each with an error that is known to a third.
+        assert np.sqrt(np.square(off).mean()) < 4
+
+
+def test_a_space_that_there_is_none(folder: Path):
+    with pytest.raises(LightpaintError, match="no space 'Display' to fit in: expected linear or"):
+        lp.paint_with_light(None, "odd.exr", "a", basis="room.basis.exr", space="Display")
