@@ -10,7 +10,7 @@ from lightpaint.basis.basis import Basis, read_basis
 from lightpaint.basis.foreign import LightGroups
 from lightpaint.basis.obtain import check_same_view, obtain_basis
 from lightpaint.basis.render import basis_lights, render_basis
-from lightpaint.errors import LightpaintError, SceneError
+from lightpaint.errors import LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable, restoring
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import write_estimate
@@ -103,7 +103,7 @@ def paint_with_light(
     if scene is not None and basis is not None:
         check_same_view(scene, basis)
     if not isinstance(target, Target):
-        target = read_target(target, mask=mask)
+        target = read_target(target, mask=mask, view=asked.view)
     view = PaintedView(scene, target, Path(folder), basis, layers)
     [look] = _paint([view], Path(folder), asked, progress)
     return look
@@ -114,7 +114,7 @@ def paint_views_with_light(
     targets: Sequence[Target],
     folder: str | Path,
     *,
-    bases: Sequence[Basis] | None = None,
+    bases: list[Basis] | None = None,
     progress: Progress = silent,
     **settings: Any,
 ) -> list[Look]:
@@ -123,7 +123,8 @@ def paint_views_with_light(
     scenes: the same scene, loaded through another sensor each; targets: what each is to show.
     folder: receives lighting.json and relit.xml, and for each sensor a folder of that name with
     predicted.exr, verified.exr, comparison.png and report.html.
-    bases: of these views, if made before. settings: as of `paint_with_light`.
+    bases: of these views, if made before; the list is emptied, so that no pixel is held twice.
+    settings: as of `paint_with_light`.
     """
     names = [scene.sensor_names[scene.sensor] for scene in scenes]
     if len(set(names)) < len(names):
@@ -131,13 +132,15 @@ def paint_views_with_light(
     for name in names:
         if Path(name).name != name or name in ("..", ""):
             raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
-    made = [None] * len(scenes) if bases is None else bases
     asked = Settings(**settings)
     if asked.suggest and len(scenes) > 1:
         raise LightpaintError("lights are suggested for one view only: leave out the others")
+    made = [None] * len(scenes) if bases is None else list(bases)
+    if bases is not None:
+        bases.clear()
     views = [
-        PaintedView(scene, target, Path(folder) / name, basis)
-        for scene, target, name, basis in zip(scenes, targets, names, made, strict=True)
+        PaintedView(scene, target, Path(folder) / name, made.pop(0))
+        for scene, target, name in zip(scenes, targets, names, strict=True)
     ]
     return _paint(views, Path(folder), asked, progress)
 
@@ -167,11 +170,14 @@ def _paint(
         reduce_to(constraints, basis_lights(scene))  # names what cannot be had before it renders
         if settings.suggest:
             check_suggestible(scene)
-    check_writable(folder)
+    for place in (folder, *(view.folder for view in views)):
+        check_writable(place)
     written = _to_be_written(views, folder)
-    views = [_with_basis(view, settings, len(views), progress) for view in _fitted(views, settings)]
+    views[:] = _fitted(views, settings)
+    views[:] = [_with_basis(view, settings, len(views), progress) for view in views]
     whole, bases = joint_basis([_basis(view) for view in views])
-    views = [replace(view, basis=basis) for view, basis in zip(views, bases, strict=True)]
+    # In place: the caller's list is the last to hold the bases as they were.
+    views[:] = [replace(view, basis=basis) for view, basis in zip(views, bases, strict=True)]
 
     problems = [
         problem_of(
@@ -189,11 +195,13 @@ def _paint(
     solution, uncertainty = _improved(whole, solution, views, settings, progress)
     alike = () if constraints else ambiguities(whole, solution)
     joint = (whole, solution) if len(views) > 1 else None
+    parts = parted(solution, problems, bases)
     diagnoses = [
         diagnose(_basis(view), view.target, its, whole=joint)
-        for view, its in zip(views, parted(solution, problems, bases), strict=True)
+        for view, its in zip(views, parts, strict=True)
     ]
     solution = with_diagnosis(solution, diagnoses[0])
+    parts = [with_diagnosis(its, told) for its, told in zip(parts, diagnoses, strict=True)]
     with restoring(folder, written):
         write_lighting(folder / "lighting.json", solution.lighting)
         if (groups := views[0].groups) is not None:
@@ -201,9 +209,7 @@ def _paint(
         relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
         return [
             _finished(view, its, uncertainty, told, alike, relit, settings, progress)
-            for view, its, told in zip(
-                views, parted(solution, problems, bases), diagnoses, strict=True
-            )
+            for view, its, told in zip(views, parts, diagnoses, strict=True)
         ]
 
 
@@ -211,8 +217,16 @@ def _fitted_in(views: list[PaintedView], settings: Settings) -> View | None:
     """The one view through which all paintings are compared, None for linear light."""
     if settings.space == "linear":
         return None
-    given = settings.view or next((v.target.view for v in views if v.target.view), None)
-    return given or View("srgb", choose_exposure(views[0].target.image))
+    if settings.view is not None:
+        return settings.view
+    seen = {view.target.view for view in views if view.target.view is not None}
+    if len(seen) > 1:
+        told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
+        raise TargetError(
+            f"the paintings were seen through {told}: say with --view and --exposure which of them "
+            "is to be fitted"
+        )
+    return next(iter(seen), None) or View("srgb", choose_exposure(views[0].target.image))
 
 
 def _to_be_written(views: list[PaintedView], folder: Path) -> list[Path]:

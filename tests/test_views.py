@@ -1,6 +1,8 @@
 """One lighting for the paintings of several views."""
 
 import json
+import weakref
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,10 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import render_basis
 from lightpaint.cli import main
-from lightpaint.errors import BasisError
+from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.exr import write_rgb
+from lightpaint.images.view import View
+from lightpaint.pipeline import paint_views_with_light
 from lightpaint.scene.scene import load_scene
 from lightpaint.solve.diagnosis import diagnose
 from lightpaint.solve.normal_equations import NormalEquations
@@ -197,3 +201,45 @@ def test_views_share_no_random_numbers(tmp_path: Path) -> None:
     assert noisy.sum() > 300
     # Channels go together, so that a third of them counts: 5 standard errors.
     assert abs((x * y)[noisy].mean()) < 5 / np.sqrt(noisy.sum() / 3)
+
+
+def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
+    scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
+    made = [render_basis(scene, spp=4) for scene in scenes]
+    watched = [weakref.ref(basis.images) for basis in made]
+    targets = [painting(basis, np.ones((4, 3)), "x") for basis in made]
+    alive: list[bool] = []
+
+    def look(label: str, *_: object) -> None:
+        if label == "verification":
+            alive.extend(ref() is not None for ref in watched)
+
+    paint_views_with_light(scenes, targets, tmp_path / "out", bases=made, spp=4, progress=look)
+    assert made == []
+    assert alive
+    assert not any(alive)
+
+
+def test_paintings_of_two_views_seen_through_two_transforms(room: Path, tmp_path: Path) -> None:
+    scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
+    shown = [View("agx", 1.0), View("srgb")]
+    targets = [
+        replace(painting(render_basis(s, spp=4), np.ones((4, 3)), "x"), view=view)
+        for s, view in zip(scenes, shown, strict=True)
+    ]
+    with pytest.raises(TargetError, match=r"seen through agx at \+1 stops and srgb"):
+        paint_views_with_light(scenes, targets, tmp_path / "out", spp=4, space="display")
+    looks = paint_views_with_light(
+        scenes, targets, tmp_path / "out", spp=4, space="display", view=View("srgb")
+    )
+    assert len(looks) == 2
+
+
+def test_a_file_where_a_view_s_folder_is_to_be(room: Path, tmp_path: Path) -> None:
+    scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
+    targets = [painting(render_basis(s, spp=4), np.ones((4, 3)), "x") for s in scenes]
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "close").write_text("mine", encoding="utf-8")
+    with pytest.raises(OutputError, match=r"cannot write into .*close"):
+        paint_views_with_light(scenes, targets, tmp_path / "out", spp=4)
+    assert (tmp_path / "out" / "close").read_text(encoding="utf-8") == "mine"
