@@ -158,11 +158,11 @@ def _bounded(text: str) -> int:
     return int(text)
 
 
-def one_line(text: str) -> str:
-    """What others say, as it may stand in an error: one line of no more than MAX_QUOTED."""
-    text = " ".join(text[: 4 * MAX_QUOTED].split())
+def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
+    """What others say, as it may stand in an error: one line of no more than `limit`."""
+    text = " ".join(text[: 4 * limit].split())
     text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    return text if len(text) <= MAX_QUOTED else f"{text[:MAX_QUOTED]} …"
+    return text if len(text) <= limit else f"{text[:limit]} …"
 
 
 @contextmanager

@@ -260,8 +260,6 @@ def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
     try:
         lights = [_light(strict_json(p.attributes[LIGHT_KEY])) for p in lit]
-        images = [p.rgb() for p in lit]
-        halves = [p.rgb(HALF_DIFFERENCE) for p in lit]
         origin = _origin(strict_json(head[ORIGIN_KEY]))
         checksums = None
         if CHECKSUMS_KEY in head:
@@ -275,13 +273,13 @@ def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
     try:
         basis = Basis(
             lights=tuple(lights[k] for k in order),
-            images=np.stack([images[k] for k in order]),
-            half_differences=np.stack([halves[k] for k in order]),
+            images=_stacked([lit[k] for k in order]),
+            half_differences=_stacked([lit[k] for k in order], HALF_DIFFERENCE),
             emitters_seen=seen[0] > 0,
             origin=origin,
             learned=_learned(others, checksums),
         )
-    except BasisError as error:
+    except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
     if not (np.isfinite(basis.images).all() and np.isfinite(basis.half_differences).all()):
         raise BasisError("holds values that are not finite: make it again")
@@ -291,6 +289,20 @@ def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
             check(checksums.lights[light.name], f"light {light.name!r}", about, channels)
         check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
     return basis
+
+
+def _stacked(parts: Sequence[Part], layer: str = "") -> Floats:
+    """(n, h, w, 3), without the copies that np.stack of np.stack would make."""
+    stacked = np.empty((len(parts), *parts[0].size, 3), np.float32)
+    for image, part in zip(stacked, parts, strict=True):
+        if part.size != parts[0].size:
+            raise BasisError(f"parts {parts[0].name!r} and {part.name!r} differ in size")
+        prefix = f"{layer}." if layer else ""
+        for k, c in enumerate("RGB"):
+            if prefix + c not in part.channels:
+                raise BasisError(f"no channel {prefix}{c} in part {part.name!r}")
+            image[..., k] = part.channels[prefix + c]
+    return stacked
 
 
 def _learned(others: Sequence[Part], checksums: Checksums | None) -> Floats | None:
