@@ -217,8 +217,6 @@ def load_scene(
     """
     backend = use_variant(variant)
     path = Path(path)
-    if path.is_dir():
-        raise SceneError(f"{path} is a folder, not a scene XML")
     file_length(path, "scene file", SceneError, limit=MAX_XML)
     if path.suffix.lower() in (".exr", ".json", ".png"):
         raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
