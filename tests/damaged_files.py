@@ -36,8 +36,8 @@ class Case:
 
 
 #: What may become of a case: read as it was before, read as it now says (which another reader
-#: agrees with, where there is one), or refused in one line that names the file.
-FINE = ("same", "agreed", "refused")
+#: agrees with; `read` where there is none), or refused in one line that names the file.
+FINE = ("same", "agreed", "read", "refused")
 
 
 def outcomes(
@@ -159,8 +159,7 @@ class Reader:
                 *(view["name"], view["stops"]),
                 *(data[k] for k in ("scene", "content", "sensor")),
             )
-        # A basis has checksums, a scene no second reader; what it is worth is Mitsuba's to say.
-        return self.kind in ("scene", "groups")
+        return False
 
 
 def contents(lighting: Any) -> Any:
@@ -202,8 +201,8 @@ def contents_of_json(data: Any) -> Any:
 def clear(error: BaseException, path: Path) -> bool:
     """Whether an error is one line, no longer than can be read, that names the file."""
     text = str(error)
-    # A template is a folder.
-    named = path.name in text or path.parent.name in text
+    # A template is a folder; a scene may name what it refers to, which has its name here.
+    named = path.stem in text or path.parent.name in text
     return named and text.isprintable() and len(text) < 2500
 
 
@@ -230,6 +229,8 @@ def _said(reader: Reader, path: Path, known: Any) -> str:
     else:
         if read == known:
             said = "same"
+        elif reader.kind in ("scene", "groups"):
+            said = "read"  # a bit that is turned in a number of these nobody can know of
         else:
             said = "agreed" if reader.agrees(path, read) else f"misread as {read!r}"[:300]
     took = time.perf_counter() - began

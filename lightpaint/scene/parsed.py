@@ -300,6 +300,10 @@ class ParsedScene:
                 asset = (path, props.plugin_name(), index)
                 if path.exists() and asset not in seen:  # what is not there Mitsuba tells of
                     check_asset(*asset)
+                    # Thrown in one of several threads, what its OpenEXR reader makes of a damaged
+                    # table of offsets now and then ends the process.
+                    if path.suffix.lower() == ".exr":
+                        self.config.parallel = False
                 seen.add(asset)
 
     def assets(self) -> Iterator[Path]:

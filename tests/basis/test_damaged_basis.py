@@ -83,8 +83,6 @@ def test_damage_of_light_groups(tmp_path: Path) -> None:
 
 def _edited(name: str) -> Callable[[list[Part]], list[Part]]:
     def edit(parts: list[Part]) -> list[Part]:
-        if name == "reversed":
-            return parts[::-1]
         if name == "one dropped":
             return [parts[0], *parts[2:]]
         if name == "one twice":
@@ -113,7 +111,7 @@ def _edited(name: str) -> Callable[[list[Part]], list[Part]]:
         if name == "smaller":
             return [
                 replace(p, channels={k: c[::2, ::2] for k, c in p.channels.items()}, display=None)
-                for p in parts
+                for p in parts[:4]
             ]
         if name == "one smaller":
             small = {k: c[:1, :1] for k, c in parts[1].channels.items()}
@@ -139,16 +137,13 @@ def _edited(name: str) -> Callable[[list[Part]], list[Part]]:
         ("exchanged", "changed light 'fill'"),
         ("half", "in half instead of float"),
         ("smaller", "changed light 'key'"),
-        ("one smaller", "(?i)size|window"),
+        ("one smaller", "changed light 'fill'"),
         ("no attributes", "is not a basis"),
         ("mask", "changed mask of seen emitters"),
     ],
 )
 def test_what_another_program_changed(path: Path, name: str, words: str) -> None:
-    try:
-        write_parts(path, _edited(name)(read_parts(path)))
-    except Exception:
-        pytest.skip("the format does not allow it")
+    write_parts(path, _edited(name)(read_parts(path)))
     with pytest.raises((BasisError, ImageError), match=words) as caught:
         read_basis(path)
     assert str(path) in str(caught.value)
