@@ -299,7 +299,10 @@ class ParsedScene:
                 index = int(props.get("shape_index", 0))
                 asset = (path, props.plugin_name(), index)
                 if path.exists() and asset not in seen:  # what is not there Mitsuba tells of
-                    check_asset(*asset)
+                    try:
+                        check_asset(*asset)
+                    except SceneError as error:
+                        raise SceneError(f"{self.path}: {error}") from None
                     # Thrown in one of several threads, what its OpenEXR reader makes of a damaged
                     # table of offsets now and then ends the process.
                     if path.suffix.lower() == ".exr":

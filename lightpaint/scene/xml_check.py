@@ -146,7 +146,11 @@ class _Walk:
                 f"{chain[-1]} includes {path}, which includes it in turn: this has no end"
             )
         chain = (*chain, path)
-        data = _decoded(read_bytes(path, "scene file", SceneError, limit=MAX_XML))
+        try:
+            data = _decoded(read_bytes(path, "scene file", SceneError, limit=MAX_XML))
+        except SceneError as error:
+            lead = f"{chain[-2]}: " if len(chain) > 1 else ""
+            raise SceneError(f"{lead}{error}") from None
         self.bytes += len(data)
         self.includes += 1
         if self.bytes > MAX_XML or self.includes > MAX_INCLUDES:
