@@ -46,13 +46,18 @@ _ENCODINGS = {
 NEW_LINE = b"\n"
 _NAME = rb"[A-Za-z_:\x80-\xff][\w:.\-\x80-\xff]*+"
 _QUOTED = rb"""(?:"[^"]*+"|'[^']*+')"""
+_SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"
+#: Of a document type, declarations inside it one level deep.
+_DECLARATION = rb"<!(?:%b|[^\"'>])*+>" % _QUOTED
 _MARKUP = re.compile(
-    rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>|<!\[CDATA\[(?s:.*?)\]\]>"
-    rb"|(?P<type><!DOCTYPE(?:%b|[^<>\"'\[])*+(?P<entities>\[|<)?)"
+    rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
+    rb"|(?P<type><!DOCTYPE(?>%b|%b|%b|[^<>\"'])*+>)"
     rb"|</(?P<end>%b)\s*+>"
     rb"|<(?P<tag>%b)(?P<attributes>(?:\s++%b\s*+=\s*+%b)*+)\s*+(?P<empty>/?)>"
-    % (_QUOTED, _NAME, _NAME, _NAME, _QUOTED)
+    % (_SKIPPED, _QUOTED, _SKIPPED, _DECLARATION, _NAME, _NAME, _NAME, _QUOTED)
 )
+_DECLARED = re.compile(rb"<!ENTITY\s+(%b)" % _NAME)
+_USED = re.compile(rb"&(%b);" % _NAME)
 _ATTRIBUTE = re.compile(rb"(%b)\s*+=\s*+(%b)" % (_NAME, _QUOTED))
 _REFERENCE = re.compile(r"&(?:#x([0-9a-fA-F]{1,8})|#([0-9]{1,8})|(lt|gt|amp|quot|apos));")
 _ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
@@ -249,11 +254,14 @@ def _markup(path: Path, data: bytes) -> Iterator[re.Match[bytes]]:
                 f"{path}, line {data.count(NEW_LINE, 0, at) + 1}: cannot read "
                 f"{one_line(start)!r} as XML"
             )
-        if found["entities"]:
-            raise SceneError(
-                f"{path} has a document type with declarations of its own, as of entities, which "
-                "Mitsuba does not read: write out what they stand for"
-            )
+        if found["type"] is not None and (declared := set(_DECLARED.findall(found["type"]))):
+            used = declared.intersection(_USED.findall(data, found.end()))
+            if used:
+                name = one_line(min(used).decode("utf-8", "replace"))
+                raise SceneError(
+                    f"{path} uses the entity &{name}; of its document type, which Mitsuba does not "
+                    "read: write out what it stands for"
+                )
         yield found
         at = data.find(b"<", found.end())
 

@@ -42,7 +42,8 @@ def _hostile() -> dict[str, str]:
     doubling = "".join(f'<default name="a{k}" value="{f"$a{k - 1}" * 10}"/>' for k in range(1, 10))
     made = {
         "entities": _entities(),
-        "outside": '<!DOCTYPE s [<!ENTITY e SYSTEM "file:///dev/zero">]>' + ROOM_TEXT,
+        "outside": '<!DOCTYPE s [<!ENTITY e SYSTEM "file:///dev/zero">]>'
+        + ROOM_TEXT.replace('"bulb"', '"&e;"'),
         "itself": _with('<include filename="itself.xml"/>'),
         "to_and": _with('<include filename="fro.xml"/>'),
         "fro": '<scene version="3.0.0"><include filename="to_and.xml"/></scene>',
