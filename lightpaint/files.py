@@ -1,16 +1,26 @@
-"""Writing files so that a reader never sees half of one."""
+"""Writing files so that a reader never sees half of one; reading only what is a file."""
 
+import json
+import math
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
-from lightpaint.errors import OutputError
+from lightpaint.errors import LightpaintError, OutputError
 
 #: What the name of a folder begins with in which earlier results wait.
 ASIDE = ".earlier."
+
+#: Longest text that is read whole, in bytes.
+MAX_TEXT = 2**26
+
+#: Characters of what others say that an error repeats.
+MAX_QUOTED = 400
 
 
 @contextmanager
@@ -43,6 +53,116 @@ def write_bytes(path: Path, data: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write `text` to `path` as UTF-8, whole or not at all."""
     write_bytes(path, text.encode("utf-8"))
+
+
+def file_length(
+    path: Path, what: str, error: type[LightpaintError], *, limit: int = MAX_TEXT
+) -> int:
+    """Length in bytes of what is at `path`; raises `error` unless it is a file, and no longer.
+
+    Reading a device, a pipe or a socket might never end, so that this is asked before any of it
+    is read. what: the kind of file that is expected.
+    """
+    try:
+        status = Path(path).stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise error(f"no such {what}: {path}") from None
+    except (OSError, ValueError) as reason:  # a name too long, or with a NUL in it
+        said = getattr(reason, "strerror", None) or reason
+        raise error(f"cannot read {one_line(str(path))}: {said}") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise error(f"{path} is a folder, not a {what}")
+    if not stat.S_ISREG(status.st_mode):
+        raise error(f"{path} is a device or a pipe, not a {what}")
+    if status.st_size > limit:
+        raise error(
+            f"{path} is {status.st_size} bytes long: no {what} has more than {limit}, so it is not "
+            "read"
+        )
+    return status.st_size
+
+
+def read_bytes(
+    path: Path, what: str, error: type[LightpaintError], *, limit: int = MAX_TEXT
+) -> bytes:
+    """The content of the file at `path`. Raises `error`, in one line, for all that prevents it."""
+    file_length(path, what, error, limit=limit)
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(limit + 1)
+    except OSError as reason:
+        raise error(f"cannot read {path}: {reason.strerror or reason}") from None
+    if len(data) > limit:  # as of what a kernel makes up, and says is empty
+        raise error(f"{path} has no end: no {what} has more than {limit} bytes")
+    return data
+
+
+def read_text(path: Path, what: str, error: type[LightpaintError], *, limit: int = MAX_TEXT) -> str:
+    """The text of the UTF-8 file at `path`, without a byte-order mark.
+
+    Raises `error`, in one line, for all that prevents it.
+    """
+    try:
+        return read_bytes(path, what, error, limit=limit).decode("utf-8-sig")
+    except UnicodeDecodeError as reason:
+        raise error(
+            f"{path} is not text in UTF-8: {reason.reason} at byte {reason.start}"
+        ) from None
+
+
+def strict_json(text: str) -> Any:
+    """What the JSON in `text` says, and nothing that only Python understands or makes up.
+
+    Raises ValueError for what is no JSON, for NaN and Infinity, for numbers beyond float64, for
+    text that is not Unicode (half of a surrogate pair), for a key that stands twice in an object,
+    and for what is nested too deeply.
+    """
+    try:
+        data = json.loads(
+            text,
+            object_pairs_hook=_without_repeats,
+            parse_constant=_no_number,
+            parse_float=_finite,
+            parse_int=_bounded,
+        )
+        if "\\u" in text:  # the only way by which half a pair gets into decoded text
+            json.dumps(data, ensure_ascii=False).encode()
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    except UnicodeEncodeError as error:
+        raise ValueError(f"it has text that is not Unicode: {error.reason}") from None
+    return data
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    # JSON itself would silently keep the last of two of one name.
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError(f"a name stands twice among {', '.join(key for key, _ in pairs)}")
+    return found
+
+
+def _no_number(text: str) -> Any:
+    raise ValueError(f"{text} is no number in JSON")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is too large")
+    return number
+
+
+def _bounded(text: str) -> int:
+    _finite(text)
+    return int(text)
+
+
+def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
+    """What others say, as it may stand in an error: one line of no more than `limit`."""
+    text = " ".join(text[: 4 * limit].split())
+    text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return text if len(text) <= limit else f"{text[:limit]} …"
 
 
 @contextmanager

@@ -6,6 +6,7 @@ image as R, G, B; other programs can open it as it is. docs/formats.md has the d
 
 import json
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.errors import BasisError, ImageError
+from lightpaint.files import file_length, one_line, strict_json
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import (
     Floats,
@@ -33,6 +36,14 @@ ORIGIN_KEY = "lightpaint.origin"
 LIGHT_KEY = "lightpaint.light"
 EMITTERS_SEEN = "emitters seen"
 LEARNED = "learned"
+
+#: Longest basis file that is read, in bytes; most samples, longest name and the like in it.
+MAX_BYTES = 2**36
+MAX_SAMPLES = 2**40
+MAX_NAME = 10_000
+
+#: What comes of a header that says something else than it should.
+_DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -188,81 +199,132 @@ def mix(images: Floats, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.floa
 
 def write_basis(path: Path, basis: Basis) -> None:
     """Write `basis` as a multi-part EXR, whole or not at all."""
-    parts = []
+    parts, sums = [], {}
     for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
-        attributes = {LIGHT_KEY: json.dumps(_light_fields(light), ensure_ascii=False)}
+        about = json.dumps(_light_fields(light), ensure_ascii=False)
         channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
-        parts.append(Part(light.name, channels, attributes))
-    seen = basis.emitters_seen.astype(np.float16)
+        parts.append(Part(light.name, channels, {LIGHT_KEY: about}))
+        sums[light.name] = checksum(about, channels)
+    seen = {"Y": basis.emitters_seen.astype(np.float16)}
     # The format's rule: a part name never repeats, so a light may not take this one.
-    parts.append(Part(_free_name(EMITTERS_SEEN, basis.names), {"Y": seen}))
+    parts.append(Part(_free_name(EMITTERS_SEEN, basis.names), seen))
+    learned = {}
     if basis.learned is not None:
-        received, asked = basis.learned
-        channels = {"received": received, "asked": asked}
+        learned = dict(zip(("received", "asked"), basis.learned, strict=True))
         # A table and no picture; the format wants one display window for all parts.
-        parts.append(Part(_free_name(LEARNED, basis.names), channels, display=basis.size))
+        parts.append(Part(_free_name(LEARNED, basis.names), learned, display=basis.size))
     origin = asdict(basis.origin)
     if not basis.origin.each_light:
         del origin["each_light"]  # as in files from before there was any
-    head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: json.dumps(origin, ensure_ascii=False)}
+    of_origin = json.dumps(origin, ensure_ascii=False)
+    checksums = Checksums(
+        sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
+    )
+    head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
     parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
     write_parts(path, parts)
 
 
 def read_basis(path: Path) -> Basis:
-    """Read what `write_basis` wrote.
+    """Read what `write_basis` wrote, also where another program has put its parts in another order.
 
-    Raises ImageError if the file is damaged, BasisError if it is not a basis.
+    Raises ImageError if the file is damaged, BasisError if it is not a basis or not as it was
+    written.
     """
     path = Path(path)
-    parts = read_parts(path)
-    head = next((p.attributes for p in parts if FORMAT_KEY in p.attributes), {})
-    if head.get(FORMAT_KEY) != FORMAT:
-        found = head.get(FORMAT_KEY, "no such mark")
-        raise BasisError(
-            f"{path} is not a basis this version can read: expected {FORMAT!r}, found {found!r}; "
-            "make one with lightpaint basis"
-        )
-    lit = [p for p in parts if LIGHT_KEY in p.attributes]
-    others = [p.channels for p in parts if LIGHT_KEY not in p.attributes]
-    seen = [channels["Y"] for channels in others if "Y" in channels]
-    learned = [np.stack([c["received"], c["asked"]]) for c in others if "asked" in c]
-    if not lit or not seen:
-        raise BasisError(f"{path} has lost parts of its basis: make it again with lightpaint basis")
+    file_length(path, "image file", ImageError, limit=MAX_BYTES)
     try:
-        lights = tuple(_light(json.loads(p.attributes[LIGHT_KEY])) for p in lit)
-        origin = _origin(json.loads(head[ORIGIN_KEY]))
+        parts = read_parts(path)
+        head = next((p.attributes for p in parts if FORMAT_KEY in p.attributes), {})
+        if head.get(FORMAT_KEY) != FORMAT:
+            found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
+            raise BasisError(
+                f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
+                "make one with lightpaint basis"
+            )
+        return _of_parts(parts, head)
+    except BasisError as error:
+        raise BasisError(f"{path} {error}") from error
+    except _DAMAGES as error:
+        raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
+    except MemoryError:
+        raise ImageError(f"{path} takes more memory than there is") from None
+
+
+def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
+    """Raises BasisError, without naming the file, or one of _DAMAGES."""
+    lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
+    others = [p for p in parts if LIGHT_KEY not in p.attributes]
+    seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
+    if not lit or not seen:
+        raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
+    try:
+        lights = [_light(strict_json(p.attributes[LIGHT_KEY])) for p in lit]
+        origin = _origin(strict_json(head[ORIGIN_KEY]))
+        checksums = None
+        if CHECKSUMS_KEY in head:
+            checksums = Checksums.of_text(head[CHECKSUMS_KEY])
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+    order = list(range(len(lit)))
+    if checksums is not None:
+        order = checksums.in_order([light.name for light in lights])
+        check(checksums.origin, "origin", head[ORIGIN_KEY], {})
+    try:
         basis = Basis(
-            lights=lights,
-            images=np.stack([p.rgb() for p in lit]),
-            half_differences=np.stack([p.rgb(HALF_DIFFERENCE) for p in lit]),
+            lights=tuple(lights[k] for k in order),
+            images=_stacked([lit[k] for k in order]),
+            half_differences=_stacked([lit[k] for k in order], HALF_DIFFERENCE),
             emitters_seen=seen[0] > 0,
             origin=origin,
-            learned=learned[0] if learned else None,
+            learned=_learned(others, checksums),
         )
-    except (
-        AttributeError,
-        KeyError,
-        OverflowError,
-        RecursionError,
-        TypeError,
-        ValueError,
-        ImageError,
-    ) as error:
-        raise BasisError(f"{path} is damaged as a basis: {error}") from error
-    if not np.isfinite(basis.images).all():
-        raise BasisError(f"{path} holds values that are not finite: make it again")
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+    if not (np.isfinite(basis.images).all() and np.isfinite(basis.half_differences).all()):
+        raise BasisError("holds values that are not finite: make it again")
+    if checksums is not None:
+        for k, light in enumerate(lights):
+            about, channels = lit[k].attributes[LIGHT_KEY], lit[k].channels
+            check(checksums.lights[light.name], f"light {light.name!r}", about, channels)
+        check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
     return basis
+
+
+def _stacked(parts: Sequence[Part], layer: str = "") -> Floats:
+    """(n, h, w, 3), without the copies that np.stack of np.stack would make."""
+    stacked = np.empty((len(parts), *parts[0].size, 3), np.float32)
+    for image, part in zip(stacked, parts, strict=True):
+        if part.size != parts[0].size:
+            raise BasisError(f"parts {parts[0].name!r} and {part.name!r} differ in size")
+        prefix = f"{layer}." if layer else ""
+        for k, c in enumerate("RGB"):
+            if prefix + c not in part.channels:
+                raise BasisError(f"no channel {prefix}{c} in part {part.name!r}")
+            image[..., k] = part.channels[prefix + c]
+    return stacked
+
+
+def _learned(others: Sequence[Part], checksums: Checksums | None) -> Floats | None:
+    """The table of what was learned; None for one that is not as it was, which nothing needs."""
+    for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
+        if checksums is not None and checksum("", channels) != checksums.learned:
+            return None
+        return np.stack([channels["received"], channels["asked"]])
+    return None
 
 
 def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
     """Origin, (height, width) and number of lights of the basis at `path`, without its pixels."""
+    file_length(path, "basis", BasisError, limit=MAX_BYTES)
     try:
         headers, size = read_headers(path)
         lights = sum(LIGHT_KEY in header for header in headers)
-        return _origin(json.loads(headers[0][ORIGIN_KEY])), size, lights
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise BasisError(f"{path} is no basis this version can read: {error}") from error
+        text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
+        return _origin(strict_json(text)), size, lights
+    except (*_DAMAGES, StopIteration) as error:
+        said = one_line(str(error)) or "it does not say where it comes from"
+        raise BasisError(f"{path} is no basis this version can read: {said}") from error
 
 
 def is_basis_file(path: Path) -> bool:
@@ -271,11 +333,27 @@ def is_basis_file(path: Path) -> bool:
 
 
 def _origin(data: dict[str, Any]) -> Origin:
-    (a, b), (p, q) = (tuple(int(v) for v in data.pop(key)) for key in ("halves", "passes"))
-    each = []
-    for samples_a, samples_b, passes_a, passes_b in data.pop("each_light", []):
-        each.append((int(samples_a), int(samples_b), int(passes_a), int(passes_b)))
-    return Origin(halves=(a, b), passes=(p, q), each_light=tuple(each), **data)
+    halves, passes = (_counts(data.pop(key), 2) for key in ("halves", "passes"))
+    each = tuple(_counts(counts, 4) for counts in data.pop("each_light", []))
+    for name, value in data.items():
+        if not isinstance(value, int if name == "seed" else str) or isinstance(value, bool):
+            raise TypeError(f"{name} of the origin is {value!r}")
+    return Origin(
+        halves=(halves[0], halves[1]),
+        passes=(passes[0], passes[1]),
+        each_light=tuple((a, b, p, q) for a, b, p, q in each),
+        **data,
+    )
+
+
+def _counts(values: Any, number: int) -> tuple[int, ...]:
+    if not (
+        isinstance(values, list)
+        and len(values) == number
+        and all(type(v) is int and 0 <= v <= MAX_SAMPLES for v in values)
+    ):
+        raise ValueError(f"{values!r} are not {number} numbers of samples or passes")
+    return tuple(values)
 
 
 def _light_fields(light: BasisLight) -> dict[str, Any]:
@@ -291,15 +369,31 @@ def _light_fields(light: BasisLight) -> dict[str, Any]:
 
 
 def _light(data: dict[str, Any]) -> BasisLight:
-    r, g, b = (float(v) for v in data.pop("emission"))
+    emission = _three(data.pop("emission"))
     members = data.pop("members", [])
+    flux = data.pop("unit_flux", None)
     if not isinstance(members, list):
         raise TypeError(f"members is a list of names, not {members!r}")
-    flux = data.pop("unit_flux", None)
-    if flux is not None:
-        red, green, blue = map(float, flux)
-        flux = (red, green, blue)
-    return BasisLight(emission=(r, g, b), members=tuple(map(str, members)), unit_flux=flux, **data)
+    about = {key: data.pop(key, False) for key in ("is_scalar", "is_fixed")}
+    if not all(isinstance(value, bool) for value in about.values()):
+        raise TypeError(f"{about} are true or false")
+    texts = (*members, *data.values())
+    if not all(isinstance(text, str) and len(text) <= MAX_NAME for text in texts):
+        raise TypeError(f"{texts} are texts of up to {MAX_NAME} characters")
+    return BasisLight(
+        emission=emission,
+        members=tuple(members),
+        unit_flux=None if flux is None else _three(flux),
+        **about,
+        **data,
+    )
+
+
+def _three(values: Any) -> RGB:
+    if not isinstance(values, list) or not all(type(v) in (int, float) for v in values):
+        raise TypeError(f"{values!r} is not a list of three numbers")
+    r, g, b = map(float, values)
+    return r, g, b
 
 
 def _free_name(name: str, taken: tuple[str, ...]) -> str:

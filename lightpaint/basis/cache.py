@@ -16,7 +16,7 @@ from pathlib import Path
 from platformdirs import user_cache_path
 
 from lightpaint.basis.basis import FORMAT, Basis, Origin, read_basis, read_origin, write_basis
-from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.errors import BasisError, LightpaintError, OutputError
 
 #: Bytes above which the bases that were not used for longest are deleted.
 LARGEST = 8 * 2**30
@@ -53,6 +53,9 @@ def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> 
         return None
     try:
         basis = read_basis(path)
+        origin = basis.origin
+        if path != _path(origin.scene_identity, origin.sensor, origin.seed, basis.size):
+            raise BasisError(f"{path} is the basis of something else")
     except LightpaintError:
         with suppress(OSError):
             path.unlink(missing_ok=True)
@@ -101,7 +104,8 @@ def _prune(path: Path) -> None:
 
 def entries() -> list[Entry]:
     """What is kept, the longest unused first."""
-    files = sorted(folder().glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime)
+    there = (path for path in folder().glob(f"*{SUFFIX}") if path.is_file())
+    files = sorted(there, key=lambda path: path.stat().st_mtime)
     return [_entry(path) for path in files]
 
 

@@ -22,6 +22,9 @@ from lightpaint.images.exr import Floats, read_headers
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
 
+#: Files that a folder of light groups may have: more are the frames of a film.
+MAX_FILES = 1000
+
 #: Name of what the groups lack of the beauty, with underscores added should a light have it.
 REST = "rest"
 
@@ -65,7 +68,7 @@ def is_light_groups(path: Path) -> bool:
     """Whether `path` is a folder with an EXR, or an EXR that is no basis of lightpaint's own."""
     path = Path(path)
     if path.is_dir():
-        return any(file.suffix.lower() == ".exr" for file in path.iterdir())
+        return bool(_files(path))
     if path.suffix.lower() != ".exr" or not path.is_file():
         return False
     try:
@@ -85,6 +88,11 @@ def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightG
     the lights cannot be told from other layers, or differ in size.
     """
     path = Path(path)
+    if path.is_dir() and len(files := _files(path)) > MAX_FILES:
+        raise BasisError(
+            f"{path} holds {len(files)} EXR files, more than {MAX_FILES}: is it a sequence of "
+            "frames? give a folder with the light groups of one"
+        )
     layers = {layer.name: layer for layer in read_layers(path)}
     choice = _choose(path, layers, pattern)
     beauty = layers[choice.beauty] if choice.beauty is not None else None
@@ -105,6 +113,14 @@ def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightG
             names.append(name)
             lights.append(here)
     return _light_groups(path, choice, names, lights, beauty)
+
+
+def _files(folder: Path) -> list[Path]:
+    """What may be EXR files in a folder. Raises BasisError if it cannot be looked into."""
+    try:
+        return [file for file in folder.iterdir() if file.suffix.lower() == ".exr"]
+    except OSError as error:
+        raise BasisError(f"cannot read {folder}: {error.strerror or error}") from None
 
 
 def _choose(path: Path, layers: dict[str, Layer], pattern: str | None) -> Choice:

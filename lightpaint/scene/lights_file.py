@@ -5,17 +5,24 @@ lights in the solve is not looked at here (see solve/constraints_file.py).
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
+from lightpaint.files import one_line, read_text
 
 SUFFIX = ".lights.toml"
 #: What asks for something in the solve.
 CONSTRAINTS = ("light", "tie", "prefer", "sparse")
 KNOWN = ("lights", "groups", *CONSTRAINTS)
+
+#: Longest lights file that is read, in bytes.
+MAX_BYTES = 2**20
+#: Most dots in a line, squared and summed over all lines: what the parser takes for a dotted key
+#: goes by the square of its parts, 24 ns each.
+MAX_DOTS = 10**8
 
 
 @dataclass(frozen=True)
@@ -44,32 +51,42 @@ def read_lights_file(path: Path) -> LightsFile:
     return LightsFile(
         path,
         _names(path, "lights", data["lights"]) if "lights" in data else None,
-        {name: _names(path, f"groups.{name}", its) for name, its in groups.items()},
+        {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
     )
 
 
 def read_keys(path: Path) -> dict[str, Any]:
     """All keys of a lights file, none of them unknown. Raises SceneError."""
-    text = ""
+    text = read_text(path, "lights file", SceneError, limit=MAX_BYTES)
+    dots = [line.count(".") for line in text.splitlines()]
+    if sum(n * n for n in dots) > MAX_DOTS:
+        line = dots.index(max(dots)) + 1
+        raise SceneError(f"{path}: line {line} has too many dots, {max(dots)}, for a key or names")
     try:
-        text = path.read_text(encoding="utf-8")
         data = tomllib.loads(text)
-    except FileNotFoundError:
-        raise SceneError(f"no such lights file: {path}") from None
-    except OSError as error:
-        raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise SceneError(f"{path} is not text in UTF-8: {error.reason}") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         end = f"at line {text.rstrip().count(chr(10)) + 1}, the end"
-        reason = str(error).replace("at end of document", end)
+        reason = one_line(str(error).replace("at end of document", end))
         raise SceneError(f"{path} is not TOML: {reason}") from None
     if unknown := [key for key in data if key not in KNOWN]:
-        raise SceneError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(KNOWN)}")
+        raise SceneError(
+            f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN)}"
+        )
+    if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
+        raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
     return data
+
+
+def _integers(value: Any) -> Iterator[int]:
+    if isinstance(value, int):
+        yield value
+    elif isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from _integers(one)
 
 
 def _names(path: Path, key: str, value: Any) -> tuple[str, ...]:
     if not (isinstance(value, list) and value and all(isinstance(v, str) and v for v in value)):
-        raise SceneError(f'{path}: {key} is a list of at least one name, ["a", "b"], not {value!r}')
+        said = one_line(repr(value))
+        raise SceneError(f'{path}: {key} is a list of at least one name, ["a", "b"], not {said}')
     return tuple(value)

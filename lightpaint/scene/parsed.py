@@ -5,6 +5,7 @@ loaded scene should be alive at a time.
 """
 
 import hashlib
+import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -14,7 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
+from lightpaint.files import one_line
+from lightpaint.scene.asset_check import check_asset
 from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
+from lightpaint.scene.xml_check import check_nodes, check_xml
+
+#: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
+MAX_SAID = 2000
 
 #: A place in units of the scene.
 Position = tuple[float, float, float]
@@ -100,8 +107,12 @@ class ParsedScene:
         self.resolver = mi.FileResolver(mi.file_resolver())
         self.resolver.prepend(str(path.resolve().parent))
         with self._resolving(), mitsuba_errors(path):
+            check_xml(path, parameters, mi.file_resolver())
             self.state = mi.parser.parse_file(self.config, str(path), **parameters)
+            # Mitsuba takes properties that were looked at for used, and reports the others.
+            check_nodes(path, mi.parser.ParserState(self.state))
             mi.parser.transform_all(self.config, self.state)
+            self._check_assets(mi.parser.ParserState(self.state))
         if self.state.nodes[0].props.plugin_name() != "scene":
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
         self.files = tuple(Path(str(f)) for f in self.state.files)
@@ -299,11 +310,36 @@ class ParsedScene:
         parsed = mi.parser.write_string(self.state)
         digest = hashlib.sha256(repr((mi.__version__, parsed)).encode())
         for path in (*self.files, *self.assets()):
-            data = Path(path).read_bytes()
-            digest.update(len(data).to_bytes(8, "little"))
-            digest.update(data)
+            with Path(path).open("rb") as file:
+                digest.update(os.fstat(file.fileno()).st_size.to_bytes(8, "little"))
+                while data := file.read(2**24):
+                    digest.update(data)
         digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
         return digest.hexdigest()[:32]
+
+    def _check_assets(self, state: Any) -> None:
+        """Raise SceneError for a file that no plugin should be given."""
+        import mitsuba as mi
+
+        seen: set[tuple[Path, str, int]] = set()
+        for node in state.nodes:
+            props = node.props
+            for key in props:
+                if not key.endswith("filename") or props.type(key) != mi.Properties.Type.String:
+                    continue
+                path = Path(str(self.resolver.resolve(props[key])))
+                index = int(props.get("shape_index", 0))
+                asset = (path, props.plugin_name(), index)
+                if path.exists() and asset not in seen:  # what is not there Mitsuba tells of
+                    try:
+                        check_asset(*asset)
+                    except SceneError as error:
+                        raise SceneError(f"{self.path}: {error}") from None
+                    # Thrown in one of several threads, what its OpenEXR reader makes of a damaged
+                    # table of offsets now and then ends the process.
+                    if path.suffix.lower() == ".exr":
+                        self.config.parallel = False
+                seen.add(asset)
 
     def assets(self) -> Iterator[Path]:
         """Files that plugins read: meshes, textures, tables."""
@@ -334,9 +370,17 @@ def mitsuba_errors(path: Path) -> Iterator[None]:
     """Turn what Mitsuba throws into one line: its own words, without its source places."""
     try:
         yield
-    except RuntimeError as error:
+    except MemoryError:
+        raise SceneError(f"{path} takes more memory than there is") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
+        ) from None
+    except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
         text = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", str(error))
-        text = " ".join(text.split())
+        if "str_from_cstr" in text:  # the binding's word for it
+            text = "it, or a file that it refers to, has a name that is not UTF-8"
+        text = one_line(text, limit=MAX_SAID)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
         hint = f"; set it with -D {undefined[1]}=VALUE" if undefined else ""
-        raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from None
+        raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.errors import SceneError
+from lightpaint.files import file_length
 from lightpaint.images.exr import Floats
 from lightpaint.scene.emitters import (
     AS_AUTHORED,
@@ -35,9 +36,22 @@ from lightpaint.scene.lights import (
     point_emitter,
 )
 from lightpaint.scene.lights_file import LightsFile, lights_file_beside, read_lights_file
-from lightpaint.scene.parsed import EmitterSetting, Integrator, ParsedScene, Position, View
+from lightpaint.scene.parsed import (
+    EmitterSetting,
+    Integrator,
+    ParsedScene,
+    Position,
+    View,
+    mitsuba_errors,
+)
 from lightpaint.scene.resolution import reduced, reduction
 from lightpaint.scene.variant import use_variant
+from lightpaint.scene.xml_check import MAX_XML
+
+#: Pixels of a film, its samples per pixel and characters of a name beyond which each is a mistake.
+MAX_PIXELS = 2**28
+MAX_SPP = 2**20
+MAX_NAME = 1000
 
 
 @dataclass(frozen=True)
@@ -239,32 +253,30 @@ def load_scene(
     """
     backend = use_variant(variant)
     path = Path(path)
-    if path.is_dir():
-        raise SceneError(f"{path} is a folder, not a scene XML")
-    if not path.is_file():
-        raise SceneError(f"no such scene file: {path}")
+    file_length(path, "scene file", SceneError, limit=MAX_XML)
     if path.suffix.lower() in (".exr", ".json", ".png"):
         raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
     values = {key: str(value) for key, value in (parameters or {}).items()}
-    parsed = ParsedScene(path, values, backend.variant)
+    with mitsuba_errors(path):
+        parsed = ParsedScene(path, values, backend.variant)
     index = _sensor_index(sensor, parsed.sensor_names, path)
 
     asked = _lights_file(path, lights_file, use_lights_file=use_lights_file)
-    loaded = parsed.instantiate({})
-    emitters = _find_emitters(parsed, loaded)
-    camera = _camera(loaded, parsed.sensor_names[index])
-    view = View.of(camera, index)
-    spp = int(camera.sampler().sample_count())
-    has_null = _has_null_surfaces(loaded)
-    del loaded, camera
-    gc.collect()
-    if min(view.crop_size) < 1:
-        raise SceneError(
-            f"{path} has a film of {view.crop_size[0]}x{view.crop_size[1]} pixels: "
-            "there is nothing to render"
-        )
+    with mitsuba_errors(path):
+        loaded = parsed.instantiate({})
+        emitters = _find_emitters(parsed, loaded)
+        camera = _camera(loaded, parsed.sensor_names[index])
+        view = View.of(camera, index)
+        spp = int(camera.sampler().sample_count())
+        has_null = _has_null_surfaces(loaded)
+        del loaded, camera
+        gc.collect()
+        integrator, content = parsed.integrator(), parsed.content(index)
+    _check_view(path, view, spp)
     if not emitters:
         raise SceneError(f"{path} has no lights: add at least one emitter")
+    if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
+        raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
 
     return Scene(
         path=path,
@@ -272,7 +284,7 @@ def load_scene(
         view=view,
         sensor_names=parsed.sensor_names,
         spp=spp,
-        integrator=parsed.integrator(),
+        integrator=integrator,
         has_media=parsed.has_media(),
         has_null=has_null,
         emitters=emitters,
@@ -283,10 +295,28 @@ def load_scene(
             groups={**asked.groups, **(groups or {})},
         ),
         files=parsed.files,
-        content=parsed.content(index),
+        content=content,
         lights_file=asked.path,
         _parsed=parsed,
     )
+
+
+def _check_view(path: Path, view: View, spp: int) -> None:
+    width, height = view.crop_size
+    if min(width, height) < 1:
+        raise SceneError(
+            f"{path} has a film of {width}x{height} pixels: there is nothing to render"
+        )
+    if width * height > MAX_PIXELS:
+        raise SceneError(
+            f"{path} has a film of {width}x{height} pixels: no more than {MAX_PIXELS} can be "
+            "rendered; make its width and height smaller"
+        )
+    if spp > MAX_SPP:
+        raise SceneError(
+            f"{path} asks for {spp} samples per pixel: no more than {MAX_SPP} can be rendered; "
+            "make its sample_count smaller"
+        )
 
 
 def _camera(loaded: Any, name: str) -> Any:

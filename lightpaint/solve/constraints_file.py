@@ -2,8 +2,13 @@
 
 from pathlib import Path
 
+from lightpaint.errors import ConstraintError
+from lightpaint.files import one_line
 from lightpaint.scene.lights_file import CONSTRAINTS, read_keys
 from lightpaint.solve.constraints import Constraints
+
+#: Characters of an error, which names the file, the light and the key before it quotes.
+MAX_SAID = 1000
 
 
 def read_constraints(path: str | Path) -> Constraints:
@@ -13,10 +18,14 @@ def read_constraints(path: str | Path) -> Constraints:
     means nothing, naming file, light and key.
     """
     data = {key: value for key, value in read_keys(Path(path)).items() if key in CONSTRAINTS}
-    return Constraints.of(
-        data.get("light"),
-        tie=data.get("tie", ()),
-        prefer_current=data.get("prefer", 0.0),
-        sparse=data.get("sparse"),
-        where=str(path),
-    )
+    try:
+        return Constraints.of(
+            data.get("light"),
+            tie=data.get("tie", ()),
+            prefer_current=data.get("prefer", 0.0),
+            sparse=data.get("sparse"),
+            where=str(path),
+        )
+    except ConstraintError as error:
+        # What stands in the file may be of any length.
+        raise ConstraintError(one_line(str(error), limit=MAX_SAID)) from None

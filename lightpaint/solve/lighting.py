@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.basis.basis import RGB, Basis, BasisLight, mix
 from lightpaint.errors import LightingError
-from lightpaint.files import write_text
+from lightpaint.files import one_line, read_text, strict_json, write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.photometry import Photometry, photometry
 from lightpaint.solve.bound import Bound
@@ -273,15 +273,14 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
 def read_lighting(path: str | Path) -> Lighting:
     """Read what `write_lighting` wrote. Raises LightingError for anything else."""
     path = Path(path)
-    if not path.is_file():
-        raise LightingError(f"no such lighting file: {path}")
+    text = read_text(path, "lighting file", LightingError)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_without_repeats)
-    except (ValueError, RecursionError) as error:
-        raise LightingError(f"{path} is not a JSON file: {error}") from None
+        data = strict_json(text)
+    except ValueError as error:
+        raise LightingError(f"{path} is not a JSON file: {one_line(str(error))}") from None
     found = data.get("format") if isinstance(data, dict) else None
     if found != FORMAT:
-        raise LightingError(f"{path} has the format {found!r}: expected {FORMAT!r}")
+        raise LightingError(f"{path} has the format {one_line(repr(found))}: expected {FORMAT!r}")
     try:
         return Lighting(
             lights=tuple(_read_setting(name, d) for name, d in data["lights"].items()),
@@ -291,17 +290,9 @@ def read_lighting(path: str | Path) -> Lighting:
             cd_per_unit=_read_scale(data["cd_per_unit"]) if "cd_per_unit" in data else None,
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise LightingError(f"{path} is no complete lighting: {error!r}") from None
+        raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
     except LightingError as error:
-        raise LightingError(f"{path}: {error}") from None
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    # JSON itself would silently keep the last of two lights of one name.
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        raise ValueError(f"a name stands twice among {', '.join(key for key, _ in pairs)}")
-    return found
+        raise LightingError(f"{path}: {one_line(str(error))}") from None
 
 
 def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -> LightSetting:
@@ -342,45 +333,70 @@ def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
 
 
 def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
-    is_fixed, members = data.get("is_fixed", False), data.get("members", [name])
-    if not isinstance(is_fixed, bool):
-        raise TypeError(f"is_fixed is true or false, not {is_fixed!r}")
-    if not (isinstance(members, list) and members and all(isinstance(m, str) for m in members)):
-        raise TypeError(f"members is a list of names, not {members!r}")
+    members = _read_names(data.get("members", [name]), "members")
+    if not members:
+        raise TypeError("members is a list of names, not empty")
     return LightSetting(
         name,
-        str(data["plugin"]),
-        str(data["parameter"]),
-        str(data["unit"]),
+        _read_text(data, "plugin", required=True),
+        _read_text(data, "parameter", required=True),
+        _read_text(data, "unit", required=True),
         _read_rgb(data["emission"]),
         _read_rgb(data["weight"]),
-        is_fixed,
-        tuple(members),
+        _read_bool(data.get("is_fixed", False), "is_fixed"),
+        members,
         _read_rgb(data["unit_flux"]) if "unit_flux" in data else None,
         _read_text(data, "constraint"),
-        bool(data.get("is_active", False)),
+        _read_bool(data.get("is_active", False), "is_active"),
         _read_rgb(data["standard_error"]) if "standard_error" in data else None,
     )
 
 
 def _read_quality(data: dict[str, Any]) -> Quality:
-    r, g, b = (int(v) for v in data["sweeps"])
-    converged, unreached = data["converged"], data["unreached"]
-    if not isinstance(converged, bool) or not isinstance(unreached, list):
-        raise TypeError("converged is true or false, and unreached a list of names")
+    r, g, b = (_read_count(v) for v in data["sweeps"])
+    curve = []
+    for count, missed in data.get("curve", []):
+        if type(missed) not in (int, float):
+            raise TypeError(f"curve has {missed!r} where a number is due")
+        curve.append((_read_count(count), float(missed)))
     return Quality(
         _read_rgb(data["kkt_residual"]),
         _read_rgb(data["objective"]),
         _read_rgb(data["relative_objective"]),
         (r, g, b),
-        converged,
-        tuple(str(name) for name in unreached),
-        tuple((int(count), float(missed)) for count, missed in data.get("curve", [])),
-        tuple(Bound.of_fields(bound) for bound in data.get("bounds", [])),
+        _read_bool(data["converged"], "converged"),
+        _read_names(data["unreached"], "unreached"),
+        tuple(curve),
+        tuple(_read_bound(bound) for bound in data.get("bounds", [])),
         _read_rgb(data["objective_error"]) if "objective_error" in data else None,
         _read_text(data, "display"),
-        int(data.get("rounds", 1)),
+        _read_count(data.get("rounds", 1)),
     )
+
+
+def _read_bound(data: dict[str, Any]) -> Bound:
+    bound = Bound.of_fields(data)
+    if any(data[key] != value for key, value in bound.fields().items()):
+        raise TypeError(f"{data!r} is not a bound")
+    return bound
+
+
+def _read_count(value: Any) -> int:
+    if type(value) is not int or value < 0:
+        raise TypeError(f"{value!r} is not a count")
+    return value
+
+
+def _read_bool(value: Any, key: str) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{key} is true or false, not {value!r}")
+    return value
+
+
+def _read_names(value: Any, key: str) -> tuple[str, ...]:
+    if not (isinstance(value, list) and all(isinstance(name, str) for name in value)):
+        raise TypeError(f"{key} is a list of names, not {value!r}")
+    return tuple(value)
 
 
 def _rgb(values: Any) -> RGB:
@@ -388,8 +404,8 @@ def _rgb(values: Any) -> RGB:
     return r, g, b
 
 
-def _read_text(data: dict[str, Any], key: str) -> str:
-    text = data.get(key, "")
+def _read_text(data: dict[str, Any], key: str, *, required: bool = False) -> str:
+    text = data[key] if required else data.get(key, "")
     if not isinstance(text, str):
         raise TypeError(f"{key} is a text, not {text!r}")
     return text

@@ -8,8 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.errors import ImageError, TargetError, ViewError
-from lightpaint.files import restoring, write_bytes, write_text
+from lightpaint.errors import LightpaintError, TargetError
+from lightpaint.files import (
+    one_line,
+    read_text,
+    restoring,
+    strict_json,
+    write_bytes,
+    write_text,
+)
 from lightpaint.images.bitmap import VIEW_KEY
 from lightpaint.images.display import png_bytes, to_8_bit
 from lightpaint.images.exr import Floats, Part, read_parts, write_parts, write_rgb
@@ -21,6 +28,9 @@ FORMAT = "lightpaint-template 1"
 #: The files of a template: what says how it was made, what is painted on, what helps.
 ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
 NORMALS, DEPTH, MATTES, LIGHTS = "normals.exr", "depth.exr", "mattes", "lights"
+
+#: Longest template.json that is read, in bytes.
+MAX_ABOUT = 2**20
 
 
 @dataclass(frozen=True)
@@ -120,26 +130,45 @@ def write_look(path: Path, image: Floats, view: View) -> Path:
 
 def read_template(folder: Path) -> Template:
     """Read what `write_template` wrote. Raises TargetError for anything else."""
-    about = folder / ABOUT
     try:
-        data = json.loads(about.read_text(encoding="utf-8"))
+        data = strict_json(read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT))
         if data["format"] != FORMAT:
             raise ValueError(f"its format is {data['format']!r}, expected {FORMAT!r}")
-        view = View(str(data["view"]["name"]), float(data["view"]["stops"]))
-        scene, content, sensor = (data[key] for key in ("scene", "content", "sensor"))
-        if not all(isinstance(name, str) for name in (scene, content, sensor)):
-            raise TypeError("scene, content and sensor are to be texts")
-        image = read_parts(folder / LIGHT)[0].rgb()
-        albedo = read_parts(folder / ALBEDO)[0].rgb() if (folder / ALBEDO).is_file() else None
-        if albedo is not None and albedo.shape != image.shape:
-            raise ValueError(f"{ALBEDO} and {LIGHT} differ in size")
-        if not np.isfinite(image).all():
-            raise ValueError(f"{LIGHT} holds NaN or Inf")
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, ImageError, ViewError) as e:
+        names = [data[key] for key in ("scene", "content", "sensor")]
+        view_name, stops = data["view"]["name"], data["view"]["stops"]
+        if not all(isinstance(name, str) for name in (*names, view_name)):
+            raise TypeError("scene, content, sensor and the view's name are to be texts")
+        if type(stops) not in (int, float):
+            raise TypeError(f"the view's stops are to be a number, not {stops!r}")
+        view = View(view_name, float(stops))
+        image = _read_picture(folder / LIGHT, data["size"])
+        albedo = None
+        if (folder / ALBEDO).exists():
+            albedo = _read_picture(folder / ALBEDO, data["size"])
+    except (
+        OSError,
+        LookupError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        MemoryError,
+        LightpaintError,
+    ) as error:
         raise TargetError(
-            f"{folder} is no template: {_one_line(e)}; make one with lightpaint template"
+            f"{folder} is no template: {_one_line(error)}; make one with lightpaint template"
         ) from None
+    scene, content, sensor = names
     return Template(image, view, scene, content, sensor, albedo)
+
+
+def _read_picture(path: Path, size: list[int]) -> Floats:
+    image = read_parts(path)[0].rgb()
+    height, width, _ = image.shape
+    if size != [width, height]:
+        raise ValueError(f"{path.name} is {width}x{height}, but {ABOUT} says {size}")
+    if not np.isfinite(image).all():
+        raise ValueError(f"{path.name} holds NaN or Inf")
+    return image
 
 
 def find_template(painting: Path) -> Path | None:
@@ -170,8 +199,6 @@ def _texts(view: View) -> dict[str, str]:
 
 
 def _one_line(error: Exception) -> str:
-    if isinstance(error, FileNotFoundError):
-        return f"it has no {Path(error.filename or '').name}"
     if isinstance(error, KeyError):
-        return f"{ABOUT} lacks {error}"
-    return " ".join(str(error).split())
+        return one_line(f"{ABOUT} lacks {error}")
+    return one_line(str(error) or type(error).__name__)

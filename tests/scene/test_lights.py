@@ -173,5 +173,5 @@ def test_lights_files_that_are_wrong(tmp_path: Path, text: bytes, words: str) ->
 def test_no_lights_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="no such lights file"):
         read_lights_file(tmp_path / "gone.toml")
-    with pytest.raises(SceneError, match="cannot read"):
+    with pytest.raises(SceneError, match="is a folder"):
         read_lights_file(tmp_path)

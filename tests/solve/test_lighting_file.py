@@ -197,9 +197,10 @@ def test_a_file_cut_off_anywhere(good: tuple[Path, dict[str, Any]]):
 
 
 def test_no_file(tmp_path: Path):
-    for path in (tmp_path / "none.json", tmp_path):
-        with pytest.raises(LightingError, match="no such lighting file"):
-            read_lighting(path)
+    with pytest.raises(LightingError, match="no such lighting file"):
+        read_lighting(tmp_path / "none.json")
+    with pytest.raises(LightingError, match="is a folder, not a lighting file"):
+        read_lighting(tmp_path)
 
 
 def test_names_that_repeat():

@@ -207,7 +207,7 @@ def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
         ("[]", "no template"),
         (good.replace("template 1", "template 9"), "its format is"),
         (good.replace('"srgb"', '"srgbb"'), "no view transform"),
-        (good.replace('"stops": 0.0', '"stops": 1e999'), "out of range"),
+        (good.replace('"stops": 0.0', '"stops": 1e99'), "out of range"),
         (good.replace('"sensor": "camera"', '"sensor": 7'), "texts"),
     ):
         about.write_text(bad, encoding="utf-8")

@@ -1,0 +1,86 @@
+"""Checksums in a basis file, by which it shows that another program has changed it.
+
+OpenEXR's own compression tells damage, but not a part that was painted over, converted to half,
+cropped or exchanged and written again. The header of the first part has, as the text attribute
+`lightpaint.checksums`, CRC-32s of every light (what its header says and its pixels, together),
+of the origin and of the mask of seen emitters. A file without the attribute is read unchecked.
+"""
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.errors import BasisError
+from lightpaint.files import one_line, strict_json
+
+CHECKSUMS_KEY = "lightpaint.checksums"
+
+Channels = Mapping[str, npt.NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Checksums:
+    """Of what was written. lights: by name, in the order of the lights."""
+
+    lights: Mapping[str, str]
+    origin: str
+    seen: str
+    learned: str = ""
+
+    def text(self) -> str:
+        """As it stands in the header."""
+        return json.dumps(vars(self), ensure_ascii=False)
+
+    @classmethod
+    def of_text(cls, text: str) -> "Checksums":
+        """From what `text` gave. Raises ValueError or TypeError for anything else."""
+        made = cls(**strict_json(text))
+        if not isinstance(made.lights, dict):
+            raise TypeError("checksums of lights are to be an object")
+        if not all(isinstance(x, str) for x in (*made.lights.values(), made.origin, made.seen)):
+            raise TypeError("checksums are to be texts")
+        return made
+
+    def in_order(self, names: Sequence[str]) -> list[int]:
+        """Which of `names` come first, second, … as the lights were written.
+
+        Raises BasisError if a light is gone, or one is there that was not written with them.
+        """
+        if gone := [name for name in self.lights if name not in names]:
+            raise BasisError(f"has lost the light {one_line(gone[0])!r}: make it again")
+        if new := [name for name in names if name not in self.lights]:
+            raise BasisError(
+                f"has the light {one_line(new[0])!r}, which was not written with the others: take "
+                "it out"
+            )
+        if len(names) > len(self.lights):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise BasisError(f"has the light {one_line(twice)!r} more than once: take one out")
+        return [list(names).index(name) for name in self.lights]
+
+
+def checksum(text: str, channels: Channels) -> str:
+    """Eight hexadecimal digits of a text and of pixels, their sizes, types and names."""
+    crc = zlib.crc32(text.encode())
+    for name in sorted(channels):
+        pixels = np.ascontiguousarray(channels[name])
+        crc = zlib.crc32(repr((name, pixels.shape, pixels.dtype.str)).encode(), crc)
+        crc = zlib.crc32(pixels.data, crc)
+    return f"{crc:08x}"
+
+
+def check(want: str, what: str, text: str, channels: Channels) -> None:
+    """Raise BasisError unless text and pixels are those that were written."""
+    if checksum(text, channels) == want:
+        return
+    lost = any(pixels.dtype == np.float16 for pixels in channels.values()) and what[:5] == "light"
+    how = "its pixels are in half instead of float" if lost else "it is not as it was written"
+    raise BasisError(
+        f"has a changed {what}: {how}, so another program has edited or converted the file; take "
+        "the original, or make it again with lightpaint basis"
+    )

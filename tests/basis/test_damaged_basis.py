@@ -1,0 +1,232 @@
+"""A basis that was damaged, or that another program has opened and saved: read right or refused."""
+
+import json
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from damage import damaged
+from damaged_files import Case, outcomes, wrong
+
+from lightpaint.basis import cache
+from lightpaint.basis.basis import (
+    LIGHT_KEY,
+    ORIGIN_KEY,
+    Basis,
+    read_basis,
+    read_origin,
+    write_basis,
+)
+from lightpaint.basis.checksums import CHECKSUMS_KEY
+from lightpaint.basis.foreign import MAX_FILES, is_light_groups, read_light_groups
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
+
+SIZE = (6, 5)
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> Basis:
+    made = make_basis(3, SIZE, names=["key", "fill", "rim"], seen=np.eye(*SIZE, dtype=bool))
+    halves = np.random.default_rng(1).normal(size=made.images.shape).astype(np.float32)
+    return replace(made, half_differences=halves, learned=np.ones((2, 4, 3), np.float32))
+
+
+@pytest.fixture
+def path(tmp_path: Path, basis: Basis) -> Path:
+    write_basis(tmp_path / "a.basis.exr", basis)
+    return tmp_path / "a.basis.exr"
+
+
+def _cases(content: bytes, name: str) -> Iterator[Case]:
+    """Cut and turned everywhere, and with numbers that lie in all of the header."""
+    for done, at, bent in damaged(content, 1, 300, 300):
+        yield Case(name, f"{done} at {at}", bent)
+    head = content.rfind(b"lightpaint") + 600
+    rng = random.Random(2)
+    for _ in range(300):
+        at, bit = rng.randrange(min(head, len(content))), rng.randrange(8)
+        bent = content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
+        yield Case(name, f"bit {bit} of byte {at}", bent)
+
+
+def test_damage_of_bytes(path: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.exr"
+    whole.write_bytes(path.read_bytes())
+    results = outcomes("basis", whole, list(_cases(path.read_bytes(), path.name)), tmp_path)
+    # With checksums nothing but what was written is ever read.
+    assert wrong(results, ("same", "refused")) == []
+    assert len(results) > 1000
+    assert sum(said == "same" for _, said in results) > 10
+
+
+def test_damage_of_light_groups(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    channels = {
+        f"{layer}.{c}": rng.random((8, 8)).astype(np.float32)
+        for layer in ("Combined_key", "Combined_fill")
+        for c in "RGB"
+    }
+    write_parts(tmp_path / "whole.exr", [Part("ViewLayer", channels)])
+    content = (tmp_path / "whole.exr").read_bytes()
+    cases = [Case("a.exr", f"{d} at {at}", bent) for d, at, bent in damaged(content, 3, 150, 150)]
+    results = outcomes("groups", tmp_path / "whole.exr", cases, tmp_path)
+    assert wrong(results) == []
+    assert [
+        case.done for case, said in results if case.done[:3] == "cut" and said == "agreed"
+    ] == []
+
+
+def _edited(name: str) -> Callable[[list[Part]], list[Part]]:
+    def edit(parts: list[Part]) -> list[Part]:
+        if name == "one dropped":
+            return [parts[0], *parts[2:]]
+        if name == "one twice":
+            return [*parts, replace(parts[1], name="again")]
+        if name == "a pixel":
+            red = parts[1].channels["R"].copy()
+            red[2, 3] *= 1.001
+            return [
+                parts[0],
+                replace(parts[1], channels={**parts[1].channels, "R": red}),
+                *parts[2:],
+            ]
+        if name == "exchanged":
+            one, two = parts[1], parts[2]
+            return [
+                parts[0],
+                replace(one, channels=two.channels),
+                replace(two, channels=one.channels),
+                *parts[3:],
+            ]
+        if name == "half":
+            return [
+                replace(p, channels={k: c.astype(np.float16) for k, c in p.channels.items()})
+                for p in parts
+            ]
+        if name == "smaller":
+            return [
+                replace(p, channels={k: c[::2, ::2] for k, c in p.channels.items()}, display=None)
+                for p in parts[:4]
+            ]
+        if name == "one smaller":
+            small = {k: c[:1, :1] for k, c in parts[1].channels.items()}
+            return [parts[0], replace(parts[1], channels=small), *parts[2:]]
+        if name == "no attributes":
+            return [replace(p, attributes={}) for p in parts]
+        assert name == "mask"
+        return [
+            *parts[:3],
+            replace(parts[3], channels={"Y": parts[3].channels["Y"] * 0}),
+            *parts[4:],
+        ]
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("one dropped", "lost the light 'fill'"),
+        ("one twice", "'fill' more than once"),
+        ("a pixel", "changed light 'fill'"),
+        ("exchanged", "changed light 'fill'"),
+        ("half", "in half instead of float"),
+        ("smaller", "changed light 'key'"),
+        ("one smaller", "changed light 'fill'"),
+        ("no attributes", "is not a basis"),
+        ("mask", "changed mask of seen emitters"),
+    ],
+)
+def test_what_another_program_changed(path: Path, name: str, words: str) -> None:
+    write_parts(path, _edited(name)(read_parts(path)))
+    with pytest.raises((BasisError, ImageError), match=words) as caught:
+        read_basis(path)
+    assert str(path) in str(caught.value)
+
+
+def test_parts_in_another_order_are_the_same_basis(path: Path, basis: Basis) -> None:
+    # The table has a data window of its own, which reading and writing again keeps.
+    parts = read_parts(path)
+    write_parts(path, [replace(p, display=SIZE) for p in parts[::-1]])
+    back = read_basis(path)
+    assert back.lights == basis.lights
+    assert back.images.tobytes() == basis.images.tobytes()
+    assert read_origin(path) == (basis.origin, SIZE, 3)
+
+
+def test_a_table_that_is_not_as_it_was_is_left_out(path: Path, basis: Basis) -> None:
+    parts = read_parts(path)
+    table = {k: c * 2 for k, c in parts[-1].channels.items()}
+    write_parts(path, [*parts[:-1], replace(parts[-1], channels=table)])
+    back = read_basis(path)
+    assert back.learned is None
+    assert back.images.tobytes() == basis.images.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("key", "changes"),
+    [
+        (ORIGIN_KEY, {"halves": [0, -1]}),
+        (ORIGIN_KEY, {"halves": [1e400, 1]}),
+        (ORIGIN_KEY, {"halves": "12"}),
+        (ORIGIN_KEY, {"passes": [1, 2, 3]}),
+        (ORIGIN_KEY, {"seed": True}),
+        (ORIGIN_KEY, {"scene": 7}),
+        (ORIGIN_KEY, {"each_light": [[1, 2, 3, -4]] * 3}),
+        (ORIGIN_KEY, {"each_light": [[1, 1, 1, 1]]}),
+        (LIGHT_KEY, {"emission": [float("nan"), 1, 1]}),
+        (LIGHT_KEY, {"emission": [-1, 1, 1]}),
+        (LIGHT_KEY, {"emission": "123"}),
+        (LIGHT_KEY, {"name": "x" * 10_000_000}),
+        (LIGHT_KEY, {"name": "fill"}),
+        (LIGHT_KEY, {"name": "\ud800"}),
+        (LIGHT_KEY, {"plugin": 3}),
+        (LIGHT_KEY, {"is_fixed": "yes"}),
+        (LIGHT_KEY, {"members": [1]}),
+        (CHECKSUMS_KEY, {"lights": []}),
+        (CHECKSUMS_KEY, {"seen": None}),
+        (CHECKSUMS_KEY, {"more": ""}),
+        (CHECKSUMS_KEY, {"origin": "00000000"}),
+    ],
+)
+def test_hostile_headers(path: Path, key: str, changes: dict[str, Any]) -> None:
+    parts = read_parts(path)
+    data = json.loads(parts[0].attributes[key]) | changes
+    attributes = {**parts[0].attributes, key: json.dumps(data)}
+    if key != CHECKSUMS_KEY:
+        del attributes[CHECKSUMS_KEY]  # which would notice anyway
+    write_parts(path, [replace(parts[0], attributes=attributes), *parts[1:]])
+    with pytest.raises(BasisError) as caught:
+        read_basis(path)
+    assert str(path) in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_basis_in_the_place_of_another_is_not_taken(
+    tmp_path: Path, basis: Basis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    origin = basis.origin
+    assert cache.keep(basis)
+    asked = (origin.scene_identity, origin.sensor, origin.seed, SIZE)
+    assert cache.find(*asked) is not None
+    (kept,) = tmp_path.glob("*.basis.exr")
+    other = cache._path("another", *asked[1:])
+    kept.rename(other)
+    assert cache.find("another", *asked[1:]) is None
+    (tmp_path / "gone.basis.exr").symlink_to("nowhere")
+    assert cache.entries() == []
+
+
+def test_a_folder_of_very_many_files(tmp_path: Path) -> None:
+    write_rgb(tmp_path / "0.exr", np.ones((2, 2, 3)))
+    for k in range(MAX_FILES):
+        (tmp_path / f"frame.{k}.exr").touch()
+    assert is_light_groups(tmp_path)
+    with pytest.raises(BasisError, match="a sequence of frames"):
+        read_light_groups(tmp_path)
