@@ -93,7 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument(
         "--target",
         dest="views",
-        type=_key_value,
+        type=_sensor_target,
         action="append",
         default=[],
         metavar="SENSOR=TARGET",
@@ -150,7 +150,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     solve.add_argument(
         "--refine",
-        type=_at_least(0),
+        type=_at_least(0, most=100),
         default=0,
         metavar="K",
         help="times to render the scene as solved, with as many samples as the basis, and improve "
@@ -279,7 +279,7 @@ def _add_constraints(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "constraints",
         "NAME is a light, a group or a pattern; all may be repeated. LEVEL is a luminance like "
-        "2.5, a share of the present one like 40%%, or r,g,b. COLOR is #ffaa66, 3200K or r,g,b.",
+        "2.5, a share of the present one like 40%, or r,g,b. COLOR is #ffaa66, 3200K or r,g,b.",
     )
 
     def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
@@ -427,6 +427,13 @@ def _key_value(text: str) -> tuple[str, str]:
     return key, value
 
 
+def _sensor_target(text: str) -> tuple[str, str]:
+    sensor, _, target = text.partition("=")
+    if not sensor or not target:
+        raise argparse.ArgumentTypeError(f"{text!r} is not SENSOR=TARGET")
+    return sensor, target
+
+
 def _names(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",")]
     if not all(names):
@@ -462,6 +469,8 @@ def _lock(text: str) -> tuple[str, Any]:
 
 
 def _limits(text: str) -> tuple[str, dict[str, Any]]:
+    if "=" not in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=MIN:MAX")
     name, value = _named(text)
     least, colon, most = str(text.rpartition("=")[2]).partition(":")
     if not colon:
@@ -502,10 +511,10 @@ def _primaries(text: str) -> tuple[str, list[str]]:
 
 
 class _at_least:  # noqa: N801 (used as a function)
-    """An integer no smaller than a bound."""
+    """An integer no smaller than a bound, and maybe no larger than another."""
 
-    def __init__(self, bound: int) -> None:
-        self.bound = bound
+    def __init__(self, bound: int, *, most: int | None = None) -> None:
+        self.bound, self.most = bound, most
 
     def __call__(self, text: str) -> int:
         try:
@@ -514,6 +523,8 @@ class _at_least:  # noqa: N801 (used as a function)
             value = self.bound - 1
         if value < self.bound:
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number >= {self.bound}")
+        if self.most is not None and value > self.most:
+            raise argparse.ArgumentTypeError(f"{text!r} is too much: at most {self.most}")
         return value
 
 

@@ -64,6 +64,11 @@ def template(options: Namespace, _given: list[str]) -> int:
                 f"{file} exists and may have been painted on: choose another name with -o, or "
                 "pass --force"
             )
+    if not only_look and output.suffix.lower() in (".png", ".tif", ".tiff", ".jpg", ".jpeg"):
+        raise OutputError(
+            f"{output} is no folder: name one with -o, or a file that ends in .exr (a PNG comes "
+            "along)"
+        )
     if not only_look and output.is_file():
         raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
     check_writable(output.parent if only_look else output)

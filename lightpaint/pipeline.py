@@ -126,12 +126,7 @@ def paint_views_with_light(
     bases: of these views, if made before; the list is emptied, so that no pixel is held twice.
     settings: as of `paint_with_light`.
     """
-    names = [scene.sensor_names[scene.sensor] for scene in scenes]
-    if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
-    for name in names:
-        if Path(name).name != name or name in ("..", ""):
-            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+    names = check_each_once(scenes)
     asked = Settings(**settings)
     if asked.suggest and len(scenes) > 1:
         raise LightpaintError("lights are suggested for one view only: leave out the others")
@@ -143,6 +138,17 @@ def paint_views_with_light(
         for scene, target, name in zip(scenes, targets, names, strict=True)
     ]
     return _paint(views, Path(folder), asked, progress)
+
+
+def check_each_once(scenes: Sequence[Scene]) -> list[str]:
+    """The sensor of each. Raises SceneError for one that is there twice or names no folder."""
+    names = [scene.sensor_names[scene.sensor] for scene in scenes]
+    if len(set(names)) < len(names):
+        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+    for name in names:
+        if Path(name).name != name or name in ("..", ""):
+            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+    return names
 
 
 @dataclass(frozen=True)

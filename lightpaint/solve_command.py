@@ -13,6 +13,7 @@ from lightpaint.files import check_writable
 from lightpaint.given import constraints_of, folders_of, load, render_or_find, view_of
 from lightpaint.pipeline import (
     all_constraints,
+    check_each_once,
     command_line,
     paint_views_with_light,
     paint_with_light,
@@ -126,6 +127,7 @@ def _solve_views(options: Namespace, targets: list[Target], given: list[str]) ->
         options.sensor = sensor
         scene = load(options, path=Path(options.source), is_first=not scenes)
         scenes.append(on_film(scene, options.quality, options.resolution))
+    check_each_once(scenes)
     constraints = constraints_of(options)
     reduce_to(all_constraints(scenes[0], constraints), basis_lights(scenes[0]))
     folder = Path(options.output or targets[0].name)
@@ -220,7 +222,8 @@ def _check_nothing_to_render(options: Namespace) -> None:
     asked |= {"--suggest": options.suggest}
     if idle := [name for name, value in asked.items() if value]:
         raise BasisError(
-            f"{', '.join(idle)} cannot change a saved basis: leave them out, or give the scene"
+            f"{', '.join(idle)} cannot change a saved basis: leave "
+            f"{'it' if len(idle) == 1 else 'them'} out, or give the scene"
         )
 
 

@@ -34,6 +34,8 @@ def light_group_source(options: Namespace) -> GroupSource | None:
         path = Path(given)
         if not path.exists():
             raise BasisError(f"no such file or folder of light groups: --lights {given}")
+        if path.is_dir() and not is_light_groups(path):
+            raise BasisError(f"--lights {given} is a folder without an .exr file")
         if not is_light_groups(path):
             raise BasisError(
                 f"--lights {given} holds no light groups: give an EXR of another renderer's, or a "
@@ -76,8 +78,7 @@ def _is_file_to_be(given: str, source: Path) -> bool:
     if given.lower().endswith(".exr"):
         return True
     # A folder may well have the name of a light: results are kept in such.
-    is_painting = source.suffix.lower() != ".xml"
-    return is_painting and Path(given).is_dir() and is_light_groups(Path(given))
+    return source.suffix.lower() != ".xml" and Path(given).is_dir()
 
 
 def _check_nothing_to_render(source: GroupSource, options: Namespace) -> None:

@@ -138,7 +138,7 @@ def show_look(look: Look, folder: Path) -> None:
     quality = look.solution.quality
     if quality.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
-        console.write(f"missed of the painting, by number of lights: {listed}")
+        console.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
     if quality.unreached:
         console.say(
             f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "

@@ -36,10 +36,12 @@ def spoken_sum(
         "that is kept as it is, as the light rest"
     )
     if truly_exceeding > EXCEEDING:
-        told += (
-            f"; WARNING: in places they exceed it, by {_percent(exceeding)} in all, which rest "
-            "takes away: is the beauty denoised or clamped, or a light in two groups?"
+        warning = (
+            f"WARNING: in places the groups exceed the beauty, by {_percent(exceeding)} of its "
+            "light in all, which the light rest takes away: is the beauty denoised or clamped, or "
+            "a light in two groups?"
         )
+        told = f"{warning} {told[0].upper()}{told[1:]}" if truly_missing > NOTHING else warning
     return told, True
 
 

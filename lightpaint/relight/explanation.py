@@ -50,7 +50,9 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     errors = relative_errors(uncertainty)
     effect = np.where(np.isfinite(errors), errors, 0) * shares
     if not effect.any():
-        return "More samples would change no light: the basis has no noise."
+        has_noise = bool(basis.half_differences.any())
+        why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
+        return f"More samples would change no light: {why}."
     k = int(np.argmax(effect))
     light = f"light {solution.lighting.lights[k].name}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
@@ -79,8 +81,10 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     d = diagnosis
     if d.missed < 0.01:
         return ["The lights can do what is painted."]
+    # What is kept has a bound of its own below.
+    which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     parts = {
-        "no mix of the lights can reach": d.unreachable,
+        f"no mix of {which} can reach": d.unreachable,
         "only light below zero could"
         if not d.is_constrained
         else "what is asked of the lights, or zero, forbids": d.forbidden,

@@ -86,9 +86,9 @@ def codes_missed(solution: Solution) -> float:
 
 def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
     """One plain sentence: how well the painting is met, and whether a render confirms it."""
-    # No render is without noise: where there is none, nobody has measured it.
+    # No render of light is without noise: where there is none, nobody has measured it.
     noise = "whatever noise the layers have included"
-    if predicted.half_difference.any():
+    if predicted.half_difference.any() or not predicted.image.any():
         noise = f"noise adds {100 * noise_residual(solution, predicted):.0f} %"
     fit = f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting"
     if solution.space == "linear":

@@ -292,7 +292,8 @@ def _white(value: Any, duv: float, where: str) -> tuple[RGB, ...]:
     is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
     if not is_range or not all(map(_is_number, ends)) or sorted(ends) != list(ends):
         raise ConstraintError(
-            f"{where} is {value!r}: expected a temperature, 3200, or a range, [2700, 6500]"
+            f"{where} is {value!r}: expected a temperature, 3200, or a range from low to high, "
+            "[2700, 6500]"
         )
     return tuple(_kelvin(float(kelvin), duv, where) for kelvin in dict.fromkeys(ends))
 
