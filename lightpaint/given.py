@@ -81,6 +81,8 @@ def render_or_find(scene: Scene, options: Namespace, *, time_s: float | None = N
         def progress(label: str, done: int, total: int, unit: str = "passes") -> None:
             nonlocal rendered
             rendered = True
+            if getattr(options, "views", None):
+                label += f" of {scene.sensor_names[scene.sensor]}"
             report(label, done, total, unit)
 
         made = obtain_basis(

@@ -15,7 +15,7 @@ from lightpaint.files import check_writable, restoring
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.view import View
-from lightpaint.progress import Progress, silent
+from lightpaint.progress import Progress, of, silent
 from lightpaint.relight.export import EXPORTS, write_exports
 from lightpaint.relight.refine import refine_by_rendering
 from lightpaint.relight.relight import check_relightable, relight
@@ -180,7 +180,8 @@ def _paint(
         check_writable(place)
     written = _to_be_written(views, folder)
     views[:] = _fitted(views, settings)
-    views[:] = [_with_basis(view, settings, len(views), progress) for view in views]
+    reports = {view.folder: _progress_of(view, len(views), progress) for view in views}
+    views[:] = [_with_basis(x, settings, len(views), reports[x.folder]) for x in views]
     whole, bases = joint_basis([_basis(view) for view in views])
     # In place: the caller's list is the last to hold the bases as they were.
     views[:] = [replace(view, basis=basis) for view, basis in zip(views, bases, strict=True)]
@@ -214,7 +215,7 @@ def _paint(
             write_exports(folder, groups, solution.lighting)
         relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
         return [
-            _finished(view, its, uncertainty, told, alike, relit, settings, progress)
+            _finished(view, its, uncertainty, told, alike, relit, settings, reports[view.folder])
             for view, its, told in zip(views, parts, diagnoses, strict=True)
         ]
 
@@ -359,6 +360,10 @@ def _suggested(
         seed=settings.seed,
         progress=progress,
     )
+
+
+def _progress_of(view: PaintedView, count: int, progress: Progress) -> Progress:
+    return progress if count == 1 else of(progress, view.folder.name)
 
 
 def _basis(view: PaintedView) -> Basis:

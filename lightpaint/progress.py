@@ -29,6 +29,15 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C, after what was done has been kept. Its text says how to go on."""
 
 
+def of(progress: Progress, name: str) -> Progress:
+    """`progress` whose labels say of what: `verification of balcony`."""
+
+    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+        progress(f"{label} of {name}", done, total, unit)
+
+    return report
+
+
 @contextmanager
 def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
     """Hold Ctrl-C back, and yield a function that lets it through where it does no harm.

@@ -211,7 +211,7 @@ def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
     alive: list[bool] = []
 
     def look(label: str, *_: object) -> None:
-        if label == "verification":
+        if label == "verification of close":
             alive.extend(ref() is not None for ref in watched)
 
     paint_views_with_light(scenes, targets, tmp_path / "out", bases=made, spp=4, progress=look)
