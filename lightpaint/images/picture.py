@@ -15,7 +15,7 @@ from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.exr import Floats, Part, read_parts
 from lightpaint.images.layers import Layer, choose_layer
 from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
-from lightpaint.images.view import View
+from lightpaint.images.view import View, ViewChoice
 
 Mask = npt.NDArray[np.bool_]
 
@@ -117,13 +117,17 @@ class Picture:
 
 
 def read_picture(
-    path: str | Path, *, layer: str | None = None, view: View | None = None
+    path: str | Path,
+    *,
+    layer: str | None = None,
+    view: View | ViewChoice | None = None,
+    otherwise: View | None = None,
 ) -> Picture:
     """Read a picture of any kind that paint programs write.
 
     layer: of an EXR, the layer, part or view to take; needed if there are several. view: what
-    integers were encoded by; if None, what a PNG of lightpaint's own says, else sRGB. Files of
-    floats hold light, and no view applies to them.
+    integers were encoded by; what it leaves open is what a PNG of lightpaint's own says, else
+    `otherwise`, else sRGB. Files of floats hold light, and no view applies to them.
 
     Raises ImageError, with one line that names the file, for all that cannot be read as what
     it should be.
@@ -135,7 +139,7 @@ def read_picture(
             return _of_layer(choose_layer(read_parts(path), layer))
         if layer is not None:
             raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
-        return _of_bitmap(_bitmap(path, kind), view)
+        return _of_bitmap(_bitmap(path, kind), ViewChoice.of(view), otherwise)
     except ImageError as error:
         raise ImageError(_naming(path, error)) from error
     except MemoryError:
@@ -268,7 +272,7 @@ def _stored(part: Part) -> Mask | None:
     return ones.in_display_window().channels["Y"]
 
 
-def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
+def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Picture:
     alpha: Floats | None = None
     if bitmap.alpha is not None:
         alpha = np.asarray(bitmap.alpha / np.float32(bitmap.codes or 1), np.float32)
@@ -279,7 +283,7 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
         image = light_of_floats(bitmap, alpha)
         saturated, used = None, None
     else:
-        used = view or view_of(bitmap)
+        used = asked.over(None if asked.is_whole else view_of(bitmap) or otherwise)
         image = light_of_integers(bitmap, alpha, used)
         top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
         saturated = bitmap.values >= top

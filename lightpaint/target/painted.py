@@ -64,7 +64,8 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
         looks = template.image, template.view.decode(template.shown)
         found = [_difference_of_light(picture, look, template) for look in looks]
         return max(found, key=lambda one: float((one <= ROUNDING).mean())), ROUNDING
-    view = picture.view or template.view
+    view = picture.view
+    assert view is not None  # That of a file of integers is known.
     mine, its = view.encode(picture.image), view.encode(template.image)
     if picture.lossy:
         rough = np.asarray(mine - _compressed_like(path, its), np.float64)
