@@ -79,9 +79,9 @@ def read_target(
     reading = _Reading(path, picture, made, None if made is None else Path(str(folder)))
     importance, note = _importance(reading, mask)
     notes += note
-    # Pixels that the file does not store were not painted.
-    stored = np.ones(picture.size, bool) if picture.stored is None else picture.stored
-    counted = np.where(picture.finite, stored if importance is None else importance, 0)
+    # Pixels that the file does not store were not painted, whatever a mask says.
+    there = picture.finite if picture.stored is None else picture.finite & picture.stored
+    counted = np.where(there, 1 if importance is None else importance, 0)
     image = picture.image
     if paint == "light":
         image, counted, note = _lit(reading, counted)

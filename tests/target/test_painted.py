@@ -1,5 +1,6 @@
 """What was painted, found by comparing a file that came back with its template."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from PIL import Image
 
 from lightpaint.errors import SizeError, TargetError, ViewError
 from lightpaint.images.display import decode_display
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.exr import Part, write_parts, write_rgb
 from lightpaint.images.png import write_png_16
 from lightpaint.images.view import View, ViewChoice
 from lightpaint.target.read import read_target
@@ -210,6 +211,33 @@ def test_what_a_picture_says_of_its_view_goes_before_a_template_that_was_found(
     assert read_target(tmp_path / "old.png", view=ViewChoice("srgb")).view == View("srgb", -1.0)
     # A template that is given is meant.
     assert read_target(tmp_path / "old.png", template=tmp_path).view == View("agx", 2.0)
+
+
+def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    painted = template.image[10:40, 20:60].copy()
+    painted[10:20, 10:20] += 0.3
+    planes = {name: np.ascontiguousarray(painted[..., k]) for k, name in enumerate("RGB")}
+    crop = Part("", planes, offset=(10, 20), display=SIZE)
+    write_parts(tmp_path / "crop.exr", [crop])
+    target = read_target(tmp_path / "crop.exr")
+    stored = np.zeros(SIZE, bool)
+    stored[10:40, 20:60] = True
+    assert target.importance[~stored].max() == 0
+    brush = np.zeros(SIZE, bool)
+    brush[20:30, 30:40] = True
+    np.testing.assert_array_equal(target.importance[stored] > 0, brush[stored])
+    share = f"{100 * brush.mean():.3g} % painted"
+    assert target.notes[0].startswith(share)
+    # And a crop that shows the template alone is no painting.
+    painted[:] = template.image[10:40, 20:60]
+    write_parts(
+        tmp_path / "crop.exr",
+        [replace(crop, channels={n: painted[..., k].copy() for k, n in enumerate("RGB")})],
+    )
+    with pytest.raises(TargetError, match="nothing in"):
+        read_target(tmp_path / "crop.exr")
 
 
 def test_nearly_all_painted_is_doubted(tmp_path: Path) -> None:
