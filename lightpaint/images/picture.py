@@ -285,8 +285,7 @@ def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Pic
     else:
         used = asked.over(None if asked.is_whole else view_of(bitmap) or otherwise)
         image = light_of_integers(bitmap, alpha, used)
-        top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
-        saturated = bitmap.values >= top
+        saturated = _saturated(bitmap)
     floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
     return Picture(
         kind=bitmap.kind,
@@ -300,6 +299,15 @@ def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Pic
         lossy=bitmap.lossy,
         notes=notes,
     )
+
+
+def _saturated(bitmap: Bitmap) -> Mask:
+    """(h, w, 3), where the numbers are the largest that there can be: under alpha, alpha itself."""
+    assert bitmap.codes is not None
+    if bitmap.premultiplied and bitmap.alpha is not None:
+        alpha = bitmap.alpha[..., None]
+        return np.asarray((bitmap.values >= alpha) & (alpha > 0))
+    return np.asarray(bitmap.values >= bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0))
 
 
 def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:

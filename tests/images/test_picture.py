@@ -269,6 +269,27 @@ def test_alpha_of_a_tiff(tmp_path: Path, extra: str):
     )
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_white_under_associated_alpha_is_saturated(tmp_path: Path, dtype: Any):
+    """A program stores white times alpha, which is alpha: no file can say that it was brighter."""
+    top = np.iinfo(dtype).max
+    alpha = np.random.default_rng(0).integers(top // 8, top + 1, SIZE).astype(dtype)
+    alpha[0, :2], alpha[1, 1] = top, 0
+    display = np.random.default_rng(1).choice([0.0, 0.5, 0.9, 1.0], (*SIZE, 3))
+    stored = np.round(display * alpha[..., None]).astype(dtype)
+    tifffile.imwrite(
+        tmp_path / "a.tif",
+        np.dstack([stored, alpha]),
+        photometric="rgb",
+        extrasamples=["assocalpha"],
+    )
+    picture = read_picture(tmp_path / "a.tif")
+    white = (display == 1) & (alpha > 0)[..., None]
+    assert white[alpha < top].any()
+    np.testing.assert_array_equal(picture.saturated, white)
+    np.testing.assert_array_equal(picture.image[white], 1)
+
+
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
 def test_a_tiff_of_floats_is_light(tmp_path: Path, dtype: Any):
     pixels = (np.random.default_rng(0).standard_normal((*SIZE, 3)) * 50).astype(dtype)
