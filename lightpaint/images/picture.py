@@ -13,7 +13,7 @@ import numpy.typing as npt
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.exr import Floats, Part, read_parts
-from lightpaint.images.layers import Layer, choose_layer
+from lightpaint.images.layers import ALPHA_NAMES, Layer, choose_layer
 from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
 from lightpaint.images.view import View, ViewChoice
 
@@ -242,7 +242,7 @@ def _of_layer(layer: Layer) -> Picture:
     stored_part = layer.part
     layer = replace(layer, part=stored_part.in_display_window())
     image = layer.rgb()
-    alpha, weight = layer.channel("A"), layer.channel("W")
+    alpha, weight = layer.channel(*ALPHA_NAMES), layer.channel("W")
     notes: tuple[str, ...] = ()
     if alpha is not None and weight is None:
         if _looks_straight(image, alpha):
