@@ -78,7 +78,6 @@ class Picture:
     saturated: (h, w, 3), where the file cannot say more: the light is at least that of `image`.
     view: what the numbers were decoded by; None if the file holds light.
     codes: largest integer of the file's numbers; None for floats.
-    mantissa: bits to which floats are rounded, the leading one included; None for integers.
     lossy: whether compression changed the numbers beyond that rounding.
     notes: what a person should know, a line each.
     """
@@ -92,7 +91,6 @@ class Picture:
     saturated: Mask | None = None
     view: View | None = None
     codes: int | None = None
-    mantissa: int | None = None
     lossy: bool = False
     notes: tuple[str, ...] = field(default=())
 
@@ -100,20 +98,6 @@ class Picture:
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return self.image.shape[0], self.image.shape[1]
-
-    def half_step(self) -> Floats:
-        """(h, w, 3): how far rounding to the file's numbers alone may have moved the light.
-
-        Half a code through the view, or half a unit in the last place. What a lossy
-        compression adds is not known from the file.
-        """
-        if self.codes is None or self.view is None:
-            rounding = 2.0 ** -(self.mantissa or 24)
-            return np.asarray(np.abs(self.image) * rounding + 2.0**-25, np.float32)
-        display, half = self.view.encode(self.image), 0.5 / self.codes
-        up, down = self.view.decode(display + half), self.view.decode(display - half)
-        # At the ends of the range one side is cut off.
-        return np.asarray(np.maximum(up - self.image, self.image - down), np.float32)
 
 
 def read_picture(
@@ -251,7 +235,6 @@ def _of_layer(layer: Layer) -> Picture:
                 "prescribes, edges of strokes are read too bright",
             )
         unpremultiply(image, alpha)
-    is_half = any(c.dtype == np.float16 for c in stored_part.channels.values())
     return Picture(
         kind="exr",
         image=image,
@@ -259,7 +242,6 @@ def _of_layer(layer: Layer) -> Picture:
         alpha=alpha,
         weight=weight,
         stored=_stored(stored_part),
-        mantissa=11 if is_half else 24,
         notes=notes,
     )
 
@@ -286,7 +268,6 @@ def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Pic
         used = asked.over(None if asked.is_whole else view_of(bitmap) or otherwise)
         image = light_of_integers(bitmap, alpha, used)
         saturated = _saturated(bitmap)
-    floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
     return Picture(
         kind=bitmap.kind,
         image=image,
@@ -295,7 +276,6 @@ def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Pic
         saturated=saturated,
         view=used,
         codes=bitmap.codes,
-        mantissa=floats.get(bitmap.values.dtype),
         lossy=bitmap.lossy,
         notes=notes,
     )

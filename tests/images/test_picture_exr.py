@@ -33,19 +33,19 @@ def _named(image: Any, prefix: str = "", names: Any = "RGB") -> Any:
     return {prefix + name: image[..., k] for k, name in enumerate(names)}
 
 
-@pytest.mark.parametrize(("dtype", "mantissa"), [("f2", 11), ("f4", 24), ("u4", 24)])
+@pytest.mark.parametrize("dtype", ["f2", "f4", "u4"])
 @pytest.mark.parametrize("kind", ["scanlineimage", "tiledimage"])
 @pytest.mark.parametrize(
     "compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB"]
 )
-def test_exr(tmp_path: Path, dtype: str, mantissa: int, kind: str, compression: str):
+def test_exr(tmp_path: Path, dtype: str, kind: str, compression: str):
     image = _rgb(np.dtype(dtype).type)
     header: dict[str, Any] = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
     if kind == "tiledimage":
         header["tiles"] = OpenEXR.TileDescription()
     path = _exr(tmp_path / "a.exr", _named(image), type=getattr(OpenEXR, kind), **header)
     picture = read_picture(path)
-    assert (picture.kind, picture.codes, picture.mantissa) == ("exr", None, mantissa)
+    assert (picture.kind, picture.codes) == ("exr", None)
     # Lossy compressions are of half (B44, DWA) or of 24 bits (PXR24).
     rtol = {"PXR24": 2**-15}.get(compression, 0.2 if compression[:3] in ("B44", "DWA") else 0)
     np.testing.assert_allclose(picture.image, image, rtol=rtol, atol=rtol / 10)
@@ -251,13 +251,3 @@ def test_straight_alpha_is_pointed_out(tmp_path: Path):
     alpha[:3] = 0
     picture = read_picture(_exr(tmp_path / "a.exr", _named(_rgb()) | {"A": alpha}))
     assert "if it is not premultiplied" in picture.notes[0]
-
-
-@pytest.mark.parametrize("dtype", [np.float16, np.float32])
-def test_half_a_step_of_floats(tmp_path: Path, dtype: Any):
-    light = np.exp2(np.random.default_rng(0).uniform(-9, 9, (30, 30, 3)))
-    picture = read_picture(_exr(tmp_path / "a.exr", _named(light.astype(dtype))))
-    missed = np.abs(picture.image - light)
-    assert (missed <= picture.half_step() * 1.001).all()
-    # The step of a binade is that of its upper end.
-    assert missed.max() > 0.45 * picture.half_step().max()
