@@ -160,7 +160,10 @@ def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 def _around(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Whether the pixel or one of its eight neighbours is set."""
-    height, width = mask.shape[:2]
-    padded = np.pad(mask, ((1, 1), (1, 1), (0, 0)))
-    shifted = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
-    return np.asarray(np.logical_or.reduce(shifted))
+    for axis in (0, 1):
+        lines = np.moveaxis(mask, axis, 0)
+        grown = lines.copy()
+        grown[1:] |= lines[:-1]
+        grown[:-1] |= lines[1:]
+        mask = np.moveaxis(grown, 0, axis)
+    return mask
