@@ -72,7 +72,8 @@ def template(options: Namespace, _given: list[str]) -> int:
     if not only_look and output.is_file():
         raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
     check_writable(output.parent if only_look else output)
-    view = view_of(options)
+    asked = view_of(options)
+    view = None if asked.is_open else asked.over(None)
     scene = load(options, is_to_solve=False, with_lights_file=not only_look)
     if options.resolution:
         scene = scene.reduced(options.resolution)

@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.obtain import obtain_basis
 from lightpaint.basis.render import memory_needed, why_not_one_pass
 from lightpaint.errors import OutputError
-from lightpaint.images.view import View
+from lightpaint.images.view import ViewChoice
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
@@ -106,11 +106,9 @@ def render_or_find(scene: Scene, options: Namespace, *, time_s: float | None = N
     return made
 
 
-def view_of(options: Namespace) -> View | None:
-    """The view that --view and --exposure ask for, if they do."""
-    if options.view is None and options.exposure is None:
-        return None
-    return View.parse(options.view or "srgb", options.exposure or 0.0)
+def view_of(options: Namespace) -> ViewChoice:
+    """What --view and --exposure ask for, each alone or both."""
+    return ViewChoice(options.view, options.exposure)
 
 
 def constraints_of(options: Namespace) -> Constraints:

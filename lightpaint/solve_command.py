@@ -160,8 +160,7 @@ def _settings(options: Namespace, given: list[str]) -> dict[str, Any]:
     return {
         "unpainted": options.unpainted,
         "method": options.method,
-        "space": options.space,
-        "view": view_of(options),
+        "space": options.space,  # through the view of the target, which has what was asked
         "suggest": options.suggest,
         "spp": options.spp,
         "time_s": options.time_s,

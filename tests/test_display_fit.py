@@ -15,8 +15,10 @@ from lightpaint.basis.render import render_basis
 from lightpaint.cli import main
 from lightpaint.errors import LightpaintError
 from lightpaint.images.exr import write_rgb
+from lightpaint.images.png import write_png_16
 from lightpaint.images.view import View
 from lightpaint.scene.scene import load_scene
+from lightpaint.target.template import Template, write_template
 
 TRUTH = np.array([[5.0, 3, 2], [0.2, 0.9, 0.4], [1, 2, 0.5]])
 
@@ -109,6 +111,32 @@ def test_the_view_is_that_of_the_picture(folder: Path):
     named = ["--view", "agx", "--space", "display", "-o", "b"]
     assert main(["solve", "room.basis.exr", "clip.png", *named]) == 0
     assert _solved("b")["solve"]["display"] == "agx"
+
+
+def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Basis):
+    """And a view alone is at the template's exposure: half of what is asked is the template's."""
+    image, view = basis.mix(TRUTH), View("agx", -3.0)
+    nothing = np.zeros_like(image)
+    write_template(
+        folder,
+        Template(image / 2, view),
+        normals=nothing,
+        depth=nothing[..., 0],
+        mattes={},
+        lights={},
+    )
+    write_png_16(folder / "painted.png", view.encode(image))
+    for asked, shown in (
+        ([], "agx at -3.0 stops"),
+        (["--exposure", "-2.5"], "agx at -2.5 stops"),
+        (["--view", "filmic"], "filmic at -3.0 stops"),
+    ):
+        command = ["solve", "room.basis.exr", "painted.png", "--space", "display", "-o", "a"]
+        assert main([*command, *asked]) == 0
+        assert _solved("a")["solve"]["display"] == shown
+    assert main(["solve", "room.basis.exr", "painted.png", "--exposure", "-2.5", "-o", "a"]) == 0
+    # What is half a stop less exposed than it was taken for is that much brighter in all places.
+    np.testing.assert_allclose(_weights("a"), TRUTH / 2**0.5, rtol=0.01, atol=0.01)
 
 
 def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):

@@ -1,6 +1,7 @@
 """Whether light groups are all of the picture: their sum, held against the beauty."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +18,9 @@ EXCEEDING = 1e-3
 #: Largest relative error of one rounding to float16, absolute error below its normal range, and
 #: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
 HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
+
+#: Every how many rows and columns a pixel is looked at first, where most pictures are others.
+COARSE = 8
 
 
 def spoken_sum(
@@ -58,34 +62,90 @@ def rounding(layers: Sequence[Layer]) -> Floats:
     """By how much the sum of the layers may be off its true value for rounding, (h, w, 3)."""
     bound: Floats = np.zeros(layers[0].image.shape)
     for layer in layers:
-        size = np.abs(np.nan_to_num(layer.image.astype(np.float64), posinf=0, neginf=0))
-        bound = bound + (size * HALF + SUBNORMAL if layer.is_half else 0) + size * SUMMED
+        bound += _rounded(layer.image, is_half=layer.is_half)
     return bound
 
 
-def lacking(beauty: Layer, lights: Sequence[Layer]) -> float:
-    """Σ |beauty − Σ lights|, where both are finite."""
-    return float(_off(beauty, lights).sum())
+def _rounded(image: Floats, *, is_half: bool) -> Floats:
+    size = np.abs(np.nan_to_num(image.astype(np.float64), posinf=0, neginf=0))
+    return np.asarray((size * HALF + SUBNORMAL if is_half else 0) + size * SUMMED)
 
 
-def adds_up(beauty: Layer, lights: Sequence[Layer]) -> bool:
-    """Whether the lights add up to just that picture, which then is not black."""
-    size = np.nan_to_num(np.abs(beauty.image.astype(np.float64)), posinf=0, neginf=0).sum()
-    beyond = np.maximum(_off(beauty, lights) - rounding([*lights, beauty]), 0)
-    return bool(size > 0 and beyond.sum() <= NOTHING * size)
+@dataclass(frozen=True)
+class LayerSum:
+    """Layers added up once, to be held against one picture after the other.
+
+    total: (h, w, 3) float64, not finite where one of them is not. bound: what rounding may have
+    done to it.
+    """
+
+    total: Floats
+    bound: Floats
+
+    @staticmethod
+    def of(layers: Sequence[Layer]) -> "LayerSum":
+        """The sum of at least one layer."""
+        total: Floats = np.zeros(layers[0].image.shape)
+        with np.errstate(invalid="ignore"):
+            for layer in layers:
+                total += layer.image
+        return LayerSum(total, rounding(layers))
+
+    def and_also(self, layer: Layer) -> "LayerSum":
+        """With one more."""
+        with np.errstate(invalid="ignore"):
+            total = self.total + layer.image
+        return LayerSum(total, self.bound + rounding([layer]))
+
+    def lacks(self, beauty: Layer) -> float:
+        """Σ |beauty − total|, where both are finite."""
+        return float(_off(beauty.image, self.total).sum())
+
+    def is_of(self, beauty: Layer, *, less_itself: bool = False) -> bool:
+        """Whether the sum is just that picture, which then is not black.
+
+        less_itself: whether the picture is among what was added up, and is to be taken out again.
+        """
+        size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
+        most = NOTHING * size
+        # Excesses only add up, so that a few pixels are enough to tell that it is another picture.
+        few = (slice(None, None, COARSE), slice(None, None, COARSE))
+        return bool(
+            size > 0
+            and self._excess(beauty, few, less_itself=less_itself) <= most
+            and self._excess(beauty, (), less_itself=less_itself) <= most
+        )
+
+    def _excess(self, beauty: Layer, where: tuple[slice, ...], *, less_itself: bool) -> float:
+        """By how much more they are apart than rounding makes them, summed over these pixels."""
+        image, bound = beauty.image[where], self.bound[where]
+        if less_itself:
+            # x − (total − x); the bound is that of the same layers.
+            off = _off(2 * image.astype(np.float64), self.total[where])
+        else:
+            off = _off(image, self.total[where])
+            bound = bound + _rounded(image, is_half=beauty.is_half)
+        return float(np.maximum(off - bound, 0).sum())
 
 
-def _off(beauty: Layer, lights: Sequence[Layer]) -> Floats:
-    """|beauty − Σ lights|, (h, w, 3) float64, 0 where one is not finite."""
+def _off(picture: Floats, total: Floats) -> Floats:
+    """|picture − total|, (h, w, 3) float64, 0 where one is not finite."""
     with np.errstate(invalid="ignore"):
-        total = sum(layer.image.astype(np.float64) for layer in lights)
-        off = np.nan_to_num(np.abs(beauty.image - total), nan=0, posinf=0, neginf=0)
-    return np.asarray(off)
+        return np.asarray(np.nan_to_num(np.abs(picture - total), nan=0, posinf=0, neginf=0))
 
 
 def beauty_by_sum(others: Sequence[Layer], lights: Sequence[Layer]) -> Layer | None:
     """The layer that the lights add up to, where it has a name that nobody knows."""
-    return next((layer for layer in others if adds_up(layer, lights)), None)
+    if not others or not lights:
+        return None
+    added = LayerSum.of(lights)
+    return next((layer for layer in others if added.is_of(layer)), None)
+
+
+def beauty_among(layers: Sequence[Layer]) -> Layer | None:
+    """The one of the layers that the others add up to."""
+    added = LayerSum.of(layers)
+    return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
 
 
 def _percent(share: float) -> str:

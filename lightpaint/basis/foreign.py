@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import FORMAT_KEY, Basis, BasisLight, Origin
-from lightpaint.basis.beauty import adds_up, beauty_by_sum, lacking, shares, spoken_sum
+from lightpaint.basis.beauty import LayerSum, beauty_among, beauty_by_sum, shares, spoken_sum
 from lightpaint.basis.layers import Layer, read_layers
 from lightpaint.basis.naming import Choice, choose_files, choose_layers, is_known
 from lightpaint.errors import BasisError, ImageError
@@ -103,13 +103,13 @@ def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightG
         beauty = beauty_by_sum(others, lights)
     if beauty is None and choice.renderer == "one file per light" and len(lights) > 2:
         # One of them may be the picture under a name of its own.
-        beauty = next((x for x in lights if adds_up(x, [y for y in lights if y is not x])), None)
+        beauty = beauty_among(lights)
         kept = [(n, x) for n, x in zip(names, lights, strict=True) if x is not beauty]
         names, lights = [n for n, _ in kept], [x for _, x in kept]
     for name, layer in choice.beside.items():
         here = layers[layer]
         # Whether a renderer counts these among its groups depends on version and settings.
-        if beauty is None or lacking(beauty, [*lights, here]) < lacking(beauty, lights):
+        if beauty is None or not lights or _helps(here, lights, beauty):
             names.append(name)
             lights.append(here)
     return _light_groups(path, choice, names, lights, beauty)
@@ -121,6 +121,12 @@ def _files(folder: Path) -> list[Path]:
         return [file for file in folder.iterdir() if file.suffix.lower() == ".exr"]
     except OSError as error:
         raise BasisError(f"cannot read {folder}: {error.strerror or error}") from None
+
+
+def _helps(layer: Layer, lights: Sequence[Layer], beauty: Layer) -> bool:
+    """Whether the lights come closer to the beauty with that layer."""
+    added = LayerSum.of(lights)
+    return added.and_also(layer).lacks(beauty) < added.lacks(beauty)
 
 
 def _choose(path: Path, layers: dict[str, Layer], pattern: str | None) -> Choice:

@@ -4,7 +4,7 @@ A layer is three channels that share all but the last part of their names, `key.
 `key.B`; in a part of its own it may have plain `R`, `G`, `B` and the part its name.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,23 +13,8 @@ import numpy as np
 from lightpaint.basis.naming import is_known, short_names
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import Floats, Part, read_parts
-from lightpaint.images.primaries import converted, is_rec709, to_rec709
-
-#: The last part of the names of red, green and blue, in lower case, and of alpha.
-COLOURS = (("r", "g", "b"), ("red", "green", "blue"))
-ALPHAS = ("a", "alpha")
-
-#: Text attribute in which Blender and others name the colour space, and what says nothing.
-COLOR_SPACE = "colorInteropID"
-UNSAID = ("", "data", "unknown")
-
-#: CIE xy of red, green, blue and white of those that renderers work in.
-SPACES = {
-    "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
-    "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
-    "lin_rec2020_scene": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
-    "lin_p3d65_scene": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
-}
+from lightpaint.images.layers import ALPHA_NAMES, channel_named, colour_channels
+from lightpaint.images.primaries import are_same, converted, primaries_of, to_rec709
 
 
 @dataclass(frozen=True)
@@ -87,7 +72,7 @@ def read_layers(path: Path) -> list[Layer]:
                 f"{layer.place} is {_size(layer)} but {first.place} is {_size(first)}: light "
                 "groups need one size"
             )
-        if layer.primaries != first.primaries:
+        if not are_same(layer.primaries, first.primaries):
             raise BasisError(
                 f"{layer.place} and {first.place} declare other primaries: light groups need one "
                 "colour space"
@@ -126,8 +111,9 @@ def _of_file(path: Path) -> list[Layer]:
     layers = []
     for part in parts:
         shown, primaries = part.in_display_window(), _primaries(path, part)
-        for prefix, channels in _triples(shown.channels).items():
+        for prefix, channels in colour_channels(shown.channels).items():
             image = _rgb(path, shown.channels, channels)
+            alpha = channel_named(shown.channels, prefix, *ALPHA_NAMES)
             others = [part.name, f"{part.name}.{prefix}"]
             if len(parts) == 1 and not prefix:
                 others += [path.stem, path.name]  # of a file of one layer, it is that one's name
@@ -139,49 +125,19 @@ def _of_file(path: Path) -> list[Layer]:
                     channels=channels,
                     others=tuple(others),
                     image=image,
-                    alpha=_alpha(shown.channels, channels),
+                    alpha=None if alpha is None else shown.channels[alpha],
                     primaries=primaries,
                 )
             )
     return layers
 
 
-def _triples(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
-    """Prefix → its channels of red, green and blue, of those that have all three."""
-    by_layer: dict[str, dict[str, str]] = {}
-    for name in names:
-        prefix, _, last = name.rpartition(".")
-        by_layer.setdefault(prefix, {})[last.casefold()] = name
-    found = {}
-    for prefix, channels in by_layer.items():
-        for r, g, b in COLOURS:
-            if r in channels and g in channels and b in channels:
-                found[prefix] = (channels[r], channels[g], channels[b])
-    return found
-
-
-def _alpha(channels: Mapping[str, Floats], rgb: tuple[str, str, str]) -> Floats | None:
-    prefix, _, _ = rgb[0].rpartition(".")
-    for name, pixels in channels.items():
-        layer, _, last = name.rpartition(".")
-        if layer == prefix and last.casefold() in ALPHAS:
-            return pixels
-    return None
-
-
 def _primaries(path: Path, part: Part) -> tuple[float, ...] | None:
     """Those that the part declares, unless they are Rec.709's. Raises ImageError if unknown."""
-    space = part.attributes.get(COLOR_SPACE, "")
-    if part.primaries is not None:
-        return None if is_rec709(part.primaries) else part.primaries
-    if space in UNSAID or space.startswith(("lin_rec709", "lin_srgb")):
-        return None
-    if space not in SPACES:
-        raise ImageError(
-            f"{path} is in the colour space {space!r}, but linear Rec.709 is expected: convert it "
-            "and export it again"
-        )
-    return SPACES[space]
+    try:
+        return primaries_of(part)
+    except ImageError as error:
+        raise ImageError(f"{path} {error}") from None
 
 
 def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:

@@ -32,13 +32,6 @@ def block_mean(image: Floats, factor: int) -> Floats:
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64).astype(image.dtype))
 
 
-def block_any(mask: npt.NDArray[np.bool_], factor: int) -> npt.NDArray[np.bool_]:
-    """Whether any pixel of each block of factor x factor is set. mask: (h, w, …)."""
-    height, width, *rest = mask.shape
-    blocks = mask.reshape(height // factor, factor, width // factor, factor, *rest)
-    return np.asarray(blocks.any(axis=(1, 3)))
-
-
 def enlarged(image: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
     """Every pixel repeated factor x factor times."""
     return image.repeat(factor, axis=0).repeat(factor, axis=1)

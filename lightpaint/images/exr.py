@@ -218,6 +218,10 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
         if part.display is not None:
             height, width = part.display
             header["displayWindow"] = ((0, 0), (width - 1, height - 1))
+        if part.offset != (0, 0):
+            (y, x), (height, width) = part.offset, part.size
+            first, last = (x, y), (x + width - 1, y + height - 1)
+            header["dataWindow"] = (np.array(first, np.int32), np.array(last, np.int32))
         channels = {n: np.ascontiguousarray(c) for n, c in part.channels.items()}
         exr_parts.append(OpenEXR.Part(header, channels, part.name))
     with replacing(path) as beside:

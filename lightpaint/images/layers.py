@@ -1,6 +1,6 @@
 """The colour layers of an EXR file, whatever they are made of, as linear Rec.709."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import ImageError
 from lightpaint.images.exr import Floats, Part
-from lightpaint.images.primaries import REC709, converted, is_rec709, rgb_to_xyz, to_rec709
+from lightpaint.images.primaries import REC709, converted, primaries_of, rgb_to_xyz, to_rec709
 
 #: Channel that holds importance in a layer whose RGB is not premultiplied.
 WEIGHT_CHANNEL = "W"
@@ -16,8 +16,9 @@ WEIGHT_CHANNEL = "W"
 #: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
 KRITA_LAYERS = "krita_layers_info"
 
-#: What programs call the channels of a colour.
-RGB_NAMES = (("R", "G", "B"), ("r", "g", "b"), ("red", "green", "blue"))
+#: What programs call the channels of a colour, and alpha, in any case.
+RGB_NAMES = (("r", "g", "b"), ("red", "green", "blue"))
+ALPHA_NAMES = ("a", "alpha")
 
 
 @dataclass(frozen=True)
@@ -37,26 +38,48 @@ class Layer:
 
     def channel(self, *names: str) -> npt.NDArray[np.float32] | None:
         """The first of these channels that the layer has, (h, w) float32."""
-        for name in names:
-            if (pixels := self.part.channels.get(_joined(self.prefix, name))) is not None:
-                return pixels.astype(np.float32, copy=False)
-        return None
+        name = channel_named(self.part.channels, self.prefix, *names)
+        return None if name is None else self.part.channels[name].astype(np.float32, copy=False)
+
+
+def colour_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
+    """Layer (prefix) → its channels of red, green and blue, of layers that have all three."""
+    found = {}
+    for layer, here in _by_layer(names).items():
+        for r, g, b in RGB_NAMES:
+            if layer not in found and r in here and g in here and b in here:
+                found[layer] = (here[r], here[g], here[b])
+    return found
+
+
+def channel_named(names: Iterable[str], layer: str, *lasts: str) -> str | None:
+    """The channel of `layer`, a prefix, whose name ends in the first of `lasts` that there is."""
+    here = _by_layer(names).get(layer, {})
+    return next((here[x] for x in map(str.casefold, lasts) if x in here), None)
+
+
+def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Layer → last part of a name, in lower case → the channel, the first if there are two."""
+    layers: dict[str, dict[str, str]] = {}
+    for name in names:
+        layer, _, last = name.rpartition(".")
+        layers.setdefault(layer, {}).setdefault(last.casefold(), name)
+    return layers
 
 
 def linear_rgb(part: Part, layer: str = "") -> Floats:
     """The colour of `layer`, a prefix of channels in `part`, as (h, w, 3) float32 Rec.709.
 
     Its channels are R, G, B; or Y, which is grey; or Y, RY and BY, luminance and chroma.
-    `chromaticities` that the header declares are converted. Raises ImageError, listing what
-    is there, if it has none of these.
+    Other primaries that the header declares are converted. Raises ImageError, listing what
+    is there, if it has none of these, or if its colours are of a space that is not known.
     """
-    primaries = part.primaries
-    for names in RGB_NAMES:
-        if all(_joined(layer, name) in part.channels for name in names):
-            image = np.empty((*part.size, 3), np.float32)
-            for k, name in enumerate(names):
-                image[..., k] = part.channels[_joined(layer, name)]
-            return image if is_rec709(primaries) else converted(image, _matrix(part))
+    primaries = primaries_of(part)
+    if (names := colour_channels(part.channels).get(layer)) is not None:
+        image = np.empty((*part.size, 3), np.float32)
+        for k, name in enumerate(names):
+            image[..., k] = part.channels[name]
+        return _in_rec709(image, primaries)
     luminance = part.channels.get(_joined(layer, "Y"))
     if luminance is None:
         raise ImageError(
@@ -69,7 +92,7 @@ def linear_rgb(part: Part, layer: str = "") -> Floats:
         # A grey has the colour of white, and white is adapted.
         return np.repeat(luminance[..., None], 3, axis=-1)
     image = _from_chroma(luminance, chroma[0], chroma[1], primaries or REC709)
-    return image if is_rec709(primaries) else converted(image, _matrix(part))
+    return _in_rec709(image, primaries)
 
 
 def colour_layers(parts: Sequence[Part]) -> list[Layer]:
@@ -137,7 +160,7 @@ def _is_colour(part: Part, prefix: str) -> bool:
     if _joined(prefix, "Y") in part.channels:
         # Beside X it is no luminance but a direction or a place.
         return _joined(prefix, "X") not in part.channels
-    return any(all(_joined(prefix, n) in part.channels for n in names) for names in RGB_NAMES)
+    return prefix in colour_channels(part.channels)
 
 
 def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: Sequence[float]) -> Floats:
@@ -151,9 +174,8 @@ def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: Sequence[float]) 
     return image
 
 
-def _matrix(part: Part) -> Floats:
-    assert part.primaries is not None
-    return to_rec709(part.primaries)
+def _in_rec709(image: Floats, primaries: Sequence[float] | None) -> Floats:
+    return image if primaries is None else converted(image, to_rec709(primaries))
 
 
 def _joined(layer: str, name: str) -> str:

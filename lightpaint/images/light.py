@@ -18,10 +18,10 @@ from lightpaint.images.view import View
 STRIP = 2**18
 
 
-def view_of(bitmap: Bitmap) -> View:
-    """The view that a file says it was made with, else sRGB's."""
+def view_of(bitmap: Bitmap) -> View | None:
+    """The view that a file says it was made with."""
     if bitmap.shown is None:
-        return View()
+        return None
     name, _, stops = bitmap.shown.rpartition(" ")
     try:
         return View(name, float(stops))

@@ -13,9 +13,9 @@ import numpy.typing as npt
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.exr import Floats, Part, read_parts
-from lightpaint.images.layers import Layer, choose_layer
+from lightpaint.images.layers import ALPHA_NAMES, Layer, choose_layer
 from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
-from lightpaint.images.view import View
+from lightpaint.images.view import View, ViewChoice
 
 Mask = npt.NDArray[np.bool_]
 
@@ -78,7 +78,6 @@ class Picture:
     saturated: (h, w, 3), where the file cannot say more: the light is at least that of `image`.
     view: what the numbers were decoded by; None if the file holds light.
     codes: largest integer of the file's numbers; None for floats.
-    mantissa: bits to which floats are rounded, the leading one included; None for integers.
     lossy: whether compression changed the numbers beyond that rounding.
     notes: what a person should know, a line each.
     """
@@ -92,7 +91,6 @@ class Picture:
     saturated: Mask | None = None
     view: View | None = None
     codes: int | None = None
-    mantissa: int | None = None
     lossy: bool = False
     notes: tuple[str, ...] = field(default=())
 
@@ -101,29 +99,19 @@ class Picture:
         """(height, width) in pixels."""
         return self.image.shape[0], self.image.shape[1]
 
-    def half_step(self) -> Floats:
-        """(h, w, 3): how far rounding to the file's numbers alone may have moved the light.
-
-        Half a code through the view, or half a unit in the last place. What a lossy
-        compression adds is not known from the file.
-        """
-        if self.codes is None or self.view is None:
-            rounding = 2.0 ** -(self.mantissa or 24)
-            return np.asarray(np.abs(self.image) * rounding + 2.0**-25, np.float32)
-        display, half = self.view.encode(self.image), 0.5 / self.codes
-        up, down = self.view.decode(display + half), self.view.decode(display - half)
-        # At the ends of the range one side is cut off.
-        return np.asarray(np.maximum(up - self.image, self.image - down), np.float32)
-
 
 def read_picture(
-    path: str | Path, *, layer: str | None = None, view: View | None = None
+    path: str | Path,
+    *,
+    layer: str | None = None,
+    view: View | ViewChoice | None = None,
+    otherwise: View | None = None,
 ) -> Picture:
     """Read a picture of any kind that paint programs write.
 
     layer: of an EXR, the layer, part or view to take; needed if there are several. view: what
-    integers were encoded by; if None, what a PNG of lightpaint's own says, else sRGB. Files of
-    floats hold light, and no view applies to them.
+    integers were encoded by; what it leaves open is what a PNG of lightpaint's own says, else
+    `otherwise`, else sRGB. Files of floats hold light, and no view applies to them.
 
     Raises ImageError, with one line that names the file, for all that cannot be read as what
     it should be.
@@ -135,7 +123,7 @@ def read_picture(
             return _of_layer(choose_layer(read_parts(path), layer))
         if layer is not None:
             raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
-        return _of_bitmap(_bitmap(path, kind), view)
+        return _of_bitmap(_bitmap(path, kind), ViewChoice.of(view), otherwise)
     except ImageError as error:
         raise ImageError(_naming(path, error)) from error
     except MemoryError:
@@ -238,7 +226,7 @@ def _of_layer(layer: Layer) -> Picture:
     stored_part = layer.part
     layer = replace(layer, part=stored_part.in_display_window())
     image = layer.rgb()
-    alpha, weight = layer.channel("A"), layer.channel("W")
+    alpha, weight = layer.channel(*ALPHA_NAMES), layer.channel("W")
     notes: tuple[str, ...] = ()
     if alpha is not None and weight is None:
         if _looks_straight(image, alpha):
@@ -247,7 +235,6 @@ def _of_layer(layer: Layer) -> Picture:
                 "prescribes, edges of strokes are read too bright",
             )
         unpremultiply(image, alpha)
-    is_half = any(c.dtype == np.float16 for c in stored_part.channels.values())
     return Picture(
         kind="exr",
         image=image,
@@ -255,7 +242,6 @@ def _of_layer(layer: Layer) -> Picture:
         alpha=alpha,
         weight=weight,
         stored=_stored(stored_part),
-        mantissa=11 if is_half else 24,
         notes=notes,
     )
 
@@ -268,7 +254,7 @@ def _stored(part: Part) -> Mask | None:
     return ones.in_display_window().channels["Y"]
 
 
-def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
+def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Picture:
     alpha: Floats | None = None
     if bitmap.alpha is not None:
         alpha = np.asarray(bitmap.alpha / np.float32(bitmap.codes or 1), np.float32)
@@ -279,11 +265,9 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
         image = light_of_floats(bitmap, alpha)
         saturated, used = None, None
     else:
-        used = view or view_of(bitmap)
+        used = asked.over(None if asked.is_whole else view_of(bitmap) or otherwise)
         image = light_of_integers(bitmap, alpha, used)
-        top = bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0)
-        saturated = bitmap.values >= top
-    floats = {np.dtype(np.float16): 11, np.dtype(np.float32): 24}
+        saturated = _saturated(bitmap)
     return Picture(
         kind=bitmap.kind,
         image=image,
@@ -292,10 +276,18 @@ def _of_bitmap(bitmap: Bitmap, view: View | None) -> Picture:
         saturated=saturated,
         view=used,
         codes=bitmap.codes,
-        mantissa=floats.get(bitmap.values.dtype),
         lossy=bitmap.lossy,
         notes=notes,
     )
+
+
+def _saturated(bitmap: Bitmap) -> Mask:
+    """(h, w, 3), where the numbers are the largest that there can be: under alpha, alpha itself."""
+    assert bitmap.codes is not None
+    if bitmap.premultiplied and bitmap.alpha is not None:
+        alpha = bitmap.alpha[..., None]
+        return np.asarray((bitmap.values >= alpha) & (alpha > 0))
+    return np.asarray(bitmap.values >= bitmap.codes - (JPEG_WHITE if bitmap.lossy else 0))
 
 
 def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:

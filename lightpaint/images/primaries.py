@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.errors import ImageError
-from lightpaint.images.exr import Floats
+from lightpaint.images.exr import Floats, Part
 
 #: CIE xy of red, green, blue and white of Rec.709, the colours of every image here.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
@@ -15,6 +15,18 @@ XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 
 #: Files round the numbers: to three decimals, or to float16.
 ROUNDING = 1e-3
+
+#: Text attribute in which Blender and others name the colour space, and what says nothing.
+COLOR_SPACE = "colorInteropID"
+UNSAID = ("", "data", "unknown")
+
+#: CIE xy of red, green, blue and white of those that renderers work in.
+SPACES = {
+    "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+    "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
+    "lin_rec2020_scene": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+    "lin_p3d65_scene": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+}
 
 #: Lam's cone responses ("Bradford"), in which a white is adapted to another.
 BRADFORD = np.array([
@@ -60,9 +72,32 @@ def to_rec709(primaries: Sequence[float]) -> Floats:
     return np.linalg.solve(ours, theirs)
 
 
+def primaries_of(part: Part) -> tuple[float, ...] | None:
+    """Those that a part of an EXR declares, by numbers or by name; None for Rec.709's.
+
+    Raises ImageError, without naming the file, for colours of a name that is not known as linear.
+    """
+    if part.primaries is not None:
+        return None if is_rec709(part.primaries) else part.primaries
+    space = part.attributes.get(COLOR_SPACE, "")
+    if space in UNSAID or space.startswith(("lin_rec709", "lin_srgb")):
+        return None
+    if space not in SPACES:
+        raise ImageError(
+            f"is in the colour space {space!r}, but linear Rec.709 is expected: convert it and "
+            "export it again"
+        )
+    return SPACES[space]
+
+
+def are_same(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
+    """Whether two declare the same primaries, None for Rec.709's, but for how files round."""
+    return np.allclose(one or REC709, other or REC709, rtol=0, atol=ROUNDING)
+
+
 def is_rec709(primaries: Sequence[float] | None) -> bool:
     """Whether these are the primaries of every image here; a file that declares none has them."""
-    return primaries is None or np.allclose(primaries, REC709, rtol=0, atol=ROUNDING)
+    return are_same(primaries, None)
 
 
 def converted(image: Floats, matrix: Floats) -> Floats:

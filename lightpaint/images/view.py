@@ -121,6 +121,46 @@ class View:
 
 
 @dataclass(frozen=True)
+class ViewChoice:
+    """What somebody asks of a view, maybe half of one; the rest is what a picture says.
+
+    name: as of `View.parse`. stops: of exposure. None for what is left open. Raises ViewError for
+    what no view has.
+    """
+
+    name: str | None = None
+    stops: float | None = None
+
+    def __post_init__(self) -> None:
+        self.over(None)
+
+    @staticmethod
+    def of(view: "View | ViewChoice | None") -> "ViewChoice":
+        """A whole view, a choice as it is, or nothing asked."""
+        if isinstance(view, View):
+            return ViewChoice(view.name, view.stops)
+        return view or ViewChoice()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nothing is asked."""
+        return self.name is None and self.stops is None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is left open."""
+        return self.name is not None and self.stops is not None
+
+    def over(self, said: View | None) -> View:
+        """The view asked for, where that is open the one `said`, where nobody says it sRGB's."""
+        said = said or View()
+        return View.parse(
+            said.name if self.name is None else self.name,
+            said.stops if self.stops is None else self.stops,
+        )
+
+
+@dataclass(frozen=True)
 class _Curve:
     """One curve for each channel, after a matrix. forward and slope take light in [0, white]."""
 

@@ -42,8 +42,8 @@ LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
     """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
 
-    path: the file of the picture, which says how it was compressed. Raises SizeError if the two
-    differ in size.
+    path: the file of the picture, which says how it was compressed. What that does not store was
+    not painted. Raises SizeError if the two differ in size.
     """
     if picture.size != template.size:
         raise SizeError(
@@ -54,7 +54,10 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
     difference, tolerance = _difference(path, picture, template)
     # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.
     share = np.clip((difference - tolerance) / (FULL - tolerance), 0, 1)
-    return _without_pinholes((share * share * (3 - 2 * share)).astype(np.float32))
+    painted = (share * share * (3 - 2 * share)).astype(np.float32)
+    if picture.stored is None:
+        return _without_pinholes(painted)
+    return np.where(picture.stored, _without_pinholes(painted * picture.stored), 0)
 
 
 def _difference(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
@@ -64,7 +67,8 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
         looks = template.image, template.view.decode(template.shown)
         found = [_difference_of_light(picture, look, template) for look in looks]
         return max(found, key=lambda one: float((one <= ROUNDING).mean())), ROUNDING
-    view = picture.view or template.view
+    view = picture.view
+    assert view is not None  # That of a file of integers is known.
     mine, its = view.encode(picture.image), view.encode(template.image)
     if picture.lossy:
         rough = np.asarray(mine - _compressed_like(path, its), np.float64)

@@ -10,7 +10,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.color import luminance
 from lightpaint.images.exr import Floats
 from lightpaint.images.picture import Picture, read_mask, read_picture
-from lightpaint.images.view import View
+from lightpaint.images.view import View, ViewChoice
 from lightpaint.target.painted import painted_where
 from lightpaint.target.target import Target
 from lightpaint.target.template import Template, find_template, read_template
@@ -41,7 +41,7 @@ def read_target(
     *,
     mask: str | Path | None = None,
     layer: str | None = None,
-    view: View | None = None,
+    view: View | ViewChoice | None = None,
     template: str | Path | None = None,
     find: bool = True,
     paint: Paint = "look",
@@ -52,9 +52,10 @@ def read_target(
     from the template it was painted on; without any of them, every pixel alike. Where alpha is 0
     no colour was painted, and a mask does not make one.
 
-    layer: which layer, part or view of an EXR. view: what 8 and 16 bits were encoded by; by
-    default what the template or the file says, else sRGB. template: folder that `lightpaint
-    template` wrote; find: whether one is looked for beside the painting if none is given.
+    layer: which layer, part or view of an EXR. view: what 8 and 16 bits were encoded by. What
+    it leaves open is what `template` says, else the file, else a template that was found for it,
+    else sRGB. template: folder that `lightpaint template` wrote; find: whether one is looked for
+    beside the painting if none is given.
     paint: `light` takes colours for the light that falls on a surface, 1 being what makes white
     look like 1, and multiplies them by its albedo (Schoeneman et al. 1993, section 3).
 
@@ -64,17 +65,23 @@ def read_target(
     path = Path(path)
     folder = find_template(path) if template is None and find else template
     made = None if folder is None else read_template(Path(folder))
-    picture = read_picture(path, layer=layer, view=view or (None if made is None else made.view))
+    asked = ViewChoice.of(view)
+    if made is not None and template is not None:
+        asked = ViewChoice.of(asked.over(made.view))
+    of_template = None if made is None else made.view
+    picture = read_picture(path, layer=layer, view=asked, otherwise=of_template)
     notes = list(picture.notes)
     if made is not None and made.size != picture.size and template is None:
         notes.append(f"not compared with {folder}, which has another size")
-        made = None
+        made = of_template = None
+        # It was painted on something else, and so was not shown through that view either.
+        picture = read_picture(path, layer=layer, view=asked)
     reading = _Reading(path, picture, made, None if made is None else Path(str(folder)))
     importance, note = _importance(reading, mask)
     notes += note
-    # Pixels that the file does not store were not painted.
-    stored = np.ones(picture.size, bool) if picture.stored is None else picture.stored
-    counted = np.where(picture.finite, stored if importance is None else importance, 0)
+    # Pixels that the file does not store were not painted, whatever a mask says.
+    there = picture.finite if picture.stored is None else picture.finite & picture.stored
+    counted = np.where(there, 1 if importance is None else importance, 0)
     image = picture.image
     if paint == "light":
         image, counted, note = _lit(reading, counted)
@@ -90,7 +97,7 @@ def read_target(
         notes=(*notes, *note),
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
-        view=view or picture.view or (None if made is None else made.view),
+        view=picture.view or (of_template if asked.is_open else asked.over(of_template)),
     )
 
 

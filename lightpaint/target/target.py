@@ -1,5 +1,6 @@
 """A painting as the solve sees it: linear pixels and how much each of them counts."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,9 +8,12 @@ import numpy.typing as npt
 from PIL import Image
 
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.blocks import block_any, block_mean, whole_factor
+from lightpaint.images.blocks import block_mean, whole_factor
 from lightpaint.images.exr import Floats
 from lightpaint.images.view import View
+
+#: By how much more than half one of two shares prevails, beyond the rounding of float32.
+TIE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -73,19 +77,11 @@ class Target:
         """Resampled to `size` (height, width), in linear light, weighted by importance."""
         if size == self.size:
             return self
-        height, width = size
         weighted = np.dstack([self.image * self.importance[..., None], self.importance])
-        shrinks = width <= self.size[1]
-        kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
-        planes = [
-            Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
-                (width, height), kernel
-            )
-            for plane in np.moveaxis(weighted, -1, 0)
-        ]
-        *rgb, importance = (np.asarray(p) for p in planes)
+        *rgb, importance = np.moveaxis(_resampled(weighted, size), -1, 0)
         image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
-        return replace(self, image=image, importance=importance, at_least=self._at_least(size))
+        at_least = self._at_least(lambda planes: _resampled(planes, size))
+        return replace(self, image=image, importance=importance, at_least=at_least)
 
     def reduced(self, factor: int) -> "Target":
         """One pixel for each block of factor x factor: their mean, weighted by importance.
@@ -98,24 +94,26 @@ class Target:
         importance = block_mean(self.importance, factor)
         weighted = block_mean(self.image * self.importance[..., None].astype(np.float64), factor)
         image = weighted / np.where(importance > 0, importance, 1)[..., None]
-        at_least = None if self.at_least is None else block_any(self._counted(), factor)
+        at_least = self._at_least(lambda planes: block_mean(planes, factor))
         return replace(
             self, image=image.astype(np.float32), importance=importance, at_least=at_least
         )
 
-    def _counted(self) -> npt.NDArray[np.bool_]:
-        """`at_least` where it counts: elsewhere it says nothing about the means over blocks."""
-        assert self.at_least is not None
-        return self.at_least & (self.importance > 0)[..., None]
+    def _at_least(self, mean: Callable[[Floats], Floats]) -> npt.NDArray[np.bool_] | None:
+        """`at_least` of another size, whose pixels are the `mean` of these.
 
-    def _at_least(self, size: tuple[int, int]) -> npt.NDArray[np.bool_] | None:
-        """Resampled: whether any pixel that overlaps, or is interpolated from, is at least."""
+        What is brighter than such a mean is as good where most of it means at least, or where it
+        has a part of a patch that does. There the excess lies in the patch: a lamp outshines all
+        that is around it. Single pixels are texture, and what is brighter than the mean exceeds
+        the pixels between them, which say exactly what they mean.
+        """
         if self.at_least is None:
             return None
-        rows, columns = (_overlap(n, m) for n, m in zip(self.size, size, strict=True))
-        counted = self._counted().astype(np.float32)
-        touched = np.einsum("Hh,hwc,Ww->HWc", rows, counted, columns, optimize=True)
-        return np.asarray(touched > 0)
+        importance = self.importance[..., None]
+        share = mean(self.at_least * importance)
+        prevails = share > (0.5 + TIE) * mean(importance)
+        patch = _patches(self.at_least) & (importance > 0)
+        return np.asarray(prevails | (mean(patch.astype(np.float32)) > 0))
 
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """This target at `size` (height, width) of the basis.
@@ -140,15 +138,32 @@ class Target:
         return self.resized(size)
 
 
-def _overlap(old: int, new: int) -> Floats:
-    """(new, old): 1 where an old pixel is part of a new one, in one direction of an image.
+def _resampled(planes: Floats, size: tuple[int, int]) -> Floats:
+    """(h, w, n) at `size`: means over what a pixel covers; where it grows, interpolated."""
+    height, width = size
+    shrinks = width <= planes.shape[1]
+    kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
+    made = [
+        Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
+            (width, height), kernel
+        )
+        for plane in np.moveaxis(planes, -1, 0)
+    ]
+    return np.dstack([np.asarray(plane) for plane in made])
 
-    A new pixel that is narrower than an old one is interpolated from the two nearest.
-    """
-    reach = max(old / new / 2, 1.0)
-    centres = (np.arange(new) + 0.5) * old / new
-    if new <= old:
-        # Boxes touch pixels that they overlap: half a pixel more than to the centres.
-        reach += 0.5
-    distance = np.abs(np.arange(old) + 0.5 - centres[:, None])
-    return (distance < reach - 1e-9).astype(np.float32)
+
+def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """`mask` (h, w, n) without what is less than three pixels wide: its opening by 3 x 3."""
+    core = ~_around(~mask)
+    return _around(core) & mask
+
+
+def _around(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Whether the pixel or one of its eight neighbours is set."""
+    for axis in (0, 1):
+        lines = np.moveaxis(mask, axis, 0)
+        grown = lines.copy()
+        grown[1:] |= lines[:-1]
+        grown[:-1] |= lines[1:]
+        mask = np.moveaxis(grown, 0, axis)
+    return mask

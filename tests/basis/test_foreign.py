@@ -265,6 +265,19 @@ def test_other_primaries_are_converted(tmp_path: Path, header: dict[str, Any], k
     assert any("other primaries" in remark for remark in groups.remarks)
 
 
+def test_one_space_in_two_words_is_one_space(tmp_path: Path):
+    """Numbers are rounded by whoever writes them; names stand for the exact ones."""
+    images = pictures()
+    for k, (name, image) in enumerate(_layers(images).items()):
+        rounded = {"chromaticities": tuple(round(x, 4) for x in ACESCG)}
+        header = rounded if k % 2 else {"colorInteropID": "lin_ap1_scene"}
+        interleaved(tmp_path / f"{name}.exr", {"": image}, header=header)
+    groups = read_light_groups(tmp_path)
+    expected = np.einsum("nhwc,dc->nhwd", images, to_rec709(ACESCG))
+    # Rounding to four digits moves colours by as much.
+    np.testing.assert_allclose(groups.basis.images, expected, atol=2e-3, rtol=1e-3)
+
+
 def test_light_of_a_wide_gamut_is_no_excess(tmp_path: Path):
     """Green of ACEScg is negative in Rec.709, and still light that the groups lack."""
     images = pictures(4)

@@ -1,5 +1,6 @@
 """What was painted, found by comparing a file that came back with its template."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,13 +8,13 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from lightpaint.errors import SizeError, TargetError
+from lightpaint.errors import SizeError, TargetError, ViewError
 from lightpaint.images.display import decode_display
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.exr import Part, write_parts, write_rgb
 from lightpaint.images.png import write_png_16
-from lightpaint.images.view import View
+from lightpaint.images.view import View, ViewChoice
 from lightpaint.target.read import read_target
-from lightpaint.target.template import Template, write_template
+from lightpaint.target.template import Template, write_look, write_template
 
 SIZE = (60, 80)
 
@@ -136,6 +137,107 @@ def test_of_another_size(tmp_path: Path) -> None:
     assert "another size" in target.notes[0]
     with pytest.raises(SizeError, match="31x17 but its template is 80x60"):
         read_target(tmp_path / "p.png", template=tmp_path / "template")
+
+
+@pytest.mark.parametrize("name", ["p8.png", "half.exr"])
+@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        (None, View("agx", 0.5)),
+        (ViewChoice(), View("agx", 0.5)),
+        (ViewChoice(stops=2.0), View("agx", 2.0)),
+        (ViewChoice(stops=0.0), View("agx", 0.0)),
+        (ViewChoice(name="filmic"), View("filmic", 0.5)),
+        (ViewChoice("linear", 1.0), View("linear", 1.0)),
+        (View("linear", 1.0), View("linear", 1.0)),
+    ],
+)
+def test_what_is_left_open_of_a_view_is_the_templates(
+    tmp_path: Path, asked: View | ViewChoice | None, expected: View, name: str, given: bool
+) -> None:
+    write(tmp_path, template_of(View("agx", 0.5)))
+    shown = np.random.default_rng(1).integers(0, 256, (*SIZE, 3)) / 255
+    save(tmp_path / name, shown, View("agx", 0.5))
+    target = read_target(tmp_path / name, view=asked, template=tmp_path if given else None)
+    assert target.view == expected
+    if name == "p8.png":
+        np.testing.assert_allclose(target.image, expected.decode(shown), rtol=1e-4, atol=1e-6)
+
+
+def test_what_nobody_says_of_a_view_is_srgbs(tmp_path: Path) -> None:
+    for name in ("p8.png", "half.exr"):
+        save(tmp_path / name, np.full((4, 4, 3), 0.5), View())
+        for asked, expected in (
+            (ViewChoice(stops=2.0), View("srgb", 2.0)),
+            (ViewChoice(name="agx"), View("agx")),
+            (ViewChoice(), View() if name == "p8.png" else None),
+        ):
+            assert read_target(tmp_path / name, view=asked).view == expected
+
+
+def test_what_no_view_has_cannot_be_asked() -> None:
+    with pytest.raises(ViewError, match=r"^no view transform 'srgbb'"):
+        ViewChoice(name="srgbb")
+    with pytest.raises(ViewError, match="out of range"):
+        ViewChoice(stops=1e9)
+
+
+def test_a_template_of_another_size_says_nothing_of_the_view(tmp_path: Path) -> None:
+    """It is not what was painted on: neither compared with nor decoded by."""
+    write(tmp_path, template_of(View("agx", 2.0)))
+    save(tmp_path / "p8.png", np.full((8, 8, 3), 0.5), View())
+    for asked, view in ((None, View()), (ViewChoice(stops=1.0), View("srgb", 1.0))):
+        target = read_target(tmp_path / "p8.png", view=asked)
+        assert target.view == view
+        np.testing.assert_allclose(target.image, view.decode(np.float32(128 / 255)), rtol=1e-4)
+        assert "another size" in target.notes[0]
+    # An EXR holds light: only --space display asks for a view.
+    save(tmp_path / "half.exr", np.full((8, 8, 3), 0.5), View())
+    assert read_target(tmp_path / "half.exr").view is None
+
+
+def test_what_a_picture_says_of_its_view_goes_before_a_template_that_was_found(
+    tmp_path: Path,
+) -> None:
+    """Painted on the look that a template of another view has replaced since."""
+    old = View("filmic", -1.0)
+    write(tmp_path, template_of(View("agx", 2.0)))
+    light = np.full((*SIZE, 3), 0.2)
+    write_look(tmp_path / "old.exr", light, old)
+    target = read_target(tmp_path / "old.png")
+    assert target.view == old
+    np.testing.assert_allclose(target.image, light, rtol=1e-3)
+    assert read_target(tmp_path / "old.png", view=ViewChoice("srgb")).view == View("srgb", -1.0)
+    # A template that is given is meant.
+    assert read_target(tmp_path / "old.png", template=tmp_path).view == View("agx", 2.0)
+
+
+def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> None:
+    template = template_of()
+    write(tmp_path, template)
+    painted = template.image[10:40, 20:60].copy()
+    painted[10:20, 10:20] += 0.3
+    planes = {name: np.ascontiguousarray(painted[..., k]) for k, name in enumerate("RGB")}
+    crop = Part("", planes, offset=(10, 20), display=SIZE)
+    write_parts(tmp_path / "crop.exr", [crop])
+    target = read_target(tmp_path / "crop.exr")
+    stored = np.zeros(SIZE, bool)
+    stored[10:40, 20:60] = True
+    assert target.importance[~stored].max() == 0
+    brush = np.zeros(SIZE, bool)
+    brush[20:30, 30:40] = True
+    np.testing.assert_array_equal(target.importance[stored] > 0, brush[stored])
+    share = f"{100 * brush.mean():.3g} % painted"
+    assert target.notes[0].startswith(share)
+    # And a crop that shows the template alone is no painting.
+    painted[:] = template.image[10:40, 20:60]
+    write_parts(
+        tmp_path / "crop.exr",
+        [replace(crop, channels={n: painted[..., k].copy() for k, n in enumerate("RGB")})],
+    )
+    with pytest.raises(TargetError, match="nothing in"):
+        read_target(tmp_path / "crop.exr")
 
 
 def test_nearly_all_painted_is_doubted(tmp_path: Path) -> None:

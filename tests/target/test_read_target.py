@@ -268,3 +268,7 @@ def test_a_cropped_or_padded_picture_lies_where_it_was_painted(
     np.testing.assert_array_equal(target.importance, inside)
     np.testing.assert_array_equal(target.image[inside][:, 0], y[inside])
     np.testing.assert_array_equal(target.image[inside][:, 1], x[inside])
+    # A mask does not paint what is not there.
+    write_parts(tmp_path / "mask.exr", [Part("", {"Y": np.full((height, width), 0.5, "f4")})])
+    target = read_target(tmp_path / "cropped.exr", mask=tmp_path / "mask.exr")
+    np.testing.assert_array_equal(target.importance, 0.5 * inside)
