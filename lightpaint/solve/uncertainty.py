@@ -296,7 +296,8 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     residual, mixed = residual_and_noise(basis, solution, weights)
     present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
     images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
-    is_coupled = any(light.is_scalar for light in basis.lights)
+    # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
+    is_coupled = bool(solution.constraints) or any(light.is_scalar for light in basis.lights)
     power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
     gradient = np.zeros((3, n, 3, n))
     counted = np.flatnonzero(importance)
