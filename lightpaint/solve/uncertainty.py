@@ -300,7 +300,9 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     is_coupled = bool(solution.constraints) or any(light.is_scalar for light in basis.lights)
     power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
     gradient = np.zeros((3, n, 3, n))
-    counted = np.flatnonzero(importance)
+    pulled = _pulled(basis, solution, weights)
+    unseen = ~basis.emitters_seen.ravel()
+    counted = np.flatnonzero((importance > 0) | (unseen & pulled.any()))
     for start in range(0, counted.size, BLOCK):
         pixels = counted[start : start + BLOCK]
         rows = []
@@ -308,6 +310,9 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
             D = weight[pixels, c % weight.shape[1]].astype(np.float64)
             h = halves[:, pixels, c].astype(np.float64)
             rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
+            if pulled.any():
+                lit = np.where(unseen[pixels], images[:, pixels, c], 0).astype(np.float64)
+                rows[c] += pulled[:, c, None] * lit * h
             power[c] += (D * h) @ h.T
             shared = D * share[pixels, c % share.shape[1]]
             drawn[c] += h @ (shared * present[pixels, c])
@@ -325,6 +330,15 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
         objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
         objective_noise=(weight * np.square(mixed)).sum(axis=0),
     )
+
+
+def _pulled(basis: Basis, solution: Solution, weights: Doubles) -> Doubles:
+    """(n, 3), what Φᵢ hᵢ of a pixel adds to the noise of the gradient by the pull to the present.
+
+    The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by.
+    """
+    strength = solution.constraints.prefer_current if solution.constraints else 0.0
+    return np.asarray(2 * strength * (basis.present_weights - weights))
 
 
 def residual_and_noise(

@@ -212,6 +212,7 @@ ASKED: dict[str, tuple[dict[str, Any], str]] = {
     "tie": ({"tie": [["a", "b", "c", "d", "e"]]}, "abcde"),
     "two ties": ({"tie": [["a", "b"], ["c", "d", "e"]]}, "abcde"),
     "sparse": ({"sparse": 3}, "abcde"),
+    "prefer_current": ({"prefer_current": 0.1}, "abcde"),
 }
 
 
