@@ -115,16 +115,21 @@ def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
     """
     if problem.loss is not None and problem.reweighting is None:
         return _reweighted(basis, problem, problem.loss, start)
-    solution = linear_solution(basis, problem, start=start)
     if problem.reweighting is None:
-        return solution
-    # One more step of the last linear problem, in which lights may reach less than they do.
+        return linear_solution(basis, problem, start=start)
+    # One more step of the last linear problem, in which lights may reach less than they do, and
+    # which says nothing of other lights than those that were chosen.
+    asked = problem.constraints
+    reduction = chosen_reduction(basis, problem) if asked and asked.sparse is not None else None
+    solution = linear_solution(basis, problem, start=start, reduction=reduction)
     quality = replace(
         solution.quality,
         unreached=problem.quality.unreached,
+        curve=problem.quality.curve,
         converged=solution.quality.converged and problem.reweighting.converged,
     )
-    return replace(solution, lighting=replace(solution.lighting, quality=quality))
+    lighting = replace(solution.lighting, quality=quality)
+    return replace(solution, lighting=lighting, tried=problem.tried)
 
 
 def _reweighted(basis: Basis, problem: Solution, loss: Loss, start: Doubles) -> Solution:

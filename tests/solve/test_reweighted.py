@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 from lightpaint.basis.basis import Basis
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.view import View
 from lightpaint.solve import reweighted
 from lightpaint.solve.constraints import Constraints
@@ -15,6 +16,7 @@ from lightpaint.solve.diagnosis import diagnose
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.loss import Loss
 from lightpaint.solve.normal_equations import inner_products
+from lightpaint.solve.refine import refine
 from lightpaint.solve.reweighted import predicted
 from lightpaint.solve.solve import solution_of, solve
 from lightpaint.solve.uncertainty import correct_noise, error_bars
@@ -365,3 +367,38 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | 
         corrected_off.append(corrected.lighting.weights_for(basis) - truth)
     assert 0.8 <= np.mean(held) <= 1
     assert np.square(corrected_off).mean() < np.square(off).mean()
+
+
+@pytest.mark.parametrize("view", [None, SRGB])
+@pytest.mark.parametrize("seed", range(12))
+def test_lights_once_chosen_stay_chosen(make_basis: Any, seed: int, view: View | None):
+    """With `sparse` the choice is taken as given by all that improves an answer.
+
+    The squares of the last linear problem hold near the answer only: other lights would be
+    chosen on them, which the loss does not want.
+    """
+    rng = np.random.default_rng(seed)
+    images = rng.random((6, *SIZE, 3)) ** 3
+    halves = 1e-4 * rng.normal(size=images.shape)
+    basis = make_basis(images=images, half_differences=halves, emission=rng.random((6, 3)))
+    image = rng.random((*SIZE, 3)) ** 2 * rng.choice([0.5, 1, 2])
+    target = _target(image, top=None if view else 0.3)
+    asked = Constraints.of({}, sparse=2)
+    solution = solve(basis, target, constraints=asked, view=view)
+    w = solution.lighting.weights_for(basis)
+    mix = combine(basis, solution.lighting)
+    refined = refine(basis, solution, Estimate(mix.image, 0.5 * mix.half_difference))
+    again = solution_of(basis, solution, start=w)
+    for found in (again, correct_noise(basis, solution), refined):
+        v = found.lighting.weights_for(basis)
+        assert v.any(axis=1).tolist() == w.any(axis=1).tolist()
+        # Noise of 1e-4 moves nothing further, squares that end where the loss does neither.
+        np.testing.assert_allclose(v, w, atol=2e-3)
+        assert sum(found.quality.objective) == pytest.approx(
+            sum(solution.quality.objective), rel=1e-4
+        )
+        assert [count for count, _ in found.tried] == [1, 2, 3, 4]
+        assert found.quality.curve == solution.quality.curve
+        assert [x.constraint for x in found.lighting.lights] == [
+            x.constraint for x in solution.lighting.lights
+        ]
