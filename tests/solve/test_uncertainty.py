@@ -272,9 +272,7 @@ def test_what_one_unknown_moves_in_several_channels_errs_together(make_basis: An
     rng = np.random.default_rng(4)
     images = 1 + rng.random((2, *SIZE, 3))
     halves = 0.1 * rng.normal(size=(2, *SIZE, 1)) * images
-    basis = make_basis(
-        images=images, half_differences=halves, names="ab", emission=np.ones((2, 3))
-    )
+    basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
     painted = 0.6 + rng.random((*SIZE, 3))
     others = {key: value for key, value in asked.items() if key != "lights"}
     constraints = Constraints.of(asked.get("lights", {}), **others)
