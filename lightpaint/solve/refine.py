@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import SizeError
+from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
 from lightpaint.solve.normal_equations import Doubles, NormalEquations, inner_products
@@ -30,8 +30,16 @@ def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
 
     g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of what was solved.
     mixed: V, a render of the scene under solution.lighting, of the size of the basis, with
-    random numbers that the basis does not use. Raises SizeError if it has another size.
+    random numbers that the basis does not use.
+
+    Raises SizeError if it has another size, BasisError where nothing is known of the basis' noise:
+    then nothing says how much of the render to believe.
     """
+    if not basis.knows_noise:
+        raise BasisError(
+            f"{basis.origin.scene} says nothing of its noise, so that a render of the mix cannot "
+            "be weighed against it: leave --refine out"
+        )
     if mixed.size != basis.size:
         raise SizeError(
             f"the render of the mix is {mixed.size[1]}x{mixed.size[0]} but the basis is "

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import SizeError
+from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.refine import refine
@@ -186,6 +186,19 @@ def test_the_render_of_the_mix_has_the_size_of_the_basis(make_basis: Any):
     small = np.zeros((12, 12, 3), np.float32)
     with pytest.raises(SizeError, match="render of the mix is 12x12 but the basis is 24x24"):
         refine(basis, solution, Estimate(small, small))
+
+
+def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
+    """A render beside noise of which nothing is known would be thrown away in silence."""
+    basis = make_basis(2, SIZE)
+    basis = replace(basis, origin=replace(basis.origin, halves=(0, 0)))
+    solution = solve(basis, _painted(_pools()))
+    image = 1.3 * basis.mix(solution.lighting.weights_for(basis))
+    assert error_bars(basis, solution) is None
+    with pytest.raises(BasisError, match="says nothing of its noise"):
+        refine(basis, solution, Estimate(image, 0.05 * image))
+    with pytest.raises(BasisError, match="says nothing of its noise"):
+        correct_noise(basis, solution)
 
 
 def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
