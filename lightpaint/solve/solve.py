@@ -194,7 +194,8 @@ def _descended(
     quality = replace(quality, converged=quality.converged and found.reweighting.converged)
     lighting = its.lighting
     if (found.weights != lighting.weights_for(basis)).any():
-        lighting = Lighting.of_weights(basis, found.weights, target=lighting.target)
+        asked = [(light.constraint, light.is_active) for light in lighting.lights]
+        lighting = Lighting.of_weights(basis, found.weights, asked=asked, target=lighting.target)
     return replace(solution, lighting=replace(lighting, quality=quality))
 
 

@@ -136,6 +136,26 @@ def test_the_objective_never_rises(
     assert (np.diff(values) <= 1e-12 * values[0]).all()
 
 
+@pytest.mark.parametrize("seed", [2, 9, 11])
+def test_running_out_of_rounds_keeps_what_was_won(
+    make_basis: Any, seed: int, monkeypatch: pytest.MonkeyPatch
+):
+    """Whole steps would be for the worse here, parts of them are not; labels stay as well."""
+    basis, image, importance = _random(make_basis, seed)
+    target, view = _target(image, importance), View("srgb", 2.0)
+    asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
+    problem = solve(basis, target, constraints=asked)
+    monkeypatch.setattr(reweighted, "ROUNDS", 1)
+    solution = solve(basis, target, constraints=asked, view=view)
+    assert not solution.quality.converged
+    begin = predicted(basis, problem.lighting.weights_for(basis))
+    assert sum(solution.quality.objective) < (1 - 1e-4) * solution.loss.objective(begin).sum()
+    labels = [light.constraint for light in solution.lighting.lights]
+    assert labels == [light.constraint for light in problem.lighting.lights]
+    assert solution.lighting.emission["light 1"] == basis.lights[1].emission
+    assert solution.lighting.lights[1].is_active
+
+
 def test_saturated_paint_does_not_dim_the_lights(make_basis: Any):
     """An 8-bit painting that ends at white; the light that made it was twice as bright."""
     rng = np.random.default_rng(5)
@@ -352,7 +372,7 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
     bases, targets = [], []
     for k in range(2):
         basis, image, importance = _random(make_basis, seed + 50 * k)
-        bases.append(basis)
+        bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
         targets.append(_target(image, importance + 0.01, top=None if view else 0.6))
     whole, parts = joint_basis(bases)
     problems = [problem_of(b, t, view=view) for b, t in zip(parts, targets, strict=True)]
