@@ -20,11 +20,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.images.color import luminance
 from lightpaint.images.exr import Floats
 from lightpaint.solve.bound import Bound
+from lightpaint.solve.directions import block_diagonal, columns, unknown_groups
 from lightpaint.solve.lighting import combine
+from lightpaint.solve.noise import pseudo_inverse
 from lightpaint.solve.normal_equations import Doubles
 from lightpaint.solve.release import bounds_of
 from lightpaint.solve.solve import Solution, solution_of
-from lightpaint.solve.uncertainty import pseudo_inverse, unknown_groups
 from lightpaint.target.target import Target
 
 #: Blocks along each side of the image over which it is asked where light is missing, and
@@ -176,14 +177,11 @@ def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
     equations = solution.equations
     weights = solution.lighting.weights_for(basis)
     for unknowns in unknown_groups(basis, equations):
-        # Directions of the weights, (3, n), one for each unknown, flat.
-        to = np.zeros((3, len(weights), len(unknowns)))
-        for k, (i, cs) in enumerate(unknowns):
-            to[cs, i, k] = 1
+        to = columns(unknowns, len(weights))
         gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
-        M = np.einsum("cik,cij,cjl->kl", to, equations.M, to, optimize=True)
-        step = pseudo_inverse(M) @ np.einsum("cik,ci->k", to, gradient)
-        weights = weights - np.einsum("cik,k->ic", to, step)
+        M = to.T @ block_diagonal(equations.M) @ to
+        step = to @ pseudo_inverse(M) @ (to.T @ gradient.ravel())
+        weights = weights - step.reshape(3, -1).T
     return weights
 
 

@@ -11,14 +11,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.solve.constraints import Constraints
+from lightpaint.solve.noise import pseudo_inverse
 from lightpaint.solve.refine import refine
 from lightpaint.solve.solve import solve
-from lightpaint.solve.uncertainty import (
-    correct_noise,
-    error_bars,
-    pseudo_inverse,
-    with_error_bars,
-)
+from lightpaint.solve.uncertainty import correct_noise, error_bars, with_error_bars
 from lightpaint.target.target import Target
 
 SIZE = (24, 24)
@@ -269,7 +265,7 @@ SPANNING: dict[str, tuple[dict[str, Any], Any]] = {
     "tie": ({"tie": [["a", "b"]]}, [[[1, 1, 1], [1, 1, 1]]]),
     # Those along which the luminance stays at its limit.
     "limit": (
-        {"lights": {"a": {"limits": {"max": 0.2}}, "b": {"off": True}}},
+        {"lights": {"a": {"limits": {"max": 0.8}}, "b": {"off": True}}},
         [[[0.7152, -0.2126, 0], [0, 0, 0]], [[0, 0.0722, -0.7152], [0, 0, 0]]],
     ),
 }
@@ -286,7 +282,7 @@ def test_what_one_unknown_moves_in_several_channels_errs_together(make_basis: An
     images = 1 + rng.random((2, *SIZE, 3))
     halves = 0.1 * rng.normal(size=(2, *SIZE, 1)) * images
     basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
-    painted = 0.6 + rng.random((*SIZE, 3))
+    painted = 1.4 + rng.random((*SIZE, 3))
     others = {key: value for key, value in asked.items() if key != "lights"}
     constraints = Constraints.of(asked.get("lights", {}), **others)
     solution = solve(basis, _target(painted), constraints=constraints)
@@ -302,3 +298,69 @@ def test_what_one_unknown_moves_in_several_channels_errs_together(make_basis: An
     steps = np.linalg.solve(stiffness, np.einsum("kic,pic->kp", to, push))
     expected = np.sqrt(np.square(np.einsum("kic,kp->icp", to, steps)).sum(axis=-1))
     np.testing.assert_allclose(error_bars(basis, solution).scatter, expected, rtol=1e-4, atol=1e-9)
+
+
+#: As `SPANNING`, where the answer moves by more than one unknown's own channel, and where not.
+MOVING: dict[str, tuple[dict[str, Any], Any]] = {
+    "lock": (
+        {"lights": {"b": {"lock": 3.0}}},
+        [[axis, [0, 0, 0]] for axis in np.eye(3)],
+    ),
+    "scalar": ({}, [[[1, 1, 1], [0, 0, 0]], [[0, 0, 0], [1, 1, 1]]]),
+    **SPANNING,
+}
+
+
+@pytest.mark.parametrize("sigma", [0.1, 0.3])
+@pytest.mark.parametrize("name", MOVING)
+def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: str, sigma: float):
+    """By hand: the excess that is expected of shares of the correction and of a render's step."""
+    asked, directions = MOVING[name]
+    rng = np.random.default_rng(5)
+    # Few pixels count, so that neither scatter nor bias is all.
+    importance = np.zeros(SIZE, np.float32)
+    importance[:3, :3] = 1
+    images = 1 + rng.random((2, *SIZE, 3))
+    images[0, :, ::2] *= 0.2
+    images[1, :, 1::2] *= 0.2
+    halves = sigma * rng.normal(size=(2, *SIZE, 1)) * images
+    basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
+    if name == "scalar":
+        basis = _with_scalar(basis, 0, 1)
+    others = {key: value for key, value in asked.items() if key != "lights"}
+    constraints = Constraints.of(asked.get("lights", {}), **others)
+    there = {"lock": 3, "scalar": 3, "color": 0.2, "tie": 1, "limit": 0}[name]
+    painted = np.einsum("nhwc,n->hwc", images, [1, there]) + 0.2 * rng.random((*SIZE, 3))
+    target = Target("t", painted.astype(np.float32), importance, everything=False)
+    solution = solve(basis, target, constraints=constraints)
+    w = solution.lighting.weights_for(basis)
+    to, counted = np.array(directions), importance > 0
+    assert all(w[its != 0].all() for its in to)
+
+    f, h = images[:, counted], halves[:, counted]
+    missed, noise = painted[counted] - np.einsum("npc,nc->pc", f, w), np.einsum("npc,nc->pc", h, w)
+    M, N = (np.einsum("kic,ipc,jpc,ljc->kl", to, x, x, to) for x in (f, h))
+    push = np.einsum("kic,ipc->kp", to, h * missed - f * noise)
+    lacking = np.einsum("kic,ipc,pc->k", to, h, noise)
+    bias = np.linalg.solve(M - N, lacking)
+    assert np.linalg.eigvals(np.linalg.solve(M, N)).max() < 0.5
+
+    def excess(share: float) -> float:
+        spread = np.linalg.solve(M - share * N, push)
+        return float(
+            (1 - share) ** 2 * bias @ M @ bias + np.einsum("kp,kl,lp->", spread, M, spread)
+        )
+
+    shares = np.linspace(0, 1, 9)
+    chosen = correct_noise(basis, solution).noise_removed
+    assert chosen == shares[np.argmin([excess(s) for s in shares])]
+
+    render = 0.3 * rng.normal(size=(*SIZE, 1)) * painted
+    mixed = Estimate(*(x.astype(np.float32) for x in (basis.mix(w), render)))
+    known, rendered = (
+        np.einsum("kp,kp->", x, np.linalg.solve(M, x))
+        for x in (np.einsum("kic,ipc,pc->kp", to, f, y) for y in (noise, render[counted]))
+    )
+    ours = lacking @ np.linalg.solve(M, lacking) + known
+    refined = refine(basis, solution, mixed)
+    assert refined.refinement.share == pytest.approx(ours / (ours + rendered), rel=1e-4)
