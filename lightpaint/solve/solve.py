@@ -44,8 +44,8 @@ def solve(
 
     constraints: what else is asked of the lights.
     unpainted: weight of what is not painted, against the current look.
-    start: lighting to begin with (the present one by default): a good guess saves sweeps,
-    the answer is the same.
+    start: lighting to begin with (the present one by default): a good guess saves sweeps, the
+    answer is the same, but for what no painted pixel tells: lights that reach none keep the start.
     method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
     quality of the answer then says that it has not converged.
     view: for an answer that comes closest in what this view shows, instead of in linear light.
