@@ -114,10 +114,11 @@ def suggest_lights(
     if count < 1:
         raise SceneError(f"--suggest {count}: ask for one light or more")
     check_suggestible(scene)
-    total = sum(solution.quality.objective)
     norm2 = float(solution.norm2.sum())
-    if total <= NOTHING_MISSED**2 * norm2:
+    if sum(solution.quality.objective) <= NOTHING_MISSED**2 * norm2:
         return ()
+    # The gains are of the last linear problem, which may be on another scale.
+    total = solution.energy
     small = _on_small_film(scene, basis)
     space = _look_around(small, seed)
     if not len(space.places):

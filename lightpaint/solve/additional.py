@@ -16,10 +16,10 @@ from lightpaint.basis.basis import mix
 from lightpaint.images.exr import Floats
 from lightpaint.solve.candidates import Candidates
 from lightpaint.solve.constrained import weights_of
+from lightpaint.solve.noise import pseudo_inverse, without_noise
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.solve.optimum import minimise
 from lightpaint.solve.reduced_problem import ReducedProblem, problems
-from lightpaint.solve.uncertainty import pseudo_inverse, without_noise
 
 #: Candidates that the problem is solved for again, of those that seem to help most.
 SOLVED = 8

@@ -8,7 +8,6 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
 from lightpaint.solve.optimum import Method, Optimum, minimise
-from lightpaint.solve.quadratic import UNREACHED
 from lightpaint.solve.reduced_problem import problems
 from lightpaint.solve.reduction import Reduction, Unknown
 from lightpaint.solve.selection import best_knobs, only
@@ -62,7 +61,7 @@ def free_directions(equations: NormalEquations, reduction: Reduction, start: Dou
     Arguments as of `solve_constrained`.
     """
     x = constrained_optimum(equations, reduction, start).x
-    lit = reached(equations)
+    lit = equations.reached
     columns = []
     for unknown in reduction.unknowns:
         column = np.zeros((3, len(reduction.held)))
@@ -103,7 +102,7 @@ def constrained_optimum(
 
     x: the unknowns to begin with, where they are known; else those nearest to `start`.
     """
-    lit = reached(equations)
+    lit = equations.reached
     equations = _with_faint_pull(equations, lit, start)
     multipliers = np.zeros(len(reduction.unknowns))
     cap_multipliers = np.zeros(len(reduction.caps))
@@ -167,12 +166,6 @@ def weights_of(reduction: Reduction, x: Doubles) -> Doubles:
     return w
 
 
-def reached(equations: NormalEquations) -> npt.NDArray[np.bool_]:
-    """(n, 3), whether a light reaches something that counts in a channel."""
-    power = np.einsum("cii->ic", equations.M)
-    return np.asarray(power > UNREACHED * power.max(initial=0))
-
-
 def preferring(
     equations: NormalEquations, basis: Basis, present: Doubles, strength: float
 ) -> NormalEquations:
@@ -194,7 +187,7 @@ def pulled(equations: NormalEquations, basis: Basis, weights: Doubles) -> tuple[
     The gradient g = M w − b must vanish for a free light that is on, and may not be
     negative for one that is off; where it does not do so, something holds the light.
     """
-    lit = reached(equations)
+    lit = equations.reached
     power = np.einsum("cii->ic", equations.M)
     gradient = np.einsum("cij,jc->ic", equations.M, weights) - equations.b.T
     size = np.abs(equations.b.T[lit] / np.sqrt(power[lit])).max(initial=0) or 1.0

@@ -7,7 +7,8 @@ With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to 
 exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
 noise of the prediction adds to the first is taken out of it. Where the lighting answers several
 views, part of the second is what the best lighting for this view alone would not have missed.
-After reweighting, all of it is of the last linear problem: without what a display clips.
+After reweighting, all of it is of the last linear problem: without what a display clips, and on
+a scale of its own.
 """
 
 from dataclasses import dataclass, replace
@@ -19,11 +20,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.images.color import luminance
 from lightpaint.images.exr import Floats
 from lightpaint.solve.bound import Bound
+from lightpaint.solve.directions import block_diagonal, columns, unknown_groups
 from lightpaint.solve.lighting import combine
+from lightpaint.solve.noise import pseudo_inverse
 from lightpaint.solve.normal_equations import Doubles
 from lightpaint.solve.release import bounds_of
 from lightpaint.solve.solve import Solution, solution_of
-from lightpaint.solve.uncertainty import pseudo_inverse, unknown_groups
 from lightpaint.target.target import Target
 
 #: Blocks along each side of the image over which it is asked where light is missing, and
@@ -55,7 +57,7 @@ class Diagnosis:
     cannot. compromise: what the best lighting for this view alone would not miss; 0 where
     there is one view. noise: what the basis' own noise adds. The four sum to `total`.
     ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
-    norm2: ‖Ψ‖², to hold them against.
+    missed: what is missed relative to the painting, root mean square, in the space of the fit.
     unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
     reason. Their sum is Ψ − ΣwΦ. ignored_map: (h, w), of luminance, weighted.
     bounds: what holds single lights, the largest gain first. bounds_left_out: how many more
@@ -69,7 +71,7 @@ class Diagnosis:
     forbidden: float
     noise: float
     ignored: float
-    norm2: float
+    missed: float
     unreachable_map: Floats
     forbidden_map: Floats
     ignored_map: Floats
@@ -92,11 +94,6 @@ class Diagnosis:
     def share(self, part: float) -> float:
         """`part` of what is missed, 0 to 1."""
         return part / self.total if self.total > 0 else 0.0
-
-    @property
-    def missed(self) -> float:
-        """What is missed relative to the painting, root mean square."""
-        return float(np.sqrt(self.total / self.norm2)) if self.norm2 > 0 else 0.0
 
 
 def diagnose(
@@ -137,32 +134,36 @@ def diagnose(
         forbidden=total - out_of_reach - compromise,
         noise=noise,
         ignored=float((uncounted[..., None] * np.square(seen)).sum()),
-        norm2=_norm2(solution, D),
+        missed=_relative(solution, D, total),
         unreachable_map=unreachable,
         forbidden_map=forbidden,
         ignored_map=uncounted * luminance(outside),
         bounds=bounds,
         bounds_left_out=left_out,
-        lighting_total=total if whole is None else sum(whole[1].quality.objective),
+        lighting_total=total if whole is None else whole[1].energy,
         is_constrained=bool(solution.constraints),
         compromise=compromise,
         place=_place(solution, unreachable) if out_of_reach > noise else None,
     )
 
 
-def _norm2(solution: Solution, D: Floats) -> float:
+def _relative(solution: Solution, D: Floats, total: float) -> float:
+    """What is missed relative to the painting, root mean square."""
+    norm2 = float((D * np.square(solution.image, dtype=np.float64)).sum())
     if solution.loss is not None:
-        return float(solution.norm2.sum())
-    return float((D * np.square(solution.image, dtype=np.float64)).sum())
+        total, norm2 = sum(solution.quality.objective), float(solution.norm2.sum())
+    return float(np.sqrt(total / norm2)) if norm2 > 0 else 0.0
 
 
 def _given_up(basis: Basis, solution: Solution, weights: Doubles) -> float:
-    """By how much the objective of this view exceeds that of the best lighting for it alone."""
+    """By how much the energy of this view exceeds that of the best lighting for it alone.
+
+    After reweighting, both of the same squares: the loss itself is on another scale.
+    """
     if not solution.is_one_of_several:
         return 0.0
-    alone = solution_of(basis, replace(solution, reweighting=None), start=weights)
-    gap = sum(solution.quality.objective) - sum(alone.quality.objective)
-    return max(gap, 0.0)
+    alone = solution_of(basis, solution, start=weights)
+    return max(solution.energy - alone.energy, 0.0)
 
 
 def with_diagnosis(solution: Solution, diagnosis: Diagnosis) -> Solution:
@@ -176,14 +177,11 @@ def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
     equations = solution.equations
     weights = solution.lighting.weights_for(basis)
     for unknowns in unknown_groups(basis, equations):
-        # Directions of the weights, (3, n), one for each unknown, flat.
-        to = np.zeros((3, len(weights), len(unknowns)))
-        for k, (i, cs) in enumerate(unknowns):
-            to[cs, i, k] = 1
+        to = columns(unknowns, len(weights))
         gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
-        M = np.einsum("cik,cij,cjl->kl", to, equations.M, to, optimize=True)
-        step = pseudo_inverse(M) @ np.einsum("cik,ci->k", to, gradient)
-        weights = weights - np.einsum("cik,k->ic", to, step)
+        M = to.T @ block_diagonal(equations.M) @ to
+        step = to @ pseudo_inverse(M) @ (to.T @ gradient.ravel())
+        weights = weights - step.reshape(3, -1).T
     return weights
 
 

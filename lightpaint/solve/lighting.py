@@ -76,8 +76,8 @@ class Quality:
 
     kkt_residual: optimality measure of the solver (see solver.kkt_residual).
     objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
-    unreached: lights that no weighted pixel sees, which keep what the solve started from:
-    their present emission.
+    unreached: lights that no weighted pixel sees, which keep what the solve started from, or
+    what is nearest to it under their constraints: their present emission, if no start was given.
     curve: where only some lights may be on, numbers of lights and the relative residual,
     √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
     bounds: what holds single lights, where a diagnosis has looked, the largest gain first.

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.exr import Floats
+from lightpaint.solve.quadratic import UNREACHED
 from lightpaint.solve.threads import one_thread
 from lightpaint.target.target import Target
 
@@ -49,6 +50,12 @@ class NormalEquations:
         return NormalEquations(
             self.M + other.M, self.b + other.b, self.target_norm2 + other.target_norm2
         )
+
+    @property
+    def reached(self) -> npt.NDArray[np.bool_]:
+        """(n, 3), whether a light reaches something that counts in a channel."""
+        power = np.einsum("cii->ic", self.M)
+        return np.asarray(power > UNREACHED * power.max(initial=0))
 
     def objective(self, w: Doubles) -> Doubles:
         """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3)."""

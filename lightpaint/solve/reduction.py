@@ -108,8 +108,12 @@ def _add_light(
     ]
     coefficients = np.asarray(luminance(colours), np.float64)
     is_limited = least > 0 or np.isfinite(most)
-    _check_room(one, light, max(least, float(coefficients @ lower)), most)
-    _check_room(one, light, least, min(most, float(coefficients @ upper)))
+    darkest, brightest = float(coefficients @ lower), float(coefficients @ upper)
+    _check_room(one, light, max(least, darkest), most)
+    _check_room(one, light, least, min(most, brightest))
+    # Round-off may have parted ends that are the same.
+    most = max(most, darkest)
+    least = min(least, most, brightest)
     reduction.add(unknowns, (coefficients, least, most) if is_limited else None)
 
 
@@ -124,7 +128,8 @@ def _dimmer(k: int, light: BasisLight, one: LightConstraint) -> Unknown:
     _check_grey(one, light)
     lower, upper = _dimmer_limits(one, direction, light)
     _check_room(one, light, lower, upper)
-    return Unknown(((k, direction),), lower, upper)
+    # Round-off may have parted ends that are the same.
+    return Unknown(((k, direction),), min(lower, upper), upper)
 
 
 def _add_tie(

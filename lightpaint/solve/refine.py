@@ -12,17 +12,18 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import SizeError
+from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import Floats
-from lightpaint.solve.normal_equations import Doubles, NormalEquations, inner_products
-from lightpaint.solve.solve import Refinement, Solution, solution_of
-from lightpaint.solve.uncertainty import (
+from lightpaint.solve.directions import block_diagonal, moving, pulled_to_present
+from lightpaint.solve.noise import (
     lacking_gradient,
     noise_sums,
     pseudo_inverse,
     residual_and_noise,
 )
+from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations, inner_products
+from lightpaint.solve.solve import Refinement, Solution, solution_of
 
 
 def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
@@ -30,8 +31,16 @@ def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
 
     g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of what was solved.
     mixed: V, a render of the scene under solution.lighting, of the size of the basis, with
-    random numbers that the basis does not use. Raises SizeError if it has another size.
+    random numbers that the basis does not use.
+
+    Raises SizeError if it has another size, BasisError where nothing is known of the basis' noise:
+    then nothing says how much of the render to believe.
     """
+    if not basis.knows_noise:
+        raise BasisError(
+            f"{basis.origin.scene} says nothing of its noise, so that a render of the mix cannot "
+            "be weighed against it: leave --refine out"
+        )
     if mixed.size != basis.size:
         raise SizeError(
             f"the render of the mix is {mixed.size[1]}x{mixed.size[0]} but the basis is "
@@ -75,18 +84,34 @@ def _share(
     """The t that makes the expected excess (1 − t)² (B + K) + t² R least: (B + K) / (B + K + R).
 
     B: excess by what is lacking in the known gradient; K, R: by the noise of the prediction,
-    as known so far and as rendered. All measured by M⁻¹ among the lights that are on.
+    as known so far and as rendered. All measured by M⁻¹ along what nothing holds.
     """
-    weights = solution.lighting.weights_for(basis)
-    squared = np.square(solution.weight, dtype=np.float64)
     bias, spread = 0.0, np.zeros(2)
-    for c in range(3):
-        on = np.flatnonzero((weights[:, c] > 0) & ~basis.is_fixed)
-        inverse = pseudo_inverse(solution.solved.M[c][np.ix_(on, on)])
-        bias += float(lacking[c, on] @ inverse @ lacking[c, on])
+    M = pulled_to_present(basis, solution, solution.solved).M
+    for to in moving(basis, solution):
+        inverse = pseudo_inverse(to.T @ block_diagonal(M) @ to)
+        lacks = to.T @ lacking.ravel()
+        bias += float(lacks @ inverse @ lacks)
         for k, noise in enumerate((known, rendered)):
-            weighted = squared[..., c % squared.shape[2]] * np.square(noise[..., c])
-            gram, _, _ = inner_products(basis.images[on], solution.image, weighted)
-            spread[k] += np.einsum("ij,ij->", inverse, gram[c])
+            C = _pushed(basis, solution, noise, to)
+            spread[k] += np.einsum("ij,ij->", inverse, C)
     total = bias + spread.sum()
     return float((bias + spread[0]) / total) if total > 0 else 1.0
+
+
+def _pushed(basis: Basis, solution: Solution, noise: Floats, to: Doubles) -> Doubles:
+    """(k, k), covariance of the push that the noise of a prediction gives along `to`, (3 n, k)."""
+    n = len(basis.lights)
+    along = to.reshape(3, n, -1)
+    images, noise = basis.images.reshape(n, -1, 3), noise.reshape(-1, 3)
+    weight = solution.weight.reshape(len(noise), -1)
+    covariance = np.zeros((to.shape[1], to.shape[1]))
+    counted = np.flatnonzero(solution.importance)
+    for start in range(0, counted.size, BLOCK):
+        pixels = counted[start : start + BLOCK]
+        push = np.zeros((to.shape[1], pixels.size))
+        for c in np.flatnonzero(along.any(axis=(1, 2))):
+            pulls = weight[pixels, c % weight.shape[1]] * noise[pixels, c]
+            push += along[c].T @ (images[:, pixels, c] * pulls)
+        covariance += push @ push.T
+    return covariance

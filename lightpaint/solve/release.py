@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.solve.bound import Bound
-from lightpaint.solve.constrained import constrained_optimum, preferring, reached
+from lightpaint.solve.constrained import constrained_optimum, preferring
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.held import Answer, Held, all_held
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
@@ -57,7 +57,7 @@ def _answer(basis: Basis, solution: Solution, equations: NormalEquations) -> Ans
     full = reduce_to(solution.constraints or Constraints(), basis.lights)
     reduction = chosen_reduction(basis, solution) if solution.constraints else full
     found = constrained_optimum(equations, reduction, solution.lighting.weights_for(basis))
-    lit = reached(equations)
+    lit = equations.reached
     gradient = np.einsum("cij,jc->ic", equations.M, found.result.weights) - equations.b.T
     return Answer(
         basis,

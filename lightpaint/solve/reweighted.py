@@ -51,7 +51,10 @@ class Reweighting:
 
 @dataclass(frozen=True)
 class Descent:
-    """Where the rounds led: weights, and the last linear problem, which they solve."""
+    """Where the rounds led: weights, and the last linear problem.
+
+    They solve it, unless its own solution is worse than where it starts; then they lie between.
+    """
 
     weights: Doubles
     squares: Squares
@@ -96,10 +99,10 @@ def descend(
                 continue
             done = False
         if done or part == 0 or count >= ROUNDS:
-            stays = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
+            is_worse = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
             small = done or (part == 0 and fall <= FLAT * value)
             return Descent(
-                w if stays else best,
+                w + part * (best - w) if is_worse else best,
                 squares,
                 equations,
                 Reweighting(squares.factor, w, count, step, small),

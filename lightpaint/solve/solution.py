@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from lightpaint.images.exr import Floats
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, Quality
@@ -88,6 +90,16 @@ class Solution:
     def norm2(self) -> Doubles:
         """(3,), what a black picture would miss, to hold the objective against."""
         return self.equations.target_norm2 if self.loss is None else self.loss.norm2
+
+    @property
+    def energy(self) -> float:
+        """What is missed in the problem that `equations` are, all channels together.
+
+        After reweighting that is the last linear one: gains of its solutions are beside this, and
+        not beside the objective in the quality, which may be that of a view.
+        """
+        weights = np.array([light.weight for light in self.lighting.lights])
+        return float(self.equations.objective(weights).sum())
 
     @property
     def space(self) -> Space:

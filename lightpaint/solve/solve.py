@@ -44,8 +44,8 @@ def solve(
 
     constraints: what else is asked of the lights.
     unpainted: weight of what is not painted, against the current look.
-    start: lighting to begin with (the present one by default): a good guess saves sweeps,
-    the answer is the same.
+    start: lighting to begin with (the present one by default): a good guess saves sweeps, the
+    answer is the same, but for what no painted pixel tells: lights that reach none keep the start.
     method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
     quality of the answer then says that it has not converged.
     view: for an answer that comes closest in what this view shows, instead of in linear light.
@@ -115,16 +115,21 @@ def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
     """
     if problem.loss is not None and problem.reweighting is None:
         return _reweighted(basis, problem, problem.loss, start)
-    solution = linear_solution(basis, problem, start=start)
     if problem.reweighting is None:
-        return solution
-    # One more step of the last linear problem, in which lights may reach less than they do.
+        return linear_solution(basis, problem, start=start)
+    # One more step of the last linear problem, in which lights may reach less than they do, and
+    # which says nothing of other lights than those that were chosen.
+    asked = problem.constraints
+    reduction = chosen_reduction(basis, problem) if asked and asked.sparse is not None else None
+    solution = linear_solution(basis, problem, start=start, reduction=reduction)
     quality = replace(
         solution.quality,
         unreached=problem.quality.unreached,
+        curve=problem.quality.curve,
         converged=solution.quality.converged and problem.reweighting.converged,
     )
-    return replace(solution, lighting=replace(solution.lighting, quality=quality))
+    lighting = replace(solution.lighting, quality=quality)
+    return replace(solution, lighting=lighting, tried=problem.tried)
 
 
 def _reweighted(basis: Basis, problem: Solution, loss: Loss, start: Doubles) -> Solution:
@@ -189,7 +194,8 @@ def _descended(
     quality = replace(quality, converged=quality.converged and found.reweighting.converged)
     lighting = its.lighting
     if (found.weights != lighting.weights_for(basis)).any():
-        lighting = Lighting.of_weights(basis, found.weights, target=lighting.target)
+        asked = [(light.constraint, light.is_active) for light in lighting.lights]
+        lighting = Lighting.of_weights(basis, found.weights, asked=asked, target=lighting.target)
     return replace(solution, lighting=replace(lighting, quality=quality))
 
 

@@ -9,14 +9,14 @@ import numpy as np
 from lightpaint.solve.clipped_newton import clipped_newton
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.solve.optimum import Method, Optimum, minimise
-from lightpaint.solve.quadratic import UNREACHED, Bools
+from lightpaint.solve.quadratic import Bools
 from lightpaint.solve.threads import one_thread, side_by_side
 
 #: Lights up to which the channels are solved in the same calls; beyond, each on a thread.
 FEW = 64
 
 #: (light, channels it moves together) of each unknown weight.
-_Unknowns = list[tuple[int, list[int]]]
+Unknowns = list[tuple[int, list[int]]]
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,7 @@ def solve_normal_equations(
     method, tolerance, max_sweeps: see `minimise`.
     """
     weights = np.array(start, dtype=np.float64)
-    power = np.einsum("cii->ic", equations.M)
-    lit = power > UNREACHED * power.max(initial=0)  # (n, 3)
+    lit: Bools = equations.reached
     best_of = partial(minimise, method=method, tolerance=tolerance, max_sweeps=max_sweeps)
     residuals = np.zeros(3)
     if any(is_scalar):
@@ -76,7 +75,7 @@ def solve_normal_equations(
     for c, best in found.items():
         residuals[c], sweeps[c] = best.kkt_residual, best.sweeps
         needed = max(needed, best.tolerance)
-    reached = tuple(lit.any(axis=1).tolist())
+    reached = tuple(np.asarray(lit.any(axis=1)).tolist())
     return SolverResult(weights, residuals, (sweeps[0], sweeps[1], sweeps[2]), reached, needed)
 
 
@@ -112,7 +111,7 @@ def _coupled(
     best_of: Callable[..., Optimum],
 ) -> Optimum:
     """The optimum of the three channels as one problem, written into the weights (n, 3)."""
-    unknowns = _unknowns(lit, is_scalar)
+    unknowns = unknowns_of(lit, is_scalar)
     M, b = _assemble(equations, unknowns)
     best = best_of(M, b, start=np.array([weights[i, cs[0]] for i, cs in unknowns]))
     for (i, cs), value in zip(unknowns, best.x, strict=True):
@@ -147,9 +146,9 @@ def _at_once(
     return weights, residuals, is_solved
 
 
-def _unknowns(lit: Bools, is_scalar: Sequence[bool]) -> _Unknowns:
+def unknowns_of(lit: Bools, is_scalar: Sequence[bool]) -> Unknowns:
     """(light, channels it moves together) of each unknown weight."""
-    unknowns: _Unknowns = []
+    unknowns: Unknowns = []
     for i, in_channel in enumerate(lit.tolist()):
         if is_scalar[i]:
             unknowns += [(i, [0, 1, 2])] if any(in_channel) else []
@@ -158,7 +157,7 @@ def _unknowns(lit: Bools, is_scalar: Sequence[bool]) -> _Unknowns:
     return unknowns
 
 
-def _assemble(equations: NormalEquations, unknowns: _Unknowns) -> tuple[Doubles, Doubles]:
+def _assemble(equations: NormalEquations, unknowns: Unknowns) -> tuple[Doubles, Doubles]:
     """M and b in the unknowns: those of the channels, summed where one weight serves several."""
     size = len(unknowns)
     M, b = np.zeros((size, size)), np.zeros(size)

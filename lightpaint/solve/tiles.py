@@ -76,9 +76,13 @@ class TiledEquations:
         """Paint over a rectangle: what is given replaces the target or the importance there.
 
         region: slices of rows and columns. target: (rows, columns, 3) or one colour;
-        importance: (rows, columns) or one number. Raises ValueError for a negative or
-        infinite importance.
+        importance: (rows, columns) or one number. Raises ValueError, and leaves all as it is,
+        for a negative or infinite importance and for what does not fit the region.
         """
+        for along, length in zip(region, self._importance.shape, strict=True):
+            _tiles(along, length, self.side)
+        if target is not None:
+            np.broadcast_to(target, self._target[region].shape)
         if importance is not None:
             given = np.asarray(importance)
             if not (np.isfinite(given).all() and (given >= 0).all()):

@@ -10,27 +10,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError
-from lightpaint.solve.constrained import free_directions, preferring, solve_constrained
+from lightpaint.solve.constrained import free_directions
+from lightpaint.solve.directions import (
+    answer_to,
+    block_diagonal,
+    columns,
+    moving,
+    pulled_to_present,
+    unknown_groups,
+)
 from lightpaint.solve.lighting import LightSetting
-from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
-from lightpaint.solve.quadratic import UNREACHED
+from lightpaint.solve.noise import (
+    SINGULAR,
+    Noise,
+    lacking_gradient,
+    noise_sums,
+    pseudo_inverse,
+    without_noise,
+)
+from lightpaint.solve.normal_equations import Doubles, NormalEquations
 from lightpaint.solve.solve import Solution, chosen_reduction, solution_of
-from lightpaint.solve.solver import solve_normal_equations
 
 #: Standard errors on either side of a 95 % interval.
 SIDES = 1.96
 
-#: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
-#: the estimate of it is itself noise, and what is left of M would soon be indefinite.
-LARGEST_NOISE = 0.5
-
 #: Steps in which it is decided how much of the noise to take out of M.
 SHARES = 8
-
-#: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
-SINGULAR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -74,22 +81,6 @@ class Uncertainty:
         return np.maximum(self.weights - side, 0), self.weights + side
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Sums over pixels of products of half differences, per channel.
-
-    power: (3, n, n), N_ij = Σ D h_i h_j, what the noise adds to M. drawn: (3, n), what the
-    noise of the current look, where that is solved for, adds to b.
-    gradient: (3, n, 3, n), covariance of the gradient. objective: as in `Uncertainty`.
-    """
-
-    power: Doubles
-    drawn: Doubles
-    gradient: Doubles
-    objective_error: Doubles
-    objective_noise: Doubles
-
-
 def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
     """Standard error and bias of every weight that `solve` or `refine` found.
 
@@ -111,7 +102,7 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
     unbiased = NormalEquations(corrected, right, equations.target_norm2)
     if solution.constraints:
         return _constrained_error_bars(basis, solution, noise, unbiased)
-    bias = np.asarray(_solved(basis, unbiased, weights) - weights)
+    bias = np.asarray(answer_to(basis, solution, unbiased) - weights)
 
     scatter, excess = np.zeros_like(weights), np.zeros(3)
     # How firmly lights are off, had there been no bias.
@@ -120,8 +111,8 @@ def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
     # a part; the unbiased answer, on which the interval hangs, has the scatter of its own M.
     M_of_scatter = solution.solved.M if solution.refinement is None else corrected
     for unknowns in unknown_groups(basis, equations):
-        to = _columns(unknowns, len(weights))
-        M = to.T @ _block_diagonal(M_of_scatter) @ to
+        to = columns(unknowns, len(weights))
+        M = to.T @ block_diagonal(M_of_scatter) @ to
         C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
         flat = np.array([weights[i, cs[0]] for i, cs in unknowns])
         errors, spread = _propagated(M, C, flat, to.T @ gradient.T.ravel())
@@ -145,17 +136,13 @@ def _constrained_error_bars(
     basis: Basis, solution: Solution, noise: Noise, unbiased: NormalEquations
 ) -> Uncertainty:
     """As `error_bars`, along the directions of the weights that constraints leave."""
-    assert solution.constraints is not None
     weights = solution.lighting.weights_for(basis)
     reduction = chosen_reduction(basis, solution)
     solved = solution.solved if solution.refinement is None else unbiased
-    if strength := solution.constraints.prefer_current:
-        present = basis.present_weights
-        solved = preferring(solved, basis, present, strength)
-        unbiased = preferring(unbiased, basis, present, strength)
-    bias = solve_constrained(unbiased, reduction, weights).weights - weights
+    solved = pulled_to_present(basis, solution, solved)
+    bias = answer_to(basis, solution, unbiased) - weights
     to = free_directions(solved, reduction, weights)
-    inverse = pseudo_inverse(to.T @ _block_diagonal(solved.M) @ to)
+    inverse = pseudo_inverse(to.T @ block_diagonal(solved.M) @ to)
     C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
     covariance = to @ inverse @ C @ inverse @ to.T
     n = len(weights)
@@ -173,20 +160,6 @@ def _constrained_error_bars(
         excess,
         solution.norm2,
     )
-
-
-def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
-    """Some weights, (n, 3), and what noise made b − M w lack there on average, (3, n)."""
-    if (r := solution.refinement) is not None:
-        return r.before, r.lacking
-    n = noise.power.shape[1]
-    # At no light at all the noise of the basis lacks nothing in M: all of it is still to come.
-    nothing = np.zeros((n, 3))
-    if solution.noise_removed == 0:
-        return nothing, -noise.drawn
-    weights = np.array([light.weight for light in solution.lighting.lights])
-    lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.drawn
-    return weights, (1 - solution.noise_removed) * lack
 
 
 def correct_noise(basis: Basis, solution: Solution, *, share: float | None = None) -> Solution:
@@ -224,18 +197,19 @@ def _best_share(basis: Basis, solution: Solution, noise: Noise, least: Doubles) 
     grows as M_s = M − s N becomes smaller. least: M without all noise.
     """
     weights = solution.lighting.weights_for(basis)
-    M = solution.equations.M
-    right = NormalEquations(least, solution.equations.b - noise.drawn, noise.objective_noise)
-    bias = _solved(basis, right, weights) - weights
+    e, n = solution.equations, len(weights)
+    unbiased = NormalEquations(least, e.b - noise.drawn, noise.objective_noise)
+    bias = answer_to(basis, solution, unbiased) - weights
     shares = np.linspace(0, 1, SHARES + 1)
-    cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, M, bias)
-    for c in range(3):
-        on = np.flatnonzero((weights[:, c] > 0) & ~basis.is_fixed)
-        here = np.ix_(on, on)
-        C = noise.gradient[c, :, c][here]
+    cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, e.M, bias)
+    # The pull to the present keeps weights from moving, and is no part of what is missed.
+    pull = pulled_to_present(basis, solution, e).M - e.M
+    for to in moving(basis, solution):
+        M, left, stiff = (to.T @ block_diagonal(x) @ to for x in (e.M, least, pull))
+        C = to.T @ noise.gradient.reshape(3 * n, 3 * n) @ to
         for k, s in enumerate(shares):
-            inverse = pseudo_inverse((1 - s) * M[c][here] + s * least[c][here])
-            cost[k] += np.einsum("ij,ji->", M[c][here], inverse @ C @ inverse)
+            inverse = pseudo_inverse((1 - s) * M + s * left + stiff)
+            cost[k] += np.einsum("ij,ji->", M, inverse @ C @ inverse)
     return float(shares[np.argmin(cost)])
 
 
@@ -252,97 +226,6 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
     quality = replace(solution.quality, objective_error=(r, g, b))
     lighting = replace(solution.lighting, lights=tuple(lights), quality=quality)
     return replace(solution, lighting=lighting)
-
-
-def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:
-    """M without the noise in it, (3, n, n), positive semidefinite.
-
-    power: (3, n, n), N. M − N, but in no direction less than 1 − LARGEST_NOISE of M.
-    """
-    made = np.empty_like(equations.M)
-    for c in range(3):
-        root, inverse = _roots(equations.M[c])
-        values, vectors = np.linalg.eigh(inverse @ power[c] @ inverse.T)
-        values = np.clip(values, 0, LARGEST_NOISE)
-        made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
-    return made
-
-
-def unknown_groups(basis: Basis, equations: NormalEquations) -> list[list[tuple[int, list[int]]]]:
-    """(light, channels it moves together) of each unknown weight, by independent problem."""
-    power = np.einsum("cii->ic", equations.M)
-    lit = power > UNREACHED * power.max(initial=0)
-    is_coupled = any(light.is_scalar and not light.is_fixed for light in basis.lights)
-    groups = []
-    for channels in [[0, 1, 2]] if is_coupled else [[0], [1], [2]]:
-        group: list[tuple[int, list[int]]] = []
-        for i, light in enumerate(basis.lights):
-            if light.is_fixed:
-                continue
-            if light.is_scalar:
-                group += [(i, channels)] if lit[i].any() else []
-            else:
-                group += [(i, [c]) for c in channels if lit[i, c]]
-        groups.append(group)
-    return groups
-
-
-def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
-    """One pass over the pixels that count."""
-    n = len(weights)
-    importance = solution.importance.ravel()
-    # (pixels, 1), or (pixels, 3) where channels differ.
-    weight, share = (x.reshape(-1, x.shape[2]) for x in (solution.weight, solution.current_shares))
-    residual, mixed = residual_and_noise(basis, solution, weights)
-    present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
-    images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
-    is_coupled = any(light.is_scalar for light in basis.lights)
-    power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
-    gradient = np.zeros((3, n, 3, n))
-    counted = np.flatnonzero(importance)
-    for start in range(0, counted.size, BLOCK):
-        pixels = counted[start : start + BLOCK]
-        rows = []
-        for c in range(3):
-            D = weight[pixels, c % weight.shape[1]].astype(np.float64)
-            h = halves[:, pixels, c].astype(np.float64)
-            rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
-            power[c] += (D * h) @ h.T
-            shared = D * share[pixels, c % share.shape[1]]
-            drawn[c] += h @ (shared * present[pixels, c])
-            gradient[c, :, c] += rows[c] @ rows[c].T
-        if is_coupled:
-            # One path carries all three channels, so their noise goes together.
-            for c, d in ((0, 1), (0, 2), (1, 2)):
-                product = rows[c] @ rows[d].T
-                gradient[c, :, d] += product
-                gradient[d, :, c] += product.T
-    return Noise(
-        power,
-        drawn,
-        gradient,
-        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
-        objective_noise=(weight * np.square(mixed)).sum(axis=0),
-    )
-
-
-def residual_and_noise(
-    basis: Basis, solution: Solution, weights: Doubles
-) -> tuple[Doubles, Doubles]:
-    """What the answer misses, and half the difference of what its two halves predict.
-
-    Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
-    it holds the current look.
-    """
-    residual = solution.image.astype(np.float64) - basis.mix(weights)
-    noise: Doubles
-    if (r := solution.refinement) is not None:
-        noise = np.asarray(r.noise + mix(basis.half_differences, weights - r.before), np.float64)
-    else:
-        noise = mix(basis.half_differences, weights).astype(np.float64)
-        present = mix(basis.half_differences, basis.present_weights)
-        noise = np.asarray(noise - solution.current_shares * present, np.float64)
-    return residual.reshape(-1, 3), noise.reshape(-1, 3)
 
 
 def _propagated(M: Doubles, C: Doubles, w: Doubles, gradient: Doubles) -> tuple[Doubles, float]:
@@ -381,51 +264,3 @@ def _one_sided(M: Doubles, C: Doubles, on: npt.NDArray[np.bool_], i: int, gradie
     wanted = -max(gradient, 0.0) / stiffness
     spread = float(np.sqrt(np.maximum(along @ C @ along, 0.0))) / stiffness
     return max(0.0, float(spread + wanted / SIDES))
-
-
-def _solved(basis: Basis, equations: NormalEquations, start: Doubles) -> Doubles:
-    """The weights (n, 3) that solve `equations` under the same bounds as the answer."""
-    free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
-    weights = start.copy()
-    weights[free] = solve_normal_equations(
-        equations.holding(basis.is_fixed),
-        start[free],
-        is_scalar=[basis.lights[k].is_scalar for k in free],
-        # Far below the errors that are asked for.
-        tolerance=1e-6,
-        max_sweeps=2000,
-    ).weights
-    return weights
-
-
-def _columns(unknowns: list[tuple[int, list[int]]], n: int) -> Doubles:
-    """(3 n, unknowns): 1 where a weight, channel by channel, is that unknown."""
-    columns = np.zeros((3, n, len(unknowns)))
-    for k, (i, cs) in enumerate(unknowns):
-        columns[cs, i, k] = 1
-    return columns.reshape(3 * n, -1)
-
-
-def _block_diagonal(M: Doubles) -> Doubles:
-    n = M.shape[1]
-    whole = np.zeros((3, n, 3, n))
-    for c in range(3):
-        whole[c, :, c] = M[c]
-    return whole.reshape(3 * n, 3 * n)
-
-
-def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
-    """R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
-    scale = np.sqrt(np.diag(M))
-    safe = np.where(scale > 0, scale, 1)
-    values, vectors = np.linalg.eigh(M / safe[:, None] / safe)
-    seen = values > SINGULAR * values.max(initial=0)
-    root = np.sqrt(values[seen])
-    inverse = (vectors[:, seen] / root).T / safe
-    return np.asarray(safe[:, None] * vectors[:, seen] * root), np.asarray(inverse)
-
-
-def pseudo_inverse(M: Doubles) -> Doubles:
-    """Of a positive semidefinite matrix, whatever the sizes of its unknowns."""
-    _, inverse = _roots(M)
-    return np.asarray(inverse.T @ inverse)

@@ -59,13 +59,31 @@ def solve_views(
 
 
 def check_same_lights(a: Basis, b: Basis) -> None:
-    """Raise BasisError unless two bases have the same lights in the same units."""
-    told = [[(x.name, x.unit, x.members, x.is_fixed) for x in basis.lights] for basis in (a, b)]
-    if told[0] != told[1]:
+    """Raise BasisError unless two bases have the same lights, which do and emit the same."""
+    if a.names != b.names:
         raise BasisError(
             f"the bases of {a.origin.sensor} and {b.origin.sensor} have other lights, "
             f"{', '.join(a.names)} and {', '.join(b.names)}: make both of one scene"
         )
+    for one, other in zip(a.lights, b.lights, strict=True):
+        for what in ("unit", "members", "is_fixed", "is_scalar", "emission"):
+            if (its := getattr(one, what)) != (others := getattr(other, what)):
+                raise BasisError(
+                    f"light {one.name!r} has {_spoken(what, its)} in the basis of "
+                    f"{a.origin.sensor} and {_spoken(what, others)} in that of {b.origin.sensor}: "
+                    "make both of one scene as it is"
+                )
+
+
+def _spoken(what: str, value: Any) -> str:
+    """A property of a light, as a noun."""
+    if what == "is_fixed":
+        return "no weight of its own" if value else "a weight of its own"
+    if what == "is_scalar":
+        return "one weight for all channels" if value else "a weight for each channel"
+    if what == "emission":
+        return "the emission " + " ".join(f"{v:g}" for v in value)
+    return f"the {what} {value if isinstance(value, str) else ', '.join(value)}"
 
 
 def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, list[Basis]]:

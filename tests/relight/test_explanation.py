@@ -107,7 +107,7 @@ def test_the_most_useful_comes_first(make_basis: Any):
     assert first.startswith("Of what is missed (in energy), ")
     assert "no mix of the lights can reach" in first
     assert len(rest) <= 3
-    met = replace(found, total=1e-9)
+    met = replace(found, missed=0.009)
     assert what_is_missed(met) == ["The lights can do what is painted."]
     half = 0.5 * found.total
     held = replace(found, bounds=(_bound("zero", "key", gain=half, multiplier=(0, 1, 1)),))

@@ -548,3 +548,29 @@ def test_few_lights_among_ties_and_lower_limits(make_basis: Any) -> None:
     # More than there are is no constraint.
     all_of_them = _solved(basis, target, sparse=9)[0]
     np.testing.assert_allclose(all_of_them, solve(basis, target).lighting.weights_for(basis))
+
+
+@pytest.mark.parametrize("kind", ["color", "share", "luminance of mixed", "luminance of free"])
+def test_limits_may_leave_one_emission(make_basis: Any, kind: str):
+    """Round-off may part two ends that are the same; that is no contradiction."""
+    rng = np.random.default_rng(1)
+    for color in rng.uniform(0.1, 1, (100, 3)):
+        level = 0.37 * color
+        bright = float(LUMINANCE @ level)
+        basis = make_basis(2, SIZE, names="ab", emission=[level, [1, 1, 1]])
+        target = Target("t", basis.images[0], np.ones(SIZE, np.float32), everything=False)
+        # Of the first, level / color of one channel and another differ.
+        asked: dict[str, Any] = {
+            "color": {"color": color.tolist(), "limits": [level.tolist(), level.tolist()]},
+            "share": {"color": color.tolist(), "limits": ["100%", bright * (1 - 2e-13)]},
+            "luminance of mixed": {"limits": ["100%", bright * (1 - 2e-13)]},
+            "luminance of free": {"limits": [level.tolist(), bright * (1 - 2e-13)]},
+        }[kind]
+        asked["limits"] = dict(zip(("min", "max"), asked["limits"], strict=True))
+        solution = solve(basis, target, constraints=Constraints.of({"a": asked}))
+        w = solution.lighting.weights_for(basis)[0]
+        # What is taken for round-off, 1e-12, of a channel with a tenth of the luminance.
+        if kind == "luminance of mixed":
+            assert LUMINANCE @ w == pytest.approx(bright, rel=1e-11)
+        else:
+            np.testing.assert_allclose(w, level, rtol=1e-10)

@@ -1,13 +1,15 @@
 """Losses that are not one square per channel: "at least this bright", and what a display shows."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
 
 from lightpaint.basis.basis import Basis
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.view import View
 from lightpaint.solve import reweighted
 from lightpaint.solve.constraints import Constraints
@@ -15,10 +17,12 @@ from lightpaint.solve.diagnosis import diagnose
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.loss import Loss
 from lightpaint.solve.normal_equations import inner_products
+from lightpaint.solve.refine import refine
 from lightpaint.solve.reweighted import predicted
-from lightpaint.solve.solve import solution_of, solve
+from lightpaint.solve.solution import Solution
+from lightpaint.solve.solve import problem_of, solution_of, solve
 from lightpaint.solve.uncertainty import correct_noise, error_bars
-from lightpaint.solve.views import solve_views
+from lightpaint.solve.views import joint_basis, joint_problem, parted, solve_views
 from lightpaint.target.target import Target
 
 SIZE = (8, 9)
@@ -130,6 +134,26 @@ def test_the_objective_never_rises(
         values.append(sum(solution.quality.objective))
         assert solution.quality.converged or view is not None or rounds < 6
     assert (np.diff(values) <= 1e-12 * values[0]).all()
+
+
+@pytest.mark.parametrize("seed", [2, 9, 11])
+def test_running_out_of_rounds_keeps_what_was_won(
+    make_basis: Any, seed: int, monkeypatch: pytest.MonkeyPatch
+):
+    """Whole steps would be for the worse here, parts of them are not; labels stay as well."""
+    basis, image, importance = _random(make_basis, seed)
+    target, view = _target(image, importance), View("srgb", 2.0)
+    asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
+    problem = solve(basis, target, constraints=asked)
+    monkeypatch.setattr(reweighted, "ROUNDS", 1)
+    solution = solve(basis, target, constraints=asked, view=view)
+    assert not solution.quality.converged
+    begin = predicted(basis, problem.lighting.weights_for(basis))
+    assert sum(solution.quality.objective) < (1 - 1e-4) * solution.loss.objective(begin).sum()
+    labels = [light.constraint for light in solution.lighting.lights]
+    assert labels == [light.constraint for light in problem.lighting.lights]
+    assert solution.lighting.emission["light 1"] == basis.lights[1].emission
+    assert solution.lighting.lights[1].is_active
 
 
 def test_saturated_paint_does_not_dim_the_lights(make_basis: Any):
@@ -320,11 +344,75 @@ def test_views_together_are_one_picture(make_basis: Any, view: View | None):
     assert together == pytest.approx(sum(expected.quality.objective), rel=1e-9)
     M = found[0].equations.M + found[1].equations.M
     np.testing.assert_allclose(M, expected.equations.M, rtol=1e-4)
-    for (basis_, target), solution in zip(parts, found, strict=True):
-        told = diagnose(basis_, target, solution)
-        assert told.total == pytest.approx(
-            told.unreachable + told.forbidden + told.noise + told.compromise
+
+
+def _least(solution: Solution, basis: Basis, solve_channel: Any) -> float:
+    """The least of the last linear problem, by another solver, of dense rows."""
+    total = 0.0
+    for c in range(3):
+        root = np.sqrt(
+            solution.weight[..., c % solution.weight.shape[2]].ravel().astype(np.float64)
         )
+        rows = basis.images[..., c].reshape(len(basis.images), -1).astype(np.float64)
+        A, y = (rows * root).T, solution.image[..., c].ravel() * root
+        total += float(np.square(A @ solve_channel(A, y) - y).sum())
+    return total
+
+
+def _of_any_sign(A: Any, y: Any) -> Any:
+    return np.linalg.lstsq(A, y, rcond=None)[0]
+
+
+@pytest.mark.parametrize("view", [None, SRGB, View("agx", 1.0)], ids=str)
+@pytest.mark.parametrize("seed", range(4))
+def test_what_each_of_several_views_misses_is_split_on_one_scale(
+    make_basis: Any, seed: int, view: View | None
+):
+    """Each part from its own optimum, of the view's own squares: nnls, and lstsq for any sign."""
+    bases, targets = [], []
+    for k in range(2):
+        basis, image, importance = _random(make_basis, seed + 50 * k)
+        bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
+        targets.append(_target(image, importance + 0.01, top=None if view else 0.6))
+    whole, parts = joint_basis(bases)
+    problems = [problem_of(b, t, view=view) for b, t in zip(parts, targets, strict=True)]
+    joint = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
+    told, energies = [], []
+    for b, t, its in zip(parts, targets, parted(joint, problems, parts), strict=True):
+        found = diagnose(b, t, its, whole=(whole, joint))
+        free, alone = (_least(its, b, f) for f in (_of_any_sign, lambda A, y: nnls(A, y)[0]))
+        energy = _least(its, b, partial(_as_solved, joint, iter(range(3))))
+        # Pixels in float32, sums of 72 of them.
+        close = partial(pytest.approx, abs=1e-5 * energy)
+        assert found.total == close(energy)
+        assert found.unreachable == close(free)
+        assert found.forbidden == close(alone - free)
+        assert found.compromise == close(energy - alone)
+        assert found.missed == pytest.approx(
+            np.sqrt(sum(its.quality.objective) / its.norm2.sum()), rel=1e-5
+        )
+        told.append(found)
+        energies.append(energy)
+    assert min(max(x.forbidden, x.compromise) for x in told) > 0.01 * min(energies)
+    # What holds a light does so in all views, and its gain is beside what all of them miss.
+    for found in told:
+        assert found.lighting_total == pytest.approx(sum(energies), rel=1e-5)
+
+
+def _as_solved(joint: Solution, channels: Any, A: Any, y: Any) -> Any:
+    c = next(channels)
+    return np.array([light.weight[c] for light in joint.lighting.lights])
+
+
+@pytest.mark.parametrize("view", [SRGB, View("agx", 1.0)], ids=str)
+def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, view: View):
+    basis, image, importance = _random(make_basis, 2)
+    target = _target(image, importance)
+    solution = solve(basis, target, view=view)
+    found = diagnose(basis, target, solution)
+    # As pixels have it in float32, and normal equations in float64.
+    assert solution.energy == pytest.approx(found.total, rel=1e-5)
+    assert found.lighting_total == pytest.approx(found.total, rel=1e-5)
 
 
 def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any):
@@ -365,3 +453,38 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | 
         corrected_off.append(corrected.lighting.weights_for(basis) - truth)
     assert 0.8 <= np.mean(held) <= 1
     assert np.square(corrected_off).mean() < np.square(off).mean()
+
+
+@pytest.mark.parametrize("view", [None, SRGB])
+@pytest.mark.parametrize("seed", range(12))
+def test_lights_once_chosen_stay_chosen(make_basis: Any, seed: int, view: View | None):
+    """With `sparse` the choice is taken as given by all that improves an answer.
+
+    The squares of the last linear problem hold near the answer only: other lights would be
+    chosen on them, which the loss does not want.
+    """
+    rng = np.random.default_rng(seed)
+    images = rng.random((6, *SIZE, 3)) ** 3
+    halves = 1e-4 * rng.normal(size=images.shape)
+    basis = make_basis(images=images, half_differences=halves, emission=rng.random((6, 3)))
+    image = rng.random((*SIZE, 3)) ** 2 * rng.choice([0.5, 1, 2])
+    target = _target(image, top=None if view else 0.3)
+    asked = Constraints.of({}, sparse=2)
+    solution = solve(basis, target, constraints=asked, view=view)
+    w = solution.lighting.weights_for(basis)
+    mix = combine(basis, solution.lighting)
+    refined = refine(basis, solution, Estimate(mix.image, 0.5 * mix.half_difference))
+    again = solution_of(basis, solution, start=w)
+    for found in (again, correct_noise(basis, solution), refined):
+        v = found.lighting.weights_for(basis)
+        assert v.any(axis=1).tolist() == w.any(axis=1).tolist()
+        # Noise of 1e-4 moves nothing further, squares that end where the loss does neither.
+        np.testing.assert_allclose(v, w, atol=2e-3)
+        assert sum(found.quality.objective) == pytest.approx(
+            sum(solution.quality.objective), rel=1e-4
+        )
+        assert [count for count, _ in found.tried] == [1, 2, 3, 4]
+        assert found.quality.curve == solution.quality.curve
+        assert [x.constraint for x in found.lighting.lights] == [
+            x.constraint for x in solution.lighting.lights
+        ]

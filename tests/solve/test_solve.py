@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from lightpaint.errors import LightingError, SizeError, TargetError
+from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.normal_equations import weighted_problem
 from lightpaint.solve.solve import solve
@@ -148,6 +149,18 @@ def test_the_start_does_not_change_the_answer(make_basis: Any, start: float):
     other = solve(basis, target, start=begin).lighting.weights_for(basis)
     # A KKT residual of 1e-10 times the condition of the basis.
     np.testing.assert_allclose(other, plain, atol=1e-8)
+
+
+@pytest.mark.parametrize("asked", [None, Constraints.of({"light 0": {"limits": {"max": 9.0}}})])
+def test_what_reaches_nothing_keeps_the_start(make_basis: Any, asked: Constraints | None):
+    images = np.random.default_rng(0).random((3, *SIZE, 3))
+    images[2] = 0
+    basis = make_basis(images=images)
+    for begin in (None, Lighting.of_weights(basis, np.full((3, 3), 7.0))):
+        solution = solve(basis, _random_target(), start=begin, constraints=asked)
+        expected = basis.lights[2].emission if begin is None else (7.0, 7.0, 7.0)
+        assert solution.lighting.emission["light 2"] == pytest.approx(expected)
+        assert solution.quality.unreached == ("light 2",)
 
 
 def test_a_start_for_other_lights(make_basis: Any):

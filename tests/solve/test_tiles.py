@@ -124,6 +124,24 @@ def test_an_importance_that_is_none(wrong: float):
     assert _bits(tiled.equations) == before
 
 
+@pytest.mark.parametrize(
+    ("region", "target"),
+    [
+        ((slice(0, 2), slice(0, 3)), np.ones((3, 3, 3))),
+        ((slice(0, 2), slice(0, 3)), np.ones((2, 3, 4))),
+        ((slice(3, 0, -1), slice(0, 3)), (1, 1, 1)),
+    ],
+)
+def test_what_is_refused_leaves_nothing_behind(region: tuple[slice, slice], target: Any):
+    """Not even for the next stroke over the same tile to find."""
+    tiled, untouched = (TiledEquations(*_picture(5)) for _ in range(2))
+    with pytest.raises(ValueError, match=r"broadcast|from its first row"):
+        tiled.update(region, target=target, importance=0.5)
+    for each in (tiled, untouched):
+        each.update((slice(5, 6), slice(5, 6)), target=(0.1, 0.2, 0.3), importance=1.0)
+    assert _bits(tiled.equations) == _bits(untouched.equations)
+
+
 def test_pictures_of_another_size():
     images, target, importance = _picture(6)
     with pytest.raises(SizeError, match="do not fit"):
