@@ -28,12 +28,17 @@ BEYOND, FEW = 10.0, 0.01
 
 @dataclass(frozen=True)
 class _Reading:
-    """What is known on the way. template, folder: what it was painted on, if that is known."""
+    """What is known on the way.
+
+    template, folder: what it was painted on, if that is known. view: what it was seen through.
+    """
 
     path: Path
     picture: Picture
     template: Template | None
     folder: Path | None
+    view: View | None
+    notes: tuple[str, ...]
 
 
 def read_target(
@@ -62,23 +67,9 @@ def read_target(
     Raises ImageError for files that cannot be read, TargetError for what cannot be solved for,
     SizeError if target and mask or template differ in size.
     """
-    path = Path(path)
-    folder = find_template(path) if template is None and find else template
-    made = None if folder is None else read_template(Path(folder))
-    asked = ViewChoice.of(view)
-    if made is not None and template is not None:
-        asked = ViewChoice.of(asked.over(made.view))
-    of_template = None if made is None else made.view
-    picture = read_picture(path, layer=layer, view=asked, otherwise=of_template)
-    notes = list(picture.notes)
-    if made is not None and made.size != picture.size and template is None:
-        notes.append(f"not compared with {folder}, which has another size")
-        made = of_template = None
-        # It was painted on something else, and so was not shown through that view either.
-        picture = read_picture(path, layer=layer, view=asked)
-    reading = _Reading(path, picture, made, None if made is None else Path(str(folder)))
-    importance, note = _importance(reading, mask)
-    notes += note
+    reading = _opened(Path(path), layer, view, template, find=find)
+    picture, made = reading.picture, reading.template
+    importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever a mask says.
     there = picture.finite if picture.stored is None else picture.finite & picture.stored
     counted = np.where(there, 1 if importance is None else importance, 0)
@@ -88,17 +79,52 @@ def read_target(
     else:
         note = _beyond(reading, counted)
     return Target(
-        name=path.stem,
+        name=reading.path.stem,
         image=image,
         importance=counted.astype(np.float32),
         everything=importance is None,
         not_finite=int(picture.finite.size - picture.finite.sum()),
         at_least=picture.saturated,
-        notes=(*notes, *note),
+        notes=(*picture.notes, *reading.notes, *notes, *note),
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
-        view=picture.view or (of_template if asked.is_open else asked.over(of_template)),
+        view=reading.view,
     )
+
+
+def _opened(
+    path: Path,
+    layer: str | None,
+    view: View | ViewChoice | None,
+    template: str | Path | None,
+    *,
+    find: bool,
+) -> _Reading:
+    """The picture, and the template it was painted on. Arguments as of `read_target`."""
+    asked, made = ViewChoice.of(view), None
+    notes: tuple[str, ...] = ()
+    folder = None if template is None else Path(template)
+    if folder is not None:
+        # Whoever names a file in it means the folder.
+        folder = folder.parent if folder.is_file() else folder
+        made = read_template(folder)
+        asked = ViewChoice.of(asked.over(made.view))
+    elif find and (folder := find_template(path)) is not None:
+        made = read_template(folder)
+    otherwise = None if made is None else made.view
+    picture = read_picture(path, layer=layer, view=asked, otherwise=otherwise)
+    if made is not None and made.size != picture.size:
+        if template is not None:
+            raise SizeError(
+                f"{path} is {picture.size[1]}x{picture.size[0]} but the template in {folder} is "
+                f"{made.size[1]}x{made.size[0]}: give the one it was painted on"
+            )
+        notes = (f"not compared with {folder}, which has another size",)
+        # It was painted on something else, and so was not shown through that view either.
+        made, otherwise = None, None
+        picture = read_picture(path, layer=layer, view=asked)
+    shown = picture.view or (otherwise if asked.is_open else asked.over(otherwise))
+    return _Reading(path, picture, made, folder, shown, notes)
 
 
 def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:
@@ -117,6 +143,10 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     if picture.weight is not None:
         return picture.weight, []
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
+    if template is None and picture.alpha is None and picture.view is not None:
+        # Numbers of a display, and nobody said what they mean: a template would know.
+        seen = f"{picture.view.name} at {picture.view.stops:+g} stops"
+        return None, [f"no template is known: all of it counts, as seen through {seen}"]
     if template is None or not is_opaque:
         return picture.alpha, []
     importance = painted_where(path, picture, template)
@@ -128,7 +158,10 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         )
     note = f"{100 * share:.3g} % painted: what differs from the template in {reading.folder}"
     if share > NEARLY_ALL:
-        note += "; if you painted less, it was saved with another view or profile (--view, --mask)"
+        note += (
+            "; if you painted less, it was saved through another view or profile (--view, --mask), "
+            "or moved, cropped or flipped"
+        )
     return importance, [note]
 
 
@@ -168,7 +201,7 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     if share <= FEW:
         return []
     return [
-        f"{100 * share:.2g} % of the paint asks surfaces for a colour that they hardly reflect, so "
+        f"{100 * share:.0f} % of the paint asks surfaces for a colour that they hardly reflect, so "
         f"for more than {BEYOND:g} times the light of the template's brightest parts: --paint "
         "light paints the light instead"
     ]

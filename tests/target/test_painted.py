@@ -135,8 +135,18 @@ def test_of_another_size(tmp_path: Path) -> None:
     target = read_target(tmp_path / "p.png")
     assert target.everything
     assert "another size" in target.notes[0]
-    with pytest.raises(SizeError, match="31x17 but its template is 80x60"):
+    assert "no template is known" in target.notes[1]
+    with pytest.raises(SizeError, match=r"31x17 but the template in .* is 80x60"):
         read_target(tmp_path / "p.png", template=tmp_path / "template")
+    alpha = np.full((17, 31, 4), 128, np.uint8)
+    Image.fromarray(alpha).save(tmp_path / "layer.png")
+    with pytest.raises(SizeError, match="31x17"):
+        read_target(tmp_path / "layer.png", template=tmp_path / "template", paint="light")
+    # A file in it stands for the folder.
+    same = tmp_path / "same.png"
+    save(same, brushed(template.shown)[0], template.view)
+    for named in ("template", "template/template.png", "template/template.json"):
+        assert not read_target(same, template=tmp_path / named).everything
 
 
 @pytest.mark.parametrize("name", ["p8.png", "half.exr"])
@@ -192,6 +202,7 @@ def test_a_template_of_another_size_says_nothing_of_the_view(tmp_path: Path) -> 
         assert target.view == view
         np.testing.assert_allclose(target.image, view.decode(np.float32(128 / 255)), rtol=1e-4)
         assert "another size" in target.notes[0]
+    assert "no template is known" in target.notes[1]
     # An EXR holds light: only --space display asks for a view.
     save(tmp_path / "half.exr", np.full((8, 8, 3), 0.5), View())
     assert read_target(tmp_path / "half.exr").view is None
