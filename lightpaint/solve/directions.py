@@ -9,6 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.solve.constrained import free_directions, preferring, solve_constrained
 from lightpaint.solve.linear import chosen_reduction
 from lightpaint.solve.normal_equations import Doubles, NormalEquations
+from lightpaint.solve.reduction import channel_groups
 from lightpaint.solve.solution import Solution
 from lightpaint.solve.solver import Unknowns, solve_normal_equations, unknowns_of
 
@@ -35,7 +36,10 @@ def moving(basis: Basis, solution: Solution) -> list[Doubles]:
     weights = solution.lighting.weights_for(basis)
     if solution.constraints:
         solved = pulled_to_present(basis, solution, solution.solved)
-        return [free_directions(solved, chosen_reduction(basis, solution), weights)]
+        reduction = chosen_reduction(basis, solution)
+        to = free_directions(solved, reduction, weights)
+        touched = np.any(to.reshape(3, len(weights), -1), axis=1)
+        return [to[:, touched[group].any(axis=0)] for group in channel_groups(reduction)]
     groups = unknown_groups(basis, solution.solved)
     return [
         columns([(i, cs) for i, cs in group if weights[i, cs[0]] > 0], len(weights))

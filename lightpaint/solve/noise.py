@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.basis.basis import Basis, mix
+from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.normal_equations import BLOCK, Doubles, NormalEquations
+from lightpaint.solve.reduction import channel_groups, reduce_to
 from lightpaint.solve.solution import Solution
 
 #: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
@@ -47,7 +49,8 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
     images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
     # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
-    is_coupled = bool(solution.constraints) or any(light.is_scalar for light in basis.lights)
+    reduction = reduce_to(solution.constraints or Constraints(), basis.lights)
+    is_coupled = len(channel_groups(reduction)) < 3
     power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
     gradient = np.zeros((3, n, 3, n))
     pulled = _pulled(basis, solution, weights)
