@@ -103,7 +103,7 @@ def _asked(setting: LightSetting) -> str:
 def fit_table(solution: Solution) -> str:
     """Objective with its standard error, optimality and sweeps, per channel and in all."""
     q = solution.quality
-    norm2 = np.where(solution.equations.target_norm2 > 0, solution.equations.target_norm2, 1)
+    norm2 = np.where(solution.norm2 > 0, solution.norm2, 1)
     errors = None if q.objective_error is None else np.array(q.objective_error)
     each = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
     columns = zip(
