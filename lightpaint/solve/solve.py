@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.basis.basis import Basis
+from lightpaint.errors import ConstraintError, TargetError
 from lightpaint.images.view import View
 from lightpaint.solve.constrained import preferring
 from lightpaint.solve.constraints import Constraints
@@ -72,6 +73,12 @@ def problem_of(
     view: View | None = None,
 ) -> Solution:
     """What is to be solved, with the present lighting for an answer. As of `solve`."""
+    if not isinstance(target, Target):
+        raise TargetError(f"the target is a {type(target).__name__}: give what read_target returns")
+    if not (constraints is None or isinstance(constraints, Constraints)):
+        raise ConstraintError(
+            f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
+        )
     target = target.fitted_to(basis.size, resize=False)
     image, importance = weighted_problem(basis, target, unpainted=unpainted)
     counted = np.where(importance > 0, importance, 1)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from lightpaint.errors import LightingError, SizeError, TargetError
+from lightpaint.errors import ConstraintError, LightingError, SizeError, TargetError
 from lightpaint.solve.constraints import Constraints
 from lightpaint.solve.lighting import Lighting, combine
 from lightpaint.solve.normal_equations import weighted_problem
@@ -298,3 +298,12 @@ def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
     assert (everything.lighting.weights_for(alone) == 1).all()
     with pytest.raises(LightingError, match="kept as it is, so its emission is 1 1 1"):
         black.with_emission(basis.names[0], (2, 2, 2))
+
+
+def test_what_is_no_target_or_constraint_is_named(make_basis: Any) -> None:
+    basis = make_basis()
+    target = Target("t", basis.images.sum(axis=0), np.ones(basis.size, np.float32), False)
+    with pytest.raises(TargetError, match="the target is a str"):
+        solve(basis, "painting.exr")  # type: ignore[arg-type]
+    with pytest.raises(ConstraintError, match=r"are a dict: give Constraints\.of"):
+        solve(basis, target, constraints={"sparse": 2})  # type: ignore[arg-type]
