@@ -106,16 +106,21 @@ def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
         return [{k: v for k, v in h.items() if isinstance(v, str)} for h in headers], size
 
 
-def _check_is_exr(path: Path) -> None:
+def head_of(path: Path, length: int) -> bytes:
+    """How an image file begins. Raises ImageError if there is none that can be read."""
     if path.is_dir():
         raise ImageError(f"{path} is a folder, not an image file")
     if not path.is_file():
         raise ImageError(f"no such image file: {path}")
     try:
         with path.open("rb") as file:
-            magic = file.read(8)
+            return file.read(length)
     except OSError as error:
         raise ImageError(f"cannot read {path}: {error.strerror}") from error
+
+
+def _check_is_exr(path: Path) -> None:
+    magic = head_of(path, 8)
     if not magic.startswith(b"\x76\x2f\x31\x01"):
         found = next((kind for mark, kind in MAGICS.items() if magic.startswith(mark)), None)
         is_a = f"is a {found} file" if found else "is no OpenEXR file"

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.exr import Floats, Part, read_parts
+from lightpaint.images.exr import Floats, Part, head_of, read_parts
 from lightpaint.images.layers import ALPHA_NAMES, Layer, choose_layer
 from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
 from lightpaint.images.view import View, ViewChoice
@@ -162,15 +162,7 @@ def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
 
 def file_kind(path: Path) -> str:
     """Which of the kinds of pictures a file is, by how it begins. Raises ImageError if none."""
-    if path.is_dir():
-        raise ImageError(f"{path} is a folder, not an image file")
-    if not path.is_file():
-        raise ImageError(f"no such image file: {path}")
-    try:
-        with path.open("rb") as file:
-            head = file.read(128)
-    except OSError as error:
-        raise ImageError(f"cannot read {path}: {error.strerror}") from error
+    head = head_of(path, 128)
     for magic, kind in MAGICS.items():
         if head.startswith(magic):
             return kind if kind != "zip" else _zip_kind(path, head)
