@@ -16,6 +16,10 @@ from lightpaint.version import __version__
 State = Literal["ok", "missing", "info"]
 
 
+#: What lightpaint is built on.
+PACKAGES = ("mitsuba", "drjit", "numpy", "OpenEXR", "OpenImageIO", "pillow", "colour-science")
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing looked at. remedy: what to type, where something is missing."""
@@ -34,7 +38,8 @@ def examine(variant: str | None = None) -> list[Finding]:
         Finding("system", "info", f"{platform.system()} {platform.machine()}"),
         Finding("cores", "info", str(len(_usable_cores()))),
     ]
-    findings += [_package(n) for n in ("mitsuba", "drjit", "numpy", "OpenEXR", "colour-science")]
+    findings += [_package(name) for name in PACKAGES]
+    findings.append(_extra("OpenColorIO", "opencolorio", "ocio"))
     findings += _llvm()
     findings.append(_gpu())
     findings.append(_backend(variant))
@@ -52,6 +57,14 @@ def _package(name: str) -> Finding:
         return Finding(name, "ok", importlib.metadata.version(name))
     except importlib.metadata.PackageNotFoundError:
         return Finding(name, "missing", "not installed", f"pip install {name}")
+
+
+def _extra(what: str, package: str, extra: str) -> Finding:
+    """Something that is used where it is there, and missed by nobody else."""
+    found = _package(package)
+    if found.state == "ok":
+        return Finding(what, "ok", found.found)
+    return Finding(what, "info", f"not installed, optional: pip install 'lightpaint[{extra}]'")
 
 
 def _llvm() -> list[Finding]:
