@@ -72,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_scene(template)
     _add_sampling(template)
     _add_resolution(template)
-    _add_view_transform(template)
+    _add_view_transform(template, "srgb", "one that shows something; 0 where --view is given")
     _add_output(
         template, "DIR|F.exr", "folder to write, or only an EXR and a PNG (default: template/)"
     )
@@ -110,7 +110,8 @@ def _parser() -> argparse.ArgumentParser:
         "for all targets, or once for each in order",
     )
     solve.add_argument("--layer", metavar="NAME", help="layer, part or view of an EXR to read")
-    _add_view_transform(solve)
+    said = "what the template or the picture says, else"
+    _add_view_transform(solve, f"{said} srgb", f"{said} 0")
     solve.add_argument(
         "--template",
         metavar="DIR",
@@ -320,18 +321,19 @@ def _add_constraints(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_view_transform(parser: argparse.ArgumentParser) -> None:
+def _add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
+    """name, stops: what they are where nobody says."""
     parser.add_argument(
         "--view",
         metavar="VIEW",
         help="view transform of pictures of 8 or 16 bits: srgb, linear, filmic, agx, ocio or "
-        "ocio:DISPLAY/VIEW (default: what the template or the picture says, else srgb)",
+        f"ocio:DISPLAY/VIEW (default: {name})",
     )
     parser.add_argument(
         "--exposure",
         type=float,
         metavar="STOPS",
-        help="exposure of that view (default: what the template or the picture says, else 0)",
+        help=f"exposure of that view (default: {stops})",
     )
 
 

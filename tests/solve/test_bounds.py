@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from least_squares import stacked
 from scipy.optimize import lsq_linear
 
 from lightpaint.errors import LightingError
@@ -70,15 +71,9 @@ def _problem(make_basis: Any, seed: int, n: int = 6) -> tuple[Any, Target]:
     return replace(basis, lights=tuple(lights)), Target("t", image, importance, everything=False)
 
 
-def _stacked(basis: Any, target: Target) -> tuple[Any, Any]:
+def _reduced(basis: Any, target: Target) -> tuple[Any, Any]:
     """R (3 n + 1 rows) and q with ‖R w − q‖² the objective: QR of the weighted pixels."""
-    n = len(basis.lights)
-    root = np.sqrt(target.importance.astype(np.float64)).ravel()
-    A = np.zeros((3, root.size, n, 3))
-    for c in range(3):
-        A[c, :, :, c] = (basis.images[..., c].reshape(n, -1).astype(np.float64) * root).T
-    y = np.stack([target.image[..., c].ravel() * root for c in range(3)])
-    R = np.linalg.qr(np.column_stack([A.reshape(3 * root.size, 3 * n), y.ravel()]), mode="r")
+    R = np.linalg.qr(np.column_stack(stacked(basis, target)), mode="r")
     return R[:, :-1], R[:, -1]
 
 
@@ -177,7 +172,7 @@ def test_each_gain_is_that_of_the_problem_without_that_one_bound(
     make_basis: Any, seed: int
 ) -> None:
     basis, target, solution, asked = _solved(make_basis, seed)
-    R, q = _stacked(basis, target)
+    R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
     bounds, left_out = release.bounds_of(basis, solution)
     assert left_out == 0
@@ -234,7 +229,7 @@ def _numbers_of(bound: Bound, asked: list[Asked], basis: Any, j: int) -> Any:
 @pytest.mark.parametrize("seed", range(120))
 def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed: int) -> None:
     basis, target, solution, asked = _solved(make_basis, seed)
-    R, q = _stacked(basis, target)
+    R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
     bounds, _ = release.bounds_of(basis, solution)
     for bound in bounds:
@@ -264,7 +259,7 @@ def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
     sizes: dict[str, list[float]] = {}
     for seed in range(60):
         basis, target, solution, _ = _solved(make_basis, seed)
-        R, q = _stacked(basis, target)
+        R, q = _reduced(basis, target)
         allowed = 1e-12 * (q @ q) / STEP + 4 * STEP * np.square(R).sum(axis=0).max() * 6
         for bound in release.bounds_of(basis, solution)[0]:
             size = max(np.abs(bound.multiplier)) / allowed
@@ -306,7 +301,7 @@ def test_a_limit_of_luminance(make_basis: Any, seed: int, is_least: bool) -> Non
 @pytest.mark.parametrize("seed", range(60))
 def test_lights_that_sparse_leaves_out(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    R, q = _stacked(basis, target)
+    R, q = _reduced(basis, target)
     ends = [kelvin_to_rgb(2700), kelvin_to_rgb(6500)]
     constraints = Constraints.of({"l0": {"kelvin": [2700, 6500]}}, sparse=2)
     solution = solve(basis, target, constraints=constraints)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from least_squares import stacked
 from qp import least
 from scipy.optimize import lsq_linear, nnls
 
@@ -40,22 +41,11 @@ def _problem(make_basis: Any, seed: int, n: int = 4, *, scalar: tuple[int, ...] 
     return replace(basis, lights=tuple(lights)), Target("t", image, importance, everything=False)
 
 
-def _stacked(basis: Any, target: Target) -> tuple[Any, Any]:
-    """(pixels · 3, n · 3) matrix A and vector y with the objective ‖A w − y‖²."""
-    n = len(basis.lights)
-    root = np.sqrt(target.importance.astype(np.float64)).ravel()
-    A = np.zeros((3, root.size, n, 3))
-    for c in range(3):
-        A[c, :, :, c] = (basis.images[..., c].reshape(n, -1).astype(np.float64) * root).T
-    y = np.stack([target.image[..., c].ravel() * root for c in range(3)])
-    return A.reshape(3 * root.size, 3 * n), y.ravel()
-
-
 def _solved(basis: Any, target: Target, **asked: Any) -> tuple[Any, float, Any]:
     solution = solve(basis, target, constraints=Constraints.of(**asked))
     assert solution.quality.converged
     w = solution.lighting.weights_for(basis)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     return w, float(((A @ w.ravel() - y) ** 2).sum()), solution
 
 
@@ -92,7 +82,7 @@ def _check_close(mine: float, oracle: float, y: Any, *, tolerance: float = SAME)
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_fixed_colours_ranges_of_white_and_leds(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     free = _solved(basis, target, sparse=None, prefer_current=0, light={})[1]
     ends = [kelvin_to_rgb(2700, 0.002), kelvin_to_rgb(6500, 0.002)]
     leds = [hex_to_rgb(text) for text in ("#ff2000", "#20ff00", "#3000ff", "#ffb070")]
@@ -115,7 +105,7 @@ def test_fixed_colours_ranges_of_white_and_leds(make_basis: Any, seed: int) -> N
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_limits_of_emission(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     high = np.full((4, 3), np.inf)
     low = np.zeros((4, 3))
     high[:, :] = [0.3, 0.4, 0.2]
@@ -133,7 +123,7 @@ def test_limits_of_emission(make_basis: Any, seed: int) -> None:
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     present = float(_present(basis)[1] @ LUMINANCE)
     ends = [kelvin_to_rgb(2700), kelvin_to_rgb(6500)]
     for limits, lowest, most in (
@@ -153,7 +143,7 @@ def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     now = _present(basis)
     # One dimmer: the columns of both, as they shine now, are one.
     w, mine, _ = _solved(basis, target, tie=["l0", "l2"])
@@ -179,7 +169,7 @@ def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
 @pytest.mark.parametrize("seed", PROBLEMS)
 def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed, scalar=(2,))
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     now, strength = _present(basis), 0.05
     power = np.square(basis.images, dtype=np.float64).sum(axis=(1, 2))
     root = np.sqrt(strength * power).ravel()
@@ -222,7 +212,7 @@ def test_no_feasible_lighting_is_better_than_all_constraints_at_once(
     """The variational inequality: no way from the answer to another lighting goes down."""
     basis, target = _problem(make_basis, seed, 7, scalar=(6,))
     w, _, _ = _solved(basis, target, **EVERYTHING)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     gradient = A.T @ (A @ w.ravel() - y)
     rng = np.random.default_rng(seed)
     for _ in range(200):
@@ -234,7 +224,7 @@ def test_no_feasible_lighting_is_better_than_all_constraints_at_once(
 def test_one_light_of_fixed_colour_in_closed_form(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 3, 1)
     w, _, _ = _solved(basis, target, light={"l0": {"color": "3200K"}})
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     column = A @ kelvin_to_rgb(3200)
     expected = max(column @ y / (column @ column), 0) * kelvin_to_rgb(3200)
     np.testing.assert_allclose(w[0], expected, rtol=1e-10)
@@ -299,7 +289,7 @@ def test_scalar_and_kept_lights(make_basis: Any) -> None:
     basis, target = _problem(make_basis, 2, 5, scalar=(1, 2))
     kept = replace(basis.lights[4], name="rest", emission=(1.0,) * 3, is_fixed=True, members=("x",))
     basis = replace(basis, lights=(*basis.lights[:4], kept))
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     asked = {"l1": {"limits": {"max": "20%"}}, "rest": {"lock": True}, "x": {"lock": True}}
     w, mine, _ = _solved(basis, target, light=asked, tie=["l2", "l3"])
     assert (w[4] == 1).all()
@@ -513,7 +503,7 @@ def test_no_constraints_take_the_plain_way(make_basis: Any, monkeypatch: Any) ->
 def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
     """Against all choices of two of five by scipy; what is locked shines along."""
     basis, target = _problem(make_basis, seed, 6)
-    A, y = _stacked(basis, target)
+    A, y = stacked(basis, target)
     w0 = np.zeros((6, 3))
     w0[5] = _present(basis)[5]
     w, mine, solution = _solved(basis, target, sparse=2, light={"l5": {"lock": True}})
