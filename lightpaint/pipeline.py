@@ -15,7 +15,7 @@ from lightpaint.files import check_writable, restoring
 from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.view import View
-from lightpaint.progress import Progress, of, silent
+from lightpaint.progress import Progress, labelled, silent
 from lightpaint.relight.export import EXPORTS, write_exports
 from lightpaint.relight.refine import refine_by_rendering
 from lightpaint.relight.relight import check_relightable, relight
@@ -363,7 +363,7 @@ def _suggested(
 
 
 def _progress_of(view: PaintedView, count: int, progress: Progress) -> Progress:
-    return progress if count == 1 else of(progress, view.folder.name)
+    return progress if count == 1 else labelled(progress, view.folder.name)
 
 
 def _basis(view: PaintedView) -> Basis:

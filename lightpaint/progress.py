@@ -29,7 +29,7 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C, after what was done has been kept. Its text says how to go on."""
 
 
-def of(progress: Progress, name: str) -> Progress:
+def labelled(progress: Progress, name: str) -> Progress:
     """`progress` whose labels say of what: `verification of balcony`."""
 
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:

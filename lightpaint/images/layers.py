@@ -10,9 +10,6 @@ from lightpaint.errors import ImageError
 from lightpaint.images.exr import Floats, Part
 from lightpaint.images.primaries import REC709, converted, primaries_of, rgb_to_xyz, to_rec709
 
-#: Channel that holds importance in a layer whose RGB is not premultiplied.
-WEIGHT_CHANNEL = "W"
-
 #: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
 KRITA_LAYERS = "krita_layers_info"
 
