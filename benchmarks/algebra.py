@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from lightpaint.solve.normal_equations import BLOCK, NormalEquations, inner_products
-from lightpaint.solve.optimum import minimise
-from lightpaint.solve.solver import solve_normal_equations
-from lightpaint.solve.threads import one_thread
-from lightpaint.solve.tiles import TiledEquations
+from lightpaint.lighting.algebra.optimum import minimise
+from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
+from lightpaint.lighting.solver import solve_normal_equations
+from lightpaint.lighting.tiles import TiledEquations
 
 HEIGHT, WIDTH, BRUSH = 360, 640, 64
 

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import Basis, Target, load_scene, read_target, render_basis, solve
+from lightpaint.lighting.normal_equations import NormalEquations, weighted_problem
 from lightpaint.scene.scene import Scene
-from lightpaint.solve.normal_equations import NormalEquations, weighted_problem
 
 ROOT = Path(__file__).parent.parent
 CORNELL = ROOT / "scenes" / "cornell" / "scene.xml"

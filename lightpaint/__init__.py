@@ -20,27 +20,27 @@ happens when the first scene is loaded.
 """
 
 from lightpaint.basis.basis import Basis, read_basis, write_basis
-from lightpaint.basis.foreign import LightGroups, read_light_groups
-from lightpaint.basis.render import render_basis
+from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
+from lightpaint.basis.render.render import render_basis
+from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError
-from lightpaint.images.display import display_picture
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.view import View
+from lightpaint.images.png import display_picture
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.lighting import Lighting, combine, read_lighting, write_lighting
+from lightpaint.lighting.solve import Solution, solve
+from lightpaint.lighting.views import solve_views
 from lightpaint.pipeline import paint_views_with_light, paint_with_light, render_template
-from lightpaint.relight.export import write_exports
-from lightpaint.relight.relight import relight
-from lightpaint.relight.suggestion import Suggestion, suggest_lights
-from lightpaint.relight.verdict import verdict
-from lightpaint.relight.verify import Verification, verify
+from lightpaint.placement.suggest import Suggestion, suggest_lights
+from lightpaint.relit.export.exports import write_exports
+from lightpaint.relit.relight import relight
+from lightpaint.relit.verify import Verification, verify
+from lightpaint.report.verdict import verdict
 from lightpaint.results import Look
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.settings import Settings
-from lightpaint.solve.constraints import Constraints
-from lightpaint.solve.constraints_file import read_constraints
-from lightpaint.solve.lighting import Lighting, combine, read_lighting, write_lighting
-from lightpaint.solve.solve import Solution, solve
-from lightpaint.solve.views import solve_views
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 from lightpaint.version import __version__

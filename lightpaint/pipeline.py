@@ -7,20 +7,35 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis, read_basis
-from lightpaint.basis.foreign import LightGroups
-from lightpaint.basis.obtain import check_same_view, obtain_basis
-from lightpaint.basis.render import basis_lights, render_basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.obtain import check_same_view, obtain_basis
+from lightpaint.basis.render.render import basis_lights, render_basis
+from lightpaint.colour.display import choose_exposure
+from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable, restoring
-from lightpaint.images.display import choose_exposure, write_png
 from lightpaint.images.estimate import write_estimate
-from lightpaint.images.view import View
+from lightpaint.images.png import write_png
+from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose, with_diagnosis
+from lightpaint.lighting.analysis.uncertainty import (
+    Uncertainty,
+    correct_noise,
+    error_bars,
+    with_error_bars,
+)
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.lighting import Lighting, combine, write_lighting
+from lightpaint.lighting.solve import Solution, problem_of, solution_of
+from lightpaint.lighting.views import joint_basis, joint_problem, parted
+from lightpaint.placement.suggest import Suggestion, check_suggestible, suggest_lights
 from lightpaint.progress import Progress, labelled, silent
-from lightpaint.relight.export import EXPORTS, write_exports
-from lightpaint.relight.refine import refine_by_rendering
-from lightpaint.relight.relight import check_relightable, relight
-from lightpaint.relight.suggestion import Suggestion, check_suggestible, suggest_lights
-from lightpaint.relight.verify import verify
+from lightpaint.relit.export.exports import EXPORTS, write_exports
+from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.relit.rounds import refine_by_rendering
+from lightpaint.relit.verify import verify
 from lightpaint.results import (
     ALWAYS,
     RESULTS,
@@ -35,16 +50,6 @@ from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.surfaces import render_surfaces
 from lightpaint.settings import Settings
-from lightpaint.solve.constraints import Constraints
-from lightpaint.solve.constraints_file import read_constraints
-from lightpaint.solve.diagnosis import Diagnosis, diagnose, with_diagnosis
-from lightpaint.solve.indistinguishable import Ambiguity, ambiguities
-from lightpaint.solve.lighting import Lighting, combine, write_lighting
-from lightpaint.solve.reduction import reduce_to
-from lightpaint.solve.solve import Solution, problem_of, solution_of
-from lightpaint.solve.uncertainty import Uncertainty, correct_noise, error_bars, with_error_bars
-from lightpaint.solve.views import joint_basis, joint_problem, parted
-from lightpaint.sources import without_holes
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 from lightpaint.target.template import Template, write_look, write_template
@@ -263,7 +268,7 @@ def _fitted(views: list[PaintedView], settings: Settings) -> list[PaintedView]:
             size = scene.size
         target = view.target.fitted_to(size, resize=settings.resize)
         if view.groups is not None:
-            target = without_holes(target, view.groups)
+            target = target.without(view.groups.holes)
         fitted.append(replace(view, scene=scene, target=target))
     return fitted
 

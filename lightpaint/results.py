@@ -8,19 +8,19 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
+from lightpaint.lighting.analysis.ambiguity import Ambiguity
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.solve import Solution
+from lightpaint.placement.suggest import Suggestion
 from lightpaint.progress import Progress, silent
-from lightpaint.relight.comparison import write_comparison
-from lightpaint.relight.export import EXPORTS
-from lightpaint.relight.report import report_page
-from lightpaint.relight.suggestion import Suggestion
-from lightpaint.relight.verify import Verification, verify
+from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.relit.verify import Verification, verify
+from lightpaint.report.comparison import write_comparison
+from lightpaint.report.page import report_page
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.solve.diagnosis import Diagnosis
-from lightpaint.solve.indistinguishable import Ambiguity
-from lightpaint.solve.lighting import Lighting
-from lightpaint.solve.solve import Solution
-from lightpaint.solve.uncertainty import Uncertainty
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import get_args
 
+from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError
-from lightpaint.images.view import View
+from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.solve import Space
 from lightpaint.scene.quality import Quality
-from lightpaint.solve.constraints import Constraints
-from lightpaint.solve.optimum import Method
-from lightpaint.solve.solve import Space
 
 
 @dataclass(frozen=True)

@@ -108,12 +108,12 @@ class Reader:
     def read(self, path: Path) -> Any:
         """All that is known of the file, to compare."""
         if self.kind == "lighting":
-            from lightpaint.solve.lighting import read_lighting
+            from lightpaint.lighting.lighting import read_lighting
 
             return read_lighting(path)
         if self.kind == "lights":
+            from lightpaint.lighting.constraints.file import read_constraints
             from lightpaint.scene.lights_file import read_lights_file
-            from lightpaint.solve.constraints_file import read_constraints
 
             file = read_lights_file(path)
             return file.lights, dict(file.groups), read_constraints(path)
@@ -130,7 +130,7 @@ class Reader:
             arrays = (basis.images, basis.half_differences, basis.emitters_seen)
             return basis.lights, basis.origin, [(a.shape, a.tobytes()) for a in arrays]
         if self.kind == "groups":
-            from lightpaint.basis.foreign import read_light_groups
+            from lightpaint.basis.lightgroups.read import read_light_groups
 
             found = read_light_groups(path)
             return found.basis.names, found.basis.images.tobytes()
@@ -164,7 +164,7 @@ class Reader:
 
 def contents(lighting: Any) -> Any:
     """What a lighting says, by way of the file that is written of it."""
-    from lightpaint.solve.lighting import write_lighting
+    from lightpaint.lighting.lighting import write_lighting
 
     path = Path(os.environ.get("TMPDIR", "/tmp")) / f"lighting.{os.getpid()}.json"
     write_lighting(path, lighting)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint.arrays import RGB
 from lightpaint.basis.basis import Basis
-from lightpaint.scene.emitters import RGB
 from lightpaint.scene.scene import Scene
 
 REPOSITORY = Path(__file__).parent.parent
@@ -102,8 +102,8 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
     import drjit as dr
     import mitsuba as mi
 
-    from lightpaint.basis.guide import Guide
-    from lightpaint.basis.lightgroups import Guided, accumulate, lights_by_instance
+    from lightpaint.basis.render.guide import Guide
+    from lightpaint.basis.render.one_pass import Guided, accumulate, lights_by_instance
 
     names = [light.name for light in scene.lights]
     height, width = scene.size

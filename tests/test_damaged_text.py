@@ -27,18 +27,18 @@ from damaged_files import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lightpaint.colour.view import View
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
 from lightpaint.files import MAX_TEXT
-from lightpaint.images.view import View
-from lightpaint.scene.lights_file import read_lights_file
-from lightpaint.solve.bound import Bound
-from lightpaint.solve.lighting import (
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.lighting import (
     Lighting,
     LightSetting,
     Quality,
     read_lighting,
     write_lighting,
 )
+from lightpaint.scene.lights_file import read_lights_file
 from lightpaint.target.template import Template, read_template, write_template
 
 LIGHTS = b"""\

@@ -11,12 +11,12 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis, write_basis
-from lightpaint.basis.render import render_basis
+from lightpaint.basis.render.render import render_basis
 from lightpaint.cli import main
+from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError
 from lightpaint.images.exr import write_rgb
 from lightpaint.images.png import write_png_16
-from lightpaint.images.view import View
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.template import Template, write_template
 

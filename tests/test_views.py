@@ -10,18 +10,18 @@ import pytest
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import render_basis
+from lightpaint.basis.render.render import render_basis
 from lightpaint.cli import main
+from lightpaint.colour.view import View
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.exr import write_rgb
-from lightpaint.images.view import View
+from lightpaint.lighting.analysis.diagnosis import diagnose
+from lightpaint.lighting.analysis.uncertainty import error_bars
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.solve import problem_of, solution_of, solve
+from lightpaint.lighting.views import joint_basis, joint_problem, solve_views
 from lightpaint.pipeline import paint_views_with_light
 from lightpaint.scene.scene import load_scene
-from lightpaint.solve.diagnosis import diagnose
-from lightpaint.solve.normal_equations import NormalEquations
-from lightpaint.solve.solve import problem_of, solution_of, solve
-from lightpaint.solve.uncertainty import error_bars
-from lightpaint.solve.views import joint_basis, joint_problem, solve_views
 from lightpaint.target.target import Target
 
 CLOSE = """<sensor type="perspective" id="close"><float name="fov" value="40"/>

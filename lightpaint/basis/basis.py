@@ -14,21 +14,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line, strict_json
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.exr import (
-    Floats,
-    Part,
-    read_headers,
-    read_parts,
-    rgb_channels,
-    write_parts,
-)
+from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
 from lightpaint.version import __version__
-
-RGB = tuple[float, float, float]
 
 FORMAT = "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"

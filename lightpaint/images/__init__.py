@@ -1,1 +1,1 @@
-"""Pixels and colour at the edge of the program: files in and out, display encoding, ΔE."""
+"""Pixels at the edge of the program: picture files in and out, and images with their noise."""

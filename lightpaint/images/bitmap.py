@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 import OpenImageIO
 
+from lightpaint.colour.icc import Profile, gamma_profile, read_icc, srgb_profile
+from lightpaint.colour.primaries import REC709
 from lightpaint.errors import ImageError
-from lightpaint.images.icc import Profile, gamma_profile, read_icc, srgb_profile
-from lightpaint.images.primaries import REC709
 from lightpaint.images.silence import silenced
 from lightpaint.images.tiff import check_tiff
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.images.exr import Floats
+from lightpaint.arrays import Floats
 
 Size = tuple[int, int]
 

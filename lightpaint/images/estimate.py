@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
 from lightpaint.images.blocks import block_mean
-from lightpaint.images.exr import Floats, Part, read_parts, rgb_channels, write_parts
+from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"

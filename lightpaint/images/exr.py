@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import OpenEXR
 
+from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing
 from lightpaint.images.silence import silenced
-
-Floats = npt.NDArray[np.floating[Any]]
 
 #: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
 #: is refused before any is decoded. Pictures compress to less only where they are empty.

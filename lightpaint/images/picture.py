@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import Floats
+from lightpaint.colour.view import View, ViewChoice
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.exr import Floats, Part, head_of, read_parts
-from lightpaint.images.layers import ALPHA_NAMES, Layer, choose_layer
-from lightpaint.images.light import light_of_floats, light_of_integers, unpremultiply, view_of
-from lightpaint.images.view import View, ViewChoice
+from lightpaint.images.decode import light_of_floats, light_of_integers, unpremultiply, view_of
+from lightpaint.images.exr import Part, head_of, read_parts
+from lightpaint.images.exr_layers import ALPHA_NAMES, Layer, choose_layer
 
 Mask = npt.NDArray[np.bool_]
 

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.arrays import RGB
+from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
-from lightpaint.images.photometry import lambertian_flux, point_flux, spot_flux
-
-RGB = tuple[float, float, float]
 
 #: A light as the scene has it, where its emission is a multiple of that.
 AS_AUTHORED: RGB = (1.0, 1.0, 1.0)

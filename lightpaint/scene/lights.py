@@ -10,9 +10,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
+from lightpaint.arrays import RGB
+from lightpaint.colour.photometry import point_flux
 from lightpaint.errors import SceneError
-from lightpaint.images.photometry import point_flux
-from lightpaint.scene.emitters import AS_AUTHORED, MULTIPLE, PLUGINS, RGB, EmissionKind, Scaling
+from lightpaint.scene.emitters import AS_AUTHORED, MULTIPLE, PLUGINS, EmissionKind, Scaling
 
 #: Name of the fixed light, with underscores added should another have it.
 REST = "rest"

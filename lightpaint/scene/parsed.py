@@ -14,11 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
-from lightpaint.scene.asset_check import check_asset
-from lightpaint.scene.emitters import AS_AUTHORED, RGB, EmissionKind, Scaling
-from lightpaint.scene.xml_check import check_nodes, check_xml
+from lightpaint.scene.checks.assets import check_asset
+from lightpaint.scene.checks.xml import check_nodes, check_xml
+from lightpaint.scene.emitters import AS_AUTHORED, EmissionKind, Scaling
 
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.exr import Floats
 from lightpaint.progress import Progress, interruptible_between_pieces, silent
-from lightpaint.scene.emitters import RGB
 from lightpaint.scene.scene import Scene
 
 #: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what

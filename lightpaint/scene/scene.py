@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
-from lightpaint.images.exr import Floats
+from lightpaint.scene.checks.xml import MAX_XML
 from lightpaint.scene.emitters import (
     AS_AUTHORED,
-    RGB,
     check_rendered,
     describe_form,
     emission_kind,
@@ -46,7 +46,6 @@ from lightpaint.scene.parsed import (
 )
 from lightpaint.scene.resolution import reduced, reduction
 from lightpaint.scene.variant import use_variant
-from lightpaint.scene.xml_check import MAX_XML
 
 #: Pixels of a film, its samples per pixel and characters of a name beyond which each is a mistake.
 MAX_PIXELS = 2**28

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.images.exr import Floats
+from lightpaint.arrays import Floats
 from lightpaint.progress import Progress, interruptible_between_pieces, silent
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene

@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, JpegImagePlugin
 
+from lightpaint.arrays import Floats
+from lightpaint.colour.display import to_8_bit
 from lightpaint.errors import SizeError
-from lightpaint.images.display import to_8_bit
 from lightpaint.images.estimate import box_mean
-from lightpaint.images.exr import Floats
 from lightpaint.images.picture import Picture
 from lightpaint.target.template import Template
 

@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
+from lightpaint.arrays import Floats
+from lightpaint.colour.color import luminance
+from lightpaint.colour.view import View, ViewChoice
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.color import luminance
-from lightpaint.images.exr import Floats
 from lightpaint.images.picture import Picture, read_mask, read_picture
-from lightpaint.images.view import View, ViewChoice
 from lightpaint.target.painted import painted_where
 from lightpaint.target.target import Target
 from lightpaint.target.template import Template, find_template, read_template

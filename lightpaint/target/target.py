@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from lightpaint.arrays import Floats
+from lightpaint.colour.view import View
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_mean, whole_factor
-from lightpaint.images.exr import Floats
-from lightpaint.images.view import View
 
 #: By how much more than half one of two shares prevails, beyond the rounding of float32.
 TIE = 1e-5
@@ -97,6 +97,17 @@ class Target:
         at_least = self._at_least(lambda planes: block_mean(planes, factor))
         return replace(
             self, image=image.astype(np.float32), importance=importance, at_least=at_least
+        )
+
+    def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
+        """This target where the pixels `holes`, (h, w), count nothing: the basis has none there."""
+        lost = holes & (self.importance > 0)
+        if not lost.any():
+            return self
+        return replace(
+            self,
+            importance=np.where(holes, np.float32(0), self.importance),
+            not_finite=self.not_finite + int(lost.sum()),
         )
 
     def _at_least(self, mean: Callable[[Floats], Floats]) -> npt.NDArray[np.bool_] | None:

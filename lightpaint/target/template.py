@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint.arrays import Floats
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.files import (
     one_line,
@@ -18,10 +21,8 @@ from lightpaint.files import (
     write_text,
 )
 from lightpaint.images.bitmap import VIEW_KEY
-from lightpaint.images.display import png_bytes, to_8_bit
-from lightpaint.images.exr import Floats, Part, read_parts, write_parts, write_rgb
-from lightpaint.images.png import write_png_16
-from lightpaint.images.view import View
+from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.png import png_bytes, write_png_16
 
 FORMAT = "lightpaint-template 1"
 

@@ -9,7 +9,7 @@ from renderer import write_room
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import read_basis
-from lightpaint.basis.obtain import obtain_basis
+from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.scene.scene import Scene, load_scene
 
 

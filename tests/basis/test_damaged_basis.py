@@ -22,7 +22,7 @@ from lightpaint.basis.basis import (
     write_basis,
 )
 from lightpaint.basis.checksums import CHECKSUMS_KEY
-from lightpaint.basis.foreign import MAX_FILES, is_light_groups, read_light_groups
+from lightpaint.basis.lightgroups.read import MAX_FILES, is_light_groups, read_light_groups
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
 

@@ -15,9 +15,9 @@ import atheris
 
 with atheris.instrument_imports(include=["lightpaint", "json", "tomllib"]):
     from lightpaint.errors import LightpaintError
+    from lightpaint.lighting.constraints.file import read_constraints
+    from lightpaint.lighting.lighting import read_lighting
     from lightpaint.scene.lights_file import read_lights_file
-    from lightpaint.solve.constraints_file import read_constraints
-    from lightpaint.solve.lighting import read_lighting
 
 PATH = Path(tempfile.mkdtemp()) / "text"
 

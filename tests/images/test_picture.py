@@ -16,10 +16,10 @@ import tifffile
 from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, layered, para, png, psd
 from PIL import Image, ImageCms
 
+from lightpaint.colour.display import decode_display
+from lightpaint.colour.view import View
 from lightpaint.errors import ImageError
-from lightpaint.images.display import decode_display
 from lightpaint.images.picture import Picture, read_mask, read_picture
-from lightpaint.images.view import View
 
 SIZE = (9, 7)
 

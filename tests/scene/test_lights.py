@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.scene.emitters import MULTIPLE, RGB, EmissionKind, Scaling
+from lightpaint.scene.emitters import MULTIPLE, EmissionKind, Scaling
 from lightpaint.scene.lights import REST, Emitter, Light, choose_lights
 from lightpaint.scene.lights_file import read_lights_file
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from renderer import write_room
 
-from lightpaint.basis.render import render_basis
+from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import block_mean, enlarged, whole_factor
 from lightpaint.scene.parsed import View

@@ -8,11 +8,11 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from lightpaint.colour.display import decode_display
+from lightpaint.colour.view import View, ViewChoice
 from lightpaint.errors import SizeError, TargetError, ViewError
-from lightpaint.images.display import decode_display
 from lightpaint.images.exr import Part, write_parts, write_rgb
 from lightpaint.images.png import write_png_16
-from lightpaint.images.view import View, ViewChoice
 from lightpaint.target.read import read_target
 from lightpaint.target.template import Template, write_look, write_template
 

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.colour.view import View
 from lightpaint.errors import ImageError, TargetError
-from lightpaint.images.view import View
 from lightpaint.target.template import Template, write_template
 
 SCRIPTS = Path(__file__).parent / "programs"

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.colour.display import encode_display
+from lightpaint.colour.view import View
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import whole_factor
-from lightpaint.images.display import encode_display
 from lightpaint.images.exr import read_parts
-from lightpaint.images.view import View
-from lightpaint.solve.solve import solve
+from lightpaint.lighting.solve import solve
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 from lightpaint.target.template import write_look

@@ -1,0 +1,18 @@
+"""Types of the arrays that walk between the rooms. No library stands behind them but NumPy."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+#: Pixels and what is computed of them, of whichever precision.
+Floats = npt.NDArray[np.floating[Any]]
+
+#: Inner products, weights, and all that is solved.
+Doubles = npt.NDArray[np.float64]
+
+Bools = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
+
+#: One colour, linear Rec.709.
+RGB = tuple[float, float, float]

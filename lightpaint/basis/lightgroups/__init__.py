@@ -1,0 +1,1 @@
+"""A basis from another renderer's light groups: its layers, their names, their sum."""

@@ -1,0 +1,152 @@
+"""Whether light groups are all of the picture: their sum, held against the beauty."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.lightgroups.layers import Layer
+from lightpaint.colour.color import LUMINANCE
+
+#: Share of the beauty that the groups may lack beyond rounding before it counts as missing.
+NOTHING = 1e-5
+
+#: Share of the beauty by which they may exceed it before that is a warning.
+EXCEEDING = 1e-3
+
+#: Largest relative error of one rounding to float16, absolute error below its normal range, and
+#: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
+HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
+
+#: Every how many rows and columns a pixel is looked at first, where most pictures are others.
+COARSE = 8
+
+
+def spoken_sum(
+    rest: Floats, whole: Floats, layers: Sequence[Layer], missing: float, exceeding: float
+) -> tuple[str, bool]:
+    """A sentence on the sum of the groups, and whether what they lack is more than rounding.
+
+    All of it in the primaries of the file: in others, light of a wide gamut is negative.
+    """
+    beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
+    truly_missing, truly_exceeding = shares(beyond, whole)
+    if truly_missing + truly_exceeding <= NOTHING:
+        off = missing + exceeding
+        return f"the groups add up to the beauty (to {off:.1g} of its light)", False
+    told = (
+        f"the groups lack {_percent(missing)} of the light of the beauty: "
+        "that is kept as it is, as the light rest"
+    )
+    if truly_exceeding > EXCEEDING:
+        warning = (
+            f"WARNING: in places the groups exceed the beauty, by {_percent(exceeding)} of its "
+            "light in all, which the light rest takes away: is the beauty denoised or clamped, or "
+            "a light in two groups?"
+        )
+        told = f"{warning} {told[0].upper()}{told[1:]}" if truly_missing > NOTHING else warning
+    return told, True
+
+
+def shares(rest: Floats, whole: Floats) -> tuple[float, float]:
+    """Luminance that is missing, and that is too much, over that of the beauty."""
+    total = float((np.abs(whole) @ LUMINANCE).sum())
+    if total == 0:
+        return 0.0, float(bool(rest.any()))
+    lacking, excess = np.maximum(rest, 0), np.maximum(-rest, 0)
+    return float((lacking @ LUMINANCE).sum()) / total, float((excess @ LUMINANCE).sum()) / total
+
+
+def rounding(layers: Sequence[Layer]) -> Floats:
+    """By how much the sum of the layers may be off its true value for rounding, (h, w, 3)."""
+    bound: Floats = np.zeros(layers[0].image.shape)
+    for layer in layers:
+        bound += _rounded(layer.image, is_half=layer.is_half)
+    return bound
+
+
+def _rounded(image: Floats, *, is_half: bool) -> Floats:
+    size = np.abs(np.nan_to_num(image.astype(np.float64), posinf=0, neginf=0))
+    return np.asarray((size * HALF + SUBNORMAL if is_half else 0) + size * SUMMED)
+
+
+@dataclass(frozen=True)
+class LayerSum:
+    """Layers added up once, to be held against one picture after the other.
+
+    total: (h, w, 3) float64, not finite where one of them is not. bound: what rounding may have
+    done to it.
+    """
+
+    total: Floats
+    bound: Floats
+
+    @staticmethod
+    def of(layers: Sequence[Layer]) -> "LayerSum":
+        """The sum of at least one layer."""
+        total: Floats = np.zeros(layers[0].image.shape)
+        with np.errstate(invalid="ignore"):
+            for layer in layers:
+                total += layer.image
+        return LayerSum(total, rounding(layers))
+
+    def and_also(self, layer: Layer) -> "LayerSum":
+        """With one more."""
+        with np.errstate(invalid="ignore"):
+            total = self.total + layer.image
+        return LayerSum(total, self.bound + rounding([layer]))
+
+    def lacks(self, beauty: Layer) -> float:
+        """Σ |beauty − total|, where both are finite."""
+        return float(_off(beauty.image, self.total).sum())
+
+    def is_of(self, beauty: Layer, *, less_itself: bool = False) -> bool:
+        """Whether the sum is just that picture, which then is not black.
+
+        less_itself: whether the picture is among what was added up, and is to be taken out again.
+        """
+        size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
+        most = NOTHING * size
+        # Excesses only add up, so that a few pixels are enough to tell that it is another picture.
+        few = (slice(None, None, COARSE), slice(None, None, COARSE))
+        return bool(
+            size > 0
+            and self._excess(beauty, few, less_itself=less_itself) <= most
+            and self._excess(beauty, (), less_itself=less_itself) <= most
+        )
+
+    def _excess(self, beauty: Layer, where: tuple[slice, ...], *, less_itself: bool) -> float:
+        """By how much more they are apart than rounding makes them, summed over these pixels."""
+        image, bound = beauty.image[where], self.bound[where]
+        if less_itself:
+            # x − (total − x); the bound is that of the same layers.
+            off = _off(2 * image.astype(np.float64), self.total[where])
+        else:
+            off = _off(image, self.total[where])
+            bound = bound + _rounded(image, is_half=beauty.is_half)
+        return float(np.maximum(off - bound, 0).sum())
+
+
+def _off(picture: Floats, total: Floats) -> Floats:
+    """|picture − total|, (h, w, 3) float64, 0 where one is not finite."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.nan_to_num(np.abs(picture - total), nan=0, posinf=0, neginf=0))
+
+
+def beauty_by_sum(others: Sequence[Layer], lights: Sequence[Layer]) -> Layer | None:
+    """The layer that the lights add up to, where it has a name that nobody knows."""
+    if not others or not lights:
+        return None
+    added = LayerSum.of(lights)
+    return next((layer for layer in others if added.is_of(layer)), None)
+
+
+def beauty_among(layers: Sequence[Layer]) -> Layer | None:
+    """The one of the layers that the others add up to."""
+    added = LayerSum.of(layers)
+    return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

@@ -1,0 +1,154 @@
+"""The RGB layers of an EXR file, or of a folder of them, whoever has written it.
+
+A layer is three channels that share all but the last part of their names, `key.R`, `key.G` and
+`key.B`; in a part of its own it may have plain `R`, `G`, `B` and the part its name.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.lightgroups.naming import is_known, short_names
+from lightpaint.colour.primaries import are_same, converted, to_rec709
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.exr import Part, read_parts
+from lightpaint.images.exr_layers import ALPHA_NAMES, channel_named, colour_channels, primaries_of
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Three channels of a file.
+
+    name: what it is chosen by. part, channels: where it stands; part is "" where a file has one.
+    others: other names that a pattern may meet it by.
+    image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
+    alpha: (h, w), or None.
+    primaries: of the image, CIE xy of red, green, blue and white; None for Rec.709's.
+    """
+
+    name: str
+    file: Path
+    part: str
+    channels: tuple[str, str, str]
+    others: tuple[str, ...]
+    image: Floats
+    alpha: Floats | None = None
+    primaries: tuple[float, ...] | None = None
+
+    @property
+    def is_half(self) -> bool:
+        """Whether the file has it in float16."""
+        return bool(self.image.dtype == np.float16)
+
+    def in_rec709(self, image: Floats) -> Floats:
+        """An image of these primaries, (h, w, 3), as float32 in linear Rec.709."""
+        if self.primaries is None:
+            return image.astype(np.float32)
+        return converted(image, to_rec709(self.primaries))
+
+    @property
+    def place(self) -> str:
+        """File and layer, for messages."""
+        return f"{self.file}{f' ({self.name})' if self.name else ''}"
+
+
+def read_layers(path: Path) -> list[Layer]:
+    """The RGB layers of the file or of the files in the folder at `path`, in their order.
+
+    In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
+    names share. Raises ImageError for files that cannot be read, BasisError if there are none,
+    if they differ in size or if names repeat.
+    """
+    path = Path(path)
+    layers = _of_folder(path) if path.is_dir() else _of_file(path)
+    if not layers:
+        raise BasisError(f"{path} has no RGB layers: give the multi-layer EXR, or a folder of them")
+    first = layers[0]
+    for layer in layers[1:]:
+        if layer.image.shape != first.image.shape:
+            raise BasisError(
+                f"{layer.place} is {_size(layer)} but {first.place} is {_size(first)}: light "
+                "groups need one size"
+            )
+        if not are_same(layer.primaries, first.primaries):
+            raise BasisError(
+                f"{layer.place} and {first.place} declare other primaries: light groups need one "
+                "colour space"
+            )
+    names = [layer.name for layer in layers]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise BasisError(
+            f"{path} has the layers {', '.join(name or 'R, G, B' for name in twice)} more than "
+            "once: is it a sequence of frames, or several views? give one file of one view"
+        )
+    return layers
+
+
+def _of_folder(folder: Path) -> list[Layer]:
+    files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".exr" and f.is_file())
+    if not files:
+        raise BasisError(f"{folder} holds no .exr file: give the one with the light groups")
+    if len(files) == 1:
+        return _of_file(files[0])
+    read = {file: _of_file(file) for file in files}
+    plain = [file.stem for file, layers in read.items() if [x.name for x in layers] == [""]]
+    short = short_names(plain)
+    made = []
+    for file, layers in read.items():
+        for x in layers:
+            name = x.name or file.stem
+            # What a renderer calls a file is a better name than what is left of it.
+            if not x.name and not is_known(name):
+                name = short.get(name, name)
+            made.append(replace(x, name=name, others=(file.stem, file.name, *x.others)))
+    return made
+
+
+def _of_file(path: Path) -> list[Layer]:
+    parts = read_parts(path)
+    layers = []
+    for part in parts:
+        shown, primaries = part.in_display_window(), _primaries(path, part)
+        for prefix, channels in colour_channels(shown.channels).items():
+            image = _rgb(path, shown.channels, channels)
+            alpha = channel_named(shown.channels, prefix, *ALPHA_NAMES)
+            others = [part.name, f"{part.name}.{prefix}"]
+            if len(parts) == 1 and not prefix:
+                others += [path.stem, path.name]  # of a file of one layer, it is that one's name
+            layers.append(
+                Layer(
+                    name=part.name if prefix == "" and len(parts) > 1 else prefix,
+                    file=path,
+                    part=part.name if len(parts) > 1 else "",
+                    channels=channels,
+                    others=tuple(others),
+                    image=image,
+                    alpha=None if alpha is None else shown.channels[alpha],
+                    primaries=primaries,
+                )
+            )
+    return layers
+
+
+def _primaries(path: Path, part: Part) -> tuple[float, ...] | None:
+    """Those that the part declares, unless they are Rec.709's. Raises ImageError if unknown."""
+    try:
+        return primaries_of(part)
+    except ImageError as error:
+        raise ImageError(f"{path} {error}") from None
+
+
+def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:
+    """(h, w, 3), float16 where all are. Raises ImageError if they differ in size."""
+    planes = [pixels[name] for name in channels]
+    if len({plane.shape for plane in planes}) > 1:
+        raise ImageError(f"{path}: channels {', '.join(channels)} differ in size: export it again")
+    kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
+    return np.stack(planes, axis=-1).astype(kind, copy=False)
+
+
+def _size(layer: Layer) -> str:
+    return f"{layer.image.shape[1]}x{layer.image.shape[0]}"

@@ -1,0 +1,70 @@
+"""The basis to solve with: an earlier one where it fits, with what it lacks rendered."""
+
+from dataclasses import replace
+
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.render import basis_lights, is_of, render_basis
+from lightpaint.errors import BasisError
+from lightpaint.images.blocks import whole_factor
+from lightpaint.progress import Progress, silent
+from lightpaint.scene.scene import Scene
+
+
+def obtain_basis(
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    time_s: float | None = None,
+    seed: int = 0,
+    use_cache: bool = True,
+    progress: Progress = silent,
+) -> Basis:
+    """The basis of `scene`: what an earlier run kept, with the samples that are missing.
+
+    time_s: instead of spp, seconds of rendering to add to what was kept.
+    use_cache: False neither looks for one nor keeps it.
+    """
+    if not use_cache:
+        return render_basis(scene, spp=spp, time_s=time_s, seed=seed, progress=progress)
+    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
+    if start is not None and not is_of(scene, start, seed):
+        start = None
+    if start is not None:
+        # One kept by an earlier version may know less of the same lights.
+        start = replace(start, lights=basis_lights(scene))
+    basis = render_basis(
+        scene,
+        spp=spp,
+        time_s=time_s,
+        seed=seed,
+        start=start,
+        keep=cache.keep,
+        progress=progress,
+    )
+    if start is None or (basis is not start and basis.origin.spp >= start.origin.spp):
+        cache.keep(basis)
+    return basis
+
+
+def check_same_view(scene: Scene, basis: Basis) -> None:
+    """Raise BasisError unless `basis` was made of `scene` as it is, through its sensor."""
+    origin, sensor = basis.origin, scene.sensor_names[scene.sensor]
+    mine = {light.name: light.member_names for light in scene.lights}
+    its = {light.name: light.members for light in basis.lights}
+    if mine != its:
+        raise BasisError(
+            f"the basis has the lights {', '.join(its)}, and {scene.path} was loaded with "
+            f"{', '.join(mine)}: load it with the same lights and groups"
+        )
+    if (origin.scene_identity, origin.sensor) != (scene.identity, sensor):
+        what = "another state of the scene" if origin.sensor == sensor else "another sensor"
+        raise BasisError(
+            f"the basis shows {what}: it was made of {origin.scene} through {origin.sensor}, not "
+            f"of {scene.path} as it is through {sensor}; make it again"
+        )
+    if whole_factor(scene.size, basis.size) is None:
+        raise BasisError(
+            f"the basis is {basis.size[1]}x{basis.size[0]} but {scene.path} renders "
+            f"{scene.size[1]}x{scene.size[0]}, which is no whole multiple: make it again"
+        )

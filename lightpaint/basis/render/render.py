@@ -1,0 +1,234 @@
+"""Rendering the basis: all lights in one pass where that is possible, else one by one."""
+
+import gc
+from collections.abc import Callable
+from dataclasses import replace
+
+from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.render.budget import Budget, Keeper, passes
+from lightpaint.basis.render.separate import LightSums, emitters_seen, render_separately
+from lightpaint.errors import BasisError, SceneError
+from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
+from lightpaint.scene.render import SAMPLES_PER_PASS, view_seed
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.variant import use_variant
+
+#: Emitters that surround the scene.
+ENVIRONMENTS = ("constant", "envmap", "sunsky")
+
+#: Camera samples that choices of emitters are learned from before any counts.
+REHEARSAL = 2**18
+
+ONE_PASS = "one pass"
+SEPARATE = "separate renders"
+
+
+def why_not_one_pass(scene: Scene) -> str | None:
+    """What keeps `scene` from the one-pass basis, in a few words; None if nothing does."""
+    variant = use_variant()
+    integrator = scene.integrator
+    if not variant.is_jit:
+        return f"the variant is {variant.variant}"
+    if integrator.plugin not in ("path", "direct"):
+        return f"the integrator is {integrator.plugin!r}"
+    if integrator.plugin == "direct" and integrator.samples != (1, 1):
+        return "the direct integrator draws other than one sample of emitters and BSDF"
+    backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
+    if scene.has_null and (integrator.hide_emitters or not backdrop):
+        return "rays may pass surfaces and leave, which Mitsuba counts as black"
+    if scene.has_media:
+        return "the scene has participating media"
+    return None
+
+
+def render_basis(
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    time_s: float | None = None,
+    seed: int = 0,
+    start: Basis | None = None,
+    keep: Callable[[Basis], bool] | None = None,
+    progress: Progress = silent,
+) -> Basis:
+    """Render the image of each light of `scene` alone, at unit emission.
+
+    spp: samples per pixel (the scene's own number by default).
+    time_s: instead, seconds to render for, besides what `start` took; whole pairs of passes.
+    seed: any number >= 0; other seeds give independent bases.
+    start: an earlier basis of the same scene, sensor and seed: its samples count, and only
+    what is missing to `spp` is rendered, or as many more as `time_s` allows.
+    keep: called with what there is, now and then and when Ctrl-C ends the work early;
+    returns whether it could be kept.
+
+    Raises SceneError for more lights and pixels than fit, Interrupted for Ctrl-C.
+    """
+    height, width = scene.size
+    if spp is not None and time_s is not None:
+        raise SceneError("give a number of samples or a time to render for, not both")
+    budget = Budget(scene.spp if spp is None else spp, time_s)
+    if len(scene.lights) * height * width * 3 >= 2**32:
+        raise SceneError(
+            f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
+            "use --resolution or fewer lights"
+        )
+    check_memory(scene)
+    if start is not None and not is_of(scene, start, seed):
+        raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
+    if start is not None and budget.met_by(start.origin.spp):
+        return start
+    method = ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
+    if start is not None and start.origin.method != method:
+        # Nothing to go on from, but nothing to be replaced by less either.
+        start, keep = None, None
+    render_all = _render_together if method == ONE_PASS else _render_one_by_one
+    return render_all(scene, budget, seed, start, Keeper(keep), progress)
+
+
+def memory_needed(scene: Scene) -> int:
+    """Bytes that a basis of `scene` takes at its peak, whatever the number of samples."""
+    height, width = scene.size
+    images = len(scene.lights) * height * width * 3 * 4
+    # Sums of two halves, the images and half differences made of them, and a copy of both
+    # where they are written to a file; passes are small beside that.
+    return 6 * images + 512 * SAMPLES_PER_PASS
+
+
+def check_memory(scene: Scene) -> None:
+    """Raise SceneError if a basis of `scene` would not fit, instead of being killed for it."""
+    needed, free = memory_needed(scene), _free_memory()
+    if free is not None and needed > free:
+        height, width = scene.size
+        raise SceneError(
+            f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
+            f"{free / 1e9:.1f} GB are free: use --resolution or fewer lights"
+        )
+
+
+def _free_memory() -> int | None:
+    """Bytes that can be had without swapping, where the system tells (Linux)."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    except OSError:
+        return None
+    return int(found[0]) * 1024 if found else None
+
+
+def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
+    """Whether `basis` was made of `scene` as it is, through its sensor and film, under `seed`."""
+    of = basis.origin
+    mine = _origin(scene, seed, of.method, of.halves, of.passes)
+    return of == replace(mine, each_light=of.each_light) and basis.size == scene.size
+
+
+def _origin(
+    scene: Scene, seed: int, method: str, halves: tuple[int, int], passes: tuple[int, int]
+) -> Origin:
+    return Origin(
+        scene=scene.path.name,
+        scene_identity=scene.identity,
+        sensor=scene.sensor_names[scene.sensor],
+        seed=seed,
+        method=method,
+        halves=halves,
+        passes=passes,
+    )
+
+
+def basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
+    """What a basis says of the lights of `scene`."""
+    return tuple(
+        BasisLight(
+            x.name,
+            x.plugin,
+            x.parameter,
+            x.unit,
+            x.emission,
+            x.form,
+            x.is_scalar,
+            x.is_fixed,
+            x.member_names,
+            x.unit_flux,
+        )
+        for x in scene.lights
+    )
+
+
+def _render_together(
+    scene: Scene,
+    budget: Budget,
+    seed: int,
+    start: Basis | None,
+    keeper: Keeper,
+    progress: Progress,
+) -> Basis:
+    """All lights in one path-traced pass after another (see lightgroups.py)."""
+    from lightpaint.basis.render.one_pass import HalfSums, Tracer
+
+    height, width = scene.size
+    sums = HalfSums(len(scene.lights), scene.size) if start is None else HalfSums.of(start)
+    numbers = view_seed(seed, scene.sensor)
+    tracer = Tracer(scene, numbers, start.learned if start is not None else None)
+
+    def basis(*, is_last: bool = False) -> Basis:
+        images, half_differences = sums.mean_and_half_difference(is_last=is_last)
+        halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
+        return Basis(
+            basis_lights(scene),
+            images,
+            half_differences,
+            sums.emitters_seen(),
+            _origin(scene, seed, ONE_PASS, halves, passes),
+            tracer.guide.learned(),
+        )
+
+    try:
+        with interruptible_between_pieces() as let_interrupts_through:
+            for half, spp in passes(height * width, budget, sums.spp, progress):
+                if start is None and not any(sums.spp):
+                    tracer.rehearse(max(1, REHEARSAL // (height * width)))
+                let_interrupts_through()
+                tracer.add_pass(sums, half, spp)
+                if all(sums.spp):
+                    keeper.now_and_then(basis)
+        return basis(is_last=True)
+    except KeyboardInterrupt:
+        if keeper.keep is None:
+            raise
+        if not all(sums.spp):
+            raise Interrupted("too early for anything to be kept") from None
+        if not keeper.keep(basis(is_last=True)):
+            raise
+        of = "" if budget.time_s is not None else f" of {budget.spp}"
+        raise Interrupted(
+            f"{sum(sums.spp)}{of} samples per pixel are kept; the same command goes on"
+        ) from None
+    finally:
+        tracer.close()
+        gc.collect()
+
+
+def _render_one_by_one(
+    scene: Scene,
+    budget: Budget,
+    seed: int,
+    start: Basis | None,
+    keeper: Keeper,
+    progress: Progress,
+) -> Basis:
+    """One light after the other, by the scene's own integrator (see separate.py)."""
+    sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
+    seen = emitters_seen(scene) if start is None else start.emitters_seen
+    nothing = _origin(scene, seed, SEPARATE, (0, 0), (0, 0))
+
+    def basis() -> Basis:
+        images, half_differences = sums.mean_and_half_difference()
+        origin = replace(nothing, **sums.counts())
+        return Basis(basis_lights(scene), images, half_differences, seen, origin)
+
+    numbers = view_seed(seed, scene.sensor)
+    render_separately(
+        scene, budget, seed=numbers, sums=sums, basis=basis, keeper=keeper, progress=progress
+    )
+    return basis()

@@ -1,0 +1,194 @@
+"""A basis by one ordinary render per light: right for any integrator, n times the work.
+
+The seed of a pass follows from the light, the half and its number alone. So it does not matter
+in which order passes are rendered, nor in how many runs.
+"""
+
+import gc
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import RGB, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.budget import SHORTER, Budget, Clock, Keeper, next_pair
+from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces
+from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes
+from lightpaint.scene.scene import Scene
+
+WHITE: RGB = (1.0, 1.0, 1.0)
+BLACK: RGB = (0.0, 0.0, 0.0)
+
+#: (half 0 or 1, samples per pixel) of passes in a row.
+Plan = list[tuple[int, int]]
+
+
+class LightSums:
+    """What the two halves of each light's samples have come to, undivided.
+
+    planes: (2, n, h, w, 3) float32. spp, passes: (n, 2), per light and half, so far.
+    """
+
+    def __init__(self, lights: int, size: tuple[int, int]) -> None:
+        self.planes = np.zeros((2, lights, *size, 3), np.float32)
+        self.spp = np.zeros((lights, 2), np.int64)
+        self.passes = np.zeros((lights, 2), np.int64)
+
+    @classmethod
+    def of(cls, basis: Basis) -> "LightSums":
+        """The sums that made `basis`, up to round-off."""
+        origin = basis.origin
+        sums = cls(len(basis.lights), basis.size)
+        each = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
+        sums.spp[:], sums.passes[:] = np.array(each)[:, :2], np.array(each)[:, 2:]
+        for k, (a, b) in enumerate(sums.spp.tolist()):
+            image, half_difference = basis.images[k], basis.half_differences[k]
+            # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
+            sums.planes[0, k] = a * (image + half_difference * (2 * b / max(a + b, 1)))
+            sums.planes[1, k] = b * (image - half_difference * (2 * a / max(a + b, 1)))
+        return sums
+
+    def done(self, light: int) -> tuple[int, int]:
+        """Samples per pixel of the two halves of that light."""
+        a, b = self.spp[light].tolist()
+        return a, b
+
+    def mean_and_half_difference(self) -> tuple[Floats, Floats]:
+        """Of all samples, and between the halves, (n, h, w, 3) float32; 0 where there are none."""
+        means, half_differences = np.zeros_like(self.planes[0]), np.zeros_like(self.planes[0])
+        for k, (a, b) in enumerate(self.spp.tolist()):
+            sum_a, sum_b = self.planes[:, k]
+            means[k] = (sum_a + sum_b) / max(a + b, 1)
+            if a and b:
+                half_differences[k] = (sum_a / a - sum_b / b) / 2
+        return means, half_differences
+
+    def counts(self) -> dict[str, Any]:
+        """The fields of an Origin that say how many samples there are."""
+        # Of one half alone the noise is unknown: what counts is what both have.
+        spp, passes = int(self.spp.min()), int(self.passes.min())
+        each: tuple[tuple[int, ...], ...] = ()
+        if (self.spp != spp).any() or (self.passes != passes).any():
+            each = tuple(map(tuple, np.hstack([self.spp, self.passes]).tolist()))
+        return {"halves": (spp, spp), "passes": (passes, passes), "each_light": each}
+
+
+def render_separately(
+    scene: Scene,
+    budget: Budget,
+    *,
+    seed: int,
+    sums: LightSums,
+    basis: Callable[[], Basis],
+    keeper: Keeper,
+    progress: Progress,
+) -> None:
+    """Add to `sums` what `budget` allows.
+
+    basis: makes one of the sums so far, to be kept. Raises Interrupted for Ctrl-C.
+    """
+    try:
+        with interruptible_between_pieces() as let_interrupts_through:
+            for light, plan, after_pass in _turns(scene, budget, sums, progress):
+                loaded = _alone(scene, light)
+                for half, pass_spp in plan:
+                    _add_pass(loaded, scene, sums, light, half, pass_spp, seed)
+                    after_pass()
+                    keeper.now_and_then(basis)
+                    let_interrupts_through()
+                del loaded
+                gc.collect()
+    except KeyboardInterrupt:
+        if not sums.spp.any() or keeper.keep is None or not keeper.keep(basis()):
+            raise
+        mean = sums.spp.sum() / len(scene.lights)
+        of = "" if budget.time_s is not None else f" of {budget.spp}"
+        raise Interrupted(
+            f"{mean:.3g}{of} samples per pixel, on average over the lights, are kept; "
+            "the same command goes on"
+        ) from None
+
+
+def _turns(
+    scene: Scene, budget: Budget, sums: LightSums, progress: Progress
+) -> Iterator[tuple[int, Plan, Callable[[], None]]]:
+    """(light, its passes, what to call after each) in turn, until `budget` is spent."""
+    height, width = scene.size
+    pixels, lights = height * width, len(scene.lights)
+    if budget.time_s is None:
+        # One light after the other: a large scene takes long to load.
+        for light in range(lights):
+            plan = plan_passes(pixels, budget.spp, done=sums.done(light), shorter=SHORTER)
+            if plan:
+                yield light, plan, _count(f"basis: {scene.lights[light].name}", plan, progress)
+        return
+
+    # Rounds in which every light comes to the same number: one pair of passes to see what
+    # that takes, and then what the rest of the time allows, which is seldom more than twice.
+    clock, pairs = Clock(budget.time_s, progress), 1
+    while pairs > 0:
+        fullest = int(sums.spp.max())
+        begin_s, rendered = clock.left_s, 0
+        goal = next_pair(pixels, (fullest, fullest), pairs)
+        spp = 2 * fullest + sum(size for _, size in goal)
+        for light in range(lights):
+            plan = plan_passes(pixels, spp, done=sums.done(light), shorter=SHORTER)
+            rendered += len(plan)
+            yield light, plan, clock.report
+        pair_of_all_s = (begin_s - clock.left_s) / rendered * 2 * lights
+        pairs = max(0, int(clock.left_s / pair_of_all_s))
+
+
+def _count(label: str, plan: Plan, progress: Progress) -> Callable[[], None]:
+    done = 0
+    progress(label, done, len(plan))
+
+    def one_more() -> None:
+        nonlocal done
+        done += 1
+        progress(label, done, len(plan))
+
+    return one_more
+
+
+def _alone(scene: Scene, light: int) -> Any:
+    name = scene.lights[light].name
+    return scene.load({x.name: WHITE if x.name == name else BLACK for x in scene.lights})
+
+
+def _add_pass(
+    loaded: Any, scene: Scene, sums: LightSums, light: int, half: int, spp: int, seed: int
+) -> None:
+    import mitsuba as mi
+
+    # Each light has samples of its own.
+    of_light = pass_seed(seed, Stream.BASIS, light)
+    number = 2 * int(sums.passes[light, half]) + half
+    image = mi.render(
+        loaded,
+        sensor=scene.camera(loaded),
+        seed=pass_seed(of_light, Stream.BASIS, number),
+        spp=spp,
+    )
+    # Integrators that wrap another add channels of their own behind R, G and B.
+    sums.planes[half, light] += spp * as_float32(np.array(image)[..., :3])
+    sums.spp[light, half] += spp
+    sums.passes[light, half] += 1
+
+
+def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
+    """(h, w), where light reaches the camera without a single bounce."""
+    import mitsuba as mi
+
+    if scene.integrator.hide_emitters:
+        return np.zeros(scene.size, dtype=bool)
+    loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
+    direct = mi.load_dict({"type": "path", "max_depth": 1})
+    image = as_float32(
+        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=16))
+    )
+    del loaded
+    gc.collect()
+    return np.asarray(image.max(axis=-1) > 0)

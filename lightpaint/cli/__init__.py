@@ -1,0 +1,38 @@
+"""The command line: one sub-command per room. Parses, calls, prints; no more.
+
+Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: `verify` found
+a disagreement; 2: something the user can mend, said in one line; 130: interrupted.
+"""
+
+import io
+import sys
+import warnings
+from collections.abc import Sequence
+
+from lightpaint.cli.parser import command_parser
+from lightpaint.errors import LightpaintError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that lacks a character shows another, and loses no result over it.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    options = command_parser().parse_args(given)
+    try:
+        # What a command needs is imported when it runs: --help answers at once.
+        from lightpaint.cli import commands
+        from lightpaint.scene.variant import SlowBackendWarning
+
+        # The commands say it in their own words.
+        warnings.simplefilter("ignore", SlowBackendWarning)
+        return int(getattr(commands, options.command)(options, given))
+    except LightpaintError as error:
+        print(f"lightpaint {options.command}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt as interrupt:
+        how_to_go_on = f": {interrupt}" if str(interrupt) else ""
+        print(f"lightpaint {options.command}: interrupted{how_to_go_on}", file=sys.stderr)
+        return 130

@@ -1,0 +1,163 @@
+"""What commands print of scenes and answers: tables, and sentences below them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.markup import escape
+
+from lightpaint.cli import terminal
+from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.relit.verify import Verification
+from lightpaint.report.sentences import (
+    how_sure,
+    relative_errors,
+    spoken_error,
+    what_is_missed,
+)
+from lightpaint.report.verdict import agreement, energy_shares, verdict
+from lightpaint.results import Look
+from lightpaint.scene.emitters import MULTIPLE
+from lightpaint.scene.lights import WHOLE_EMISSION, Emitter, Light
+from lightpaint.scene.scene import Scene
+
+
+def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
+    """Print the lights of a scene as they are, groups with their members."""
+    headings = ("light", "plugin", "emission R G B", "unit", "size or place", "sampling", "colour")
+    # Lumen and candela only where somebody has said what a number stands for.
+    amounts = () if cd_per_unit is None else ("luminous", "flux")
+    table = terminal.table(*headings, *amounts)
+    for light in scene.lights:
+        single = light.member_names == (light.name,) and not light.is_fixed
+        if not single:
+            what = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
+            unit = "" if light.is_fixed else light.unit
+            count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
+            whole = _photometry(light, cd_per_unit)
+            table.add_row(
+                escape(light.name),
+                light.plugin,
+                what,
+                unit,
+                count,
+                "",
+                "" if light.is_fixed else whole.color,
+                *whole.amounts[: len(amounts)],
+            )
+        for member in light.members:
+            its = _photometry(member, cd_per_unit)
+            table.add_row(
+                escape(member.name if single else f"  {member.name}"),
+                member.plugin,
+                terminal.numbers(member.emission),
+                member.kind.unit if member.kind is not None else MULTIPLE,
+                member.form,
+                f"{member.sampling_weight:g}",
+                its.color,
+                *its.amounts[: len(amounts)],
+            )
+    terminal.print_table(table)
+
+
+def _photometry(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
+    """As the scene has it."""
+    unit, flux = MULTIPLE, None
+    if isinstance(light, Light):
+        unit, flux = light.unit, light.unit_flux
+    elif light.kind is not None:
+        unit = light.kind.unit
+        flux = None if light.unit_flux is None else (light.unit_flux,) * 3
+    return photometry(light.emission, unit=unit, unit_flux=flux, cd_per_unit=cd_per_unit)
+
+
+def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
+    """A light, and the emitters in it, for other programs."""
+    members = [
+        {
+            "name": member.name,
+            "plugin": member.plugin,
+            "parameter": member.kind.parameter if member.kind is not None else WHOLE_EMISSION,
+            "unit": member.kind.unit if member.kind is not None else MULTIPLE,
+            "emission": list(member.emission),
+            "form": member.form,
+            "sampling_weight": member.sampling_weight,
+            "photometry": _photometry(member, cd_per_unit).fields(),
+        }
+        for member in light.members
+    ]
+    about = {
+        "name": light.name,
+        "plugin": light.plugin,
+        "parameter": light.parameter,
+        "unit": light.unit,
+        "emission": list(light.emission),
+        "form": light.form,
+        "is_fixed": light.is_fixed,
+        "photometry": _photometry(light, cd_per_unit).fields(),
+        "members": members,
+    }
+    if len(members) == 1:
+        about["sampling_weight"] = light.members[0].sampling_weight
+    return about
+
+
+def show_look(look: Look, folder: Path) -> None:
+    """Print the lights that were solved for, and what is to be said of the answer."""
+    shares = energy_shares(look.basis, look.lighting)
+    held = any(light.constraint for light in look.lighting.lights)
+    headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
+    amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
+    asked = ["asked (* holds it)"] if held else []
+    table = terminal.table(*headings, *amounts, *asked)
+    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
+    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
+        solved = "off" if not any(light.emission) else terminal.numbers(light.emission)
+        if light.name in look.solution.quality.unreached and any(light.emission):
+            solved += " (kept)"
+        seen = look.lighting.photometry(light)
+        table.add_row(
+            escape(light.name),
+            light.plugin,
+            "" if light.is_fixed else terminal.numbers(now.emission),
+            "kept" if light.is_fixed else solved,
+            spoken_error(light, float(errors[k])),
+            "" if light.is_fixed else light.unit,
+            f"{100 * shares[k]:.1f} %",
+            "" if light.is_fixed else seen.color,
+            *seen.amounts[: len(amounts)],
+            *([escape(light.constraint) + "*" * light.is_active] if held else []),
+        )
+    terminal.print_table(table)
+    terminal.write(verdict(look.solution, look.predicted, look.verification))
+    for sentence in what_is_missed(look.diagnosis):
+        terminal.write(sentence)
+    if look.uncertainty is not None:
+        terminal.write(how_sure(look.basis, look.solution, look.uncertainty))
+    terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
+    quality = look.solution.quality
+    if quality.curve:
+        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
+        terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
+    if quality.unreached:
+        terminal.say(
+            f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "
+            "paint where it shines, or pass --unpainted"
+        )
+    for ambiguity in look.ambiguities:
+        terminal.say(ambiguity.sentence)
+    if not quality.converged:
+        terminal.say(
+            f"the solve stopped after {max(quality.sweeps)} sweeps at a KKT residual of "
+            f"{max(quality.kkt_residual):.1e}"
+        )
+    if look.verification is not None and not look.verification.agrees:
+        terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
+
+
+def spoken_agreement(result: Verification) -> str:
+    """Whether render and prediction agree, with numbers."""
+    return (
+        f"{agreement(result)}; RMSE {result.rmse:.2g} (noise {result.noise_rmse:.2g}), "
+        f"ΔE {result.delta_e_mean:.1f}"
+    )

@@ -1,0 +1,39 @@
+"""From linear light to what a display shows, in sRGB."""
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+
+
+def choose_exposure(image: Floats) -> float:
+    """Exposure in stops at which to show a linear image.
+
+    0 for a picture that is meant to be seen as it is; only one so dark or bright that it
+    would show nothing is brought back, its 99th percentile to white.
+    """
+    bright = float(np.percentile(image.max(axis=-1), 99))
+    if bright <= 0 or 0.125 <= bright <= 8:
+        return 0.0
+    return float(np.round(-np.log2(bright), 1))
+
+
+def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:
+    """sRGB-encoded values in [0, 1] of linear Rec.709, scaled by 2^stops and clipped.
+
+    The transfer function is IEC 61966-2-1's.
+    """
+    linear = np.clip(image * 2.0**stops, 0, 1)
+    curve = 1.055 * linear ** (1 / 2.4) - 0.055
+    return np.asarray(np.where(linear <= 0.0031308, 12.92 * linear, curve))
+
+
+def decode_display(image_display: Floats) -> Floats:
+    """Linear Rec.709 in [0, 1] of sRGB-encoded values in [0, 1]: undoes `encode_display`."""
+    curve = ((image_display + 0.055) / 1.055) ** 2.4
+    return np.asarray(np.where(image_display <= 0.04045, image_display / 12.92, curve))
+
+
+def to_8_bit(image_display: Floats) -> npt.NDArray[np.uint8]:
+    """Display values in [0, 1] as 8-bit integers."""
+    return np.asarray(np.round(image_display * 255), dtype=np.uint8)

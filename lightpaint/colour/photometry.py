@@ -1,0 +1,138 @@
+"""What a light is to an eye: colour, colour temperature, luminous quantities and flux.
+
+A scene in RGB has no absolute scale: only its author knows what radiance 1 stands for. Told
+once, in cd/m², it holds for everything: with radiance 1 W/(m² sr) ≙ u cd/m², the luminance-
+weighted mean Y of an emission E is
+
+    area, constant   u Y(L) cd/m²      point, spot   u Y(I) cd      directional   u Y(E) lx
+
+and a flux of Φ watts is u Y(Φ) lm. Without u there are numbers in proportion, and no units.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import RGB
+from lightpaint.colour.color import cct_and_duv, luminance, rgb_to_hex
+
+#: Luminous counterpart of the units of emission. Multiples of what a scene has are not in it.
+LUMINOUS_UNITS = {"W/(m² sr)": "cd/m²", "W/sr": "cd", "W/m²": "lx"}
+
+
+@dataclass(frozen=True)
+class Photometry:
+    """One light as it is set.
+
+    y: luminance-weighted emission, 0.2126 R + 0.7152 G + 0.0722 B.
+    hex: its display colour, brightest channel at full. kelvin, duv: its correlated colour
+    temperature. None where it has none: off, of unknown colour, far from Planck's locus.
+    flux_w: radiant flux per channel; None where a light has none of its own, as the sun.
+    flux_y: the same, luminance-weighted.
+    luminous, luminous_unit, flux_lm: with a scale; in cd/m², cd or lx, and in lumen.
+    """
+
+    y: float
+    hex: str | None
+    kelvin: float | None
+    duv: float | None
+    flux_w: RGB | None
+    flux_y: float | None
+    luminous: float | None
+    luminous_unit: str
+    flux_lm: float | None
+
+    @property
+    def color(self) -> str:
+        """`#ffaa66 2856 K`, as far as there is one; "" if there is none."""
+        kelvin = "" if self.kelvin is None else f"{self.kelvin:.0f} K"
+        return " ".join(filter(None, (self.hex, kelvin)))
+
+    @property
+    def amounts(self) -> tuple[str, str]:
+        """Luminous quantity and luminous flux for people to read, each "" if there is none."""
+        luminous = "" if self.luminous is None else f"{_spoken(self.luminous)} {self.luminous_unit}"
+        return luminous, "" if self.flux_lm is None else f"{_spoken(self.flux_lm)} lm"
+
+    def fields(self) -> dict[str, Any]:
+        """For JSON (docs/formats.md); what there is not is left out."""
+        named = {
+            "y": self.y,
+            "hex": self.hex,
+            "cct_k": self.kelvin,
+            "duv": self.duv,
+            "flux_w": None if self.flux_w is None else list(self.flux_w),
+            "flux_y": self.flux_y,
+            "luminous": self.luminous,
+            "luminous_unit": self.luminous_unit or None,
+            "flux_lm": self.flux_lm,
+        }
+        return {key: value for key, value in named.items() if value is not None}
+
+
+def photometry(
+    emission: RGB, *, unit: str, unit_flux: RGB | None = None, cd_per_unit: float | None = None
+) -> Photometry:
+    """What a light with `emission` in `unit` is.
+
+    unit_flux: watts that it radiates per channel at an emission of 1.
+    cd_per_unit: cd/m² that radiance 1 stands for.
+    """
+    is_colour = unit in LUMINOUS_UNITS
+    y = float(luminance(np.array(emission)))
+    flux = None if unit_flux is None else _times(emission, unit_flux)
+    flux_y = None if flux is None else float(luminance(np.array(flux)))
+    # Of a multiple of several colours, only what all of them radiate together has a colour.
+    colour = emission if is_colour else flux
+    is_seen = colour is not None and any(colour)
+    temperature = cct_and_duv(np.array(colour)) if is_seen else None
+    kelvin, duv = temperature or (None, None)
+    scale = cd_per_unit
+    return Photometry(
+        y=y,
+        hex=rgb_to_hex(np.array(colour)) if is_seen else None,
+        kelvin=kelvin,
+        duv=duv,
+        flux_w=flux,
+        flux_y=flux_y,
+        luminous=scale * y if scale is not None and is_colour else None,
+        luminous_unit=LUMINOUS_UNITS[unit] if scale is not None and is_colour else "",
+        flux_lm=scale * flux_y if scale is not None and flux_y is not None else None,
+    )
+
+
+def lambertian_flux(area: float) -> float:
+    """Watts per unit of radiance of a surface that is equally bright from all sides: π A."""
+    return math.pi * area
+
+
+def point_flux() -> float:
+    """Watts per unit of intensity of a light that shines alike in all directions: 4π."""
+    return 4 * math.pi
+
+
+def spot_flux(cutoff: float, beam_width: float) -> float:
+    """Watts per unit of intensity of Mitsuba's spot; both angles from the axis, in radians.
+
+    Its intensity is whole up to the beam width b, and from there on falls linearly in the
+    angle to 0 at the cutoff c:
+
+        2π (∫₀ᵇ sin θ dθ + ∫ᵇᶜ (c − θ)/(c − b) sin θ dθ) = 2π (1 − (sin c − sin b)/(c − b))
+    """
+    c, b = cutoff, min(beam_width, cutoff)
+    # (sin c − sin b)/(c − b) without the difference of two numbers that may be equal.
+    half = (c - b) / 2
+    sinc = math.sin(half) / half if half > 1e-8 else 1.0
+    return 2 * math.pi * (1 - math.cos((c + b) / 2) * sinc)
+
+
+def _spoken(value: float) -> str:
+    # 1,480 and not 1.48e+03, but no hundred digits either.
+    return f"{value:,.0f}" if 1000 <= value < 1e7 else f"{value:.3g}"
+
+
+def _times(a: RGB, b: RGB) -> RGB:
+    r, g, blue = (x * y for x, y in zip(a, b, strict=True))
+    return r, g, blue

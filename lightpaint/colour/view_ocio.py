@@ -1,0 +1,170 @@
+"""View transforms of an OpenColorIO configuration (the extra `lightpaint[ocio]`).
+
+The configuration is the one that the environment variable OCIO names, else OpenColorIO's built-in
+default. Its displays' values are taken as sRGB-like code values of the picture.
+"""
+
+import os
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.errors import ViewError
+
+#: Linear Rec.709 as OpenColorIO's built-in configurations call it, and as others do.
+LINEAR_REC709 = (
+    "Linear Rec.709 (sRGB)",
+    "lin_rec709_scene",
+    "lin_rec709",
+    "lin_srgb",
+    "Linear Rec.709",
+    "Linear BT.709",
+    "Utility - Linear - sRGB",
+)
+
+#: By how much a grey may miss itself on the way to light and back: the finest of 8 bits.
+LARGEST_MISS = 1 / 255
+
+#: Relative step of the numerical derivatives: between the noise of float32 and curvature.
+STEP = 1e-2
+
+
+def default_name() -> str:
+    """Name of the view that the configuration shows first: `ocio:DISPLAY/VIEW`."""
+    _, config = _library_and_config(os.environ.get("OCIO", ""))
+    display = config.getDefaultDisplay()
+    return f"ocio:{display}/{config.getDefaultView(display)}"
+
+
+def transform(display_and_view: str) -> "OcioTransform":
+    """The view `DISPLAY/VIEW` of the configuration. Raises ViewError."""
+    return _transform(display_and_view, os.environ.get("OCIO", ""))
+
+
+@cache
+def _transform(display_and_view: str, source: str) -> "OcioTransform":
+    return OcioTransform(display_and_view, source)
+
+
+class OcioTransform:
+    """One display and view. Raises ViewError where there is none, or no way back from it."""
+
+    def __init__(self, display_and_view: str, source: str) -> None:
+        self._name = f"ocio:{display_and_view}"
+        ocio, config = _library_and_config(source)
+        display, view = _named(display_and_view, config)
+        try:
+            self._to_display = _processors(ocio, config, display, view)
+        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+            raise ViewError(f"{self._name} cannot be used: {_first_line(error)}") from error
+        try:
+            self._to_light = _processors(ocio, config, display, view, inverse=True)
+        except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+            raise ViewError(
+                f"{self._name} cannot be undone, which reading paintings takes: "
+                f"{_first_line(error)}"
+            ) from error
+        self._check_way_back()
+        self.white = float(self.decode(np.ones((1, 1, 3), np.float32)).max())
+
+    def encode(self, image: Floats) -> Floats:
+        return np.clip(_applied(self._to_display, image), 0, 1)
+
+    def decode(self, image_display: Floats) -> Floats:
+        return _applied(self._to_light, image_display)
+
+    def jacobian(self, image: Floats) -> Floats:
+        step = np.maximum(np.abs(image).max(axis=-1), 1e-4) * STEP
+        columns = []
+        for k in range(3):
+            aside = np.zeros(3)
+            aside[k] = 1
+            up = self.encode(image + step[..., None] * aside)
+            down = self.encode(image - step[..., None] * aside)
+            columns.append((up - down) / (2 * step[..., None]))
+        return np.stack(columns, axis=-1)
+
+    def _check_way_back(self) -> None:
+        greys = np.repeat(np.linspace(0.05, 0.95, 19, dtype=np.float32), 3).reshape(1, 19, 3)
+        miss = np.abs(self.encode(self.decode(greys)) - greys).max()
+        if not miss <= LARGEST_MISS:
+            raise ViewError(
+                f"{self._name} cannot be undone: a grey comes back {miss:.2g} off, of display "
+                "values from 0 to 1; choose another view"
+            )
+
+
+def _library_and_config(source: str) -> tuple[Any, Any]:
+    try:
+        import PyOpenColorIO
+    except ImportError:
+        raise ViewError(
+            "views of OpenColorIO need an extra package: pip install 'lightpaint[ocio]'"
+        ) from None
+    ocio: Any = PyOpenColorIO
+    # What it would print comes as an error, or is about roles that are not used here.
+    loudness = ocio.GetLoggingLevel()
+    ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
+    try:
+        if source:
+            config = ocio.Config.CreateFromFile(source)
+        else:
+            config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
+        config.validate()
+    except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+        named = f"OCIO={source}" if source else "the built-in configuration"
+        raise ViewError(f"{named} is no OpenColorIO configuration: {_first_line(error)}") from error
+    finally:
+        ocio.SetLoggingLevel(loudness)
+    return ocio, config
+
+
+def _named(display_and_view: str, config: Any) -> tuple[str, str]:
+    displays = list(config.getDisplays())
+    for display in displays:
+        if display_and_view.startswith(f"{display}/"):
+            view = display_and_view[len(display) + 1 :]
+            views = list(config.getViews(display))
+            if view in views:
+                return display, view
+            raise ViewError(
+                f"display {display!r} has no view {view!r}: it has {', '.join(views) or 'none'}"
+            )
+    raise ViewError(
+        f"no view ocio:{display_and_view}: expected ocio:DISPLAY/VIEW, with a display of "
+        f"{', '.join(displays) or 'which the configuration has none'}"
+    )
+
+
+def _processors(
+    ocio: Any, config: Any, display: str, view: str, *, inverse: bool = False
+) -> list[Any]:
+    """What leads from linear Rec.709 to the display, one after the other, or back."""
+    towards = ocio.TRANSFORM_DIR_INVERSE if inverse else ocio.TRANSFORM_DIR_FORWARD
+    own = next((n for n in LINEAR_REC709 if config.getColorSpace(n) is not None), None)
+    source = own or "scene_linear"
+    shown = ocio.DisplayViewTransform(src=source, display=display, view=view)
+    chain = [config.getProcessor(shown, towards)]
+    if own is None:
+        # By way of the interchange spaces that the configuration declares.
+        between = ocio.Config.GetProcessorFromBuiltinColorSpace
+        if inverse:
+            between = ocio.Config.GetProcessorToBuiltinColorSpace
+            chain.append(between(config, source, LINEAR_REC709[0]))
+        else:
+            chain.insert(0, between(LINEAR_REC709[0], config, source))
+    return [processor.getDefaultCPUProcessor() for processor in chain]
+
+
+def _applied(processors: list[Any], image: Floats) -> Floats:
+    # The library works in place, on contiguous float32 rows of pixels.
+    pixels = np.array(image, dtype=np.float32, order="C").reshape(1, -1, 3)
+    for processor in processors:
+        processor.applyRGB(pixels)
+    return pixels.reshape(image.shape)
+
+
+def _first_line(error: BaseException) -> str:
+    return next(iter(str(error).strip().splitlines()), type(error).__name__)

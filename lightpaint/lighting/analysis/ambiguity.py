@@ -1,0 +1,119 @@
+"""Lights that a painting cannot tell apart: their images differ by nothing that counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.lighting.algebra.quadratic import UNREACHED
+from lightpaint.lighting.solve import Solution
+
+#: Two images are taken for one if their normalised inner product is above 1 − ALIKE, and
+#: several make up for each other if what is left of a mix of them is below that share.
+ALIKE = 1e-6
+
+#: The largest `alike` that noise is an excuse for.
+MOST_ALIKE = 0.01
+
+#: Share of a light in a mix that cancels, below which it has no part in it.
+PART = 0.05
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """Lights that share what they do among themselves in many ways, all equally good.
+
+    names: the lights. left: of their images, what is left when they cancel: 1 − cos of the
+    angle between two; an eigenvalue for more. is_mix: whether it takes a mix, in some channel;
+    otherwise all are alike in all channels.
+    """
+
+    names: tuple[str, ...]
+    left: float
+    is_mix: bool
+
+    @property
+    def sentence(self) -> str:
+        """What this means, and what would change it."""
+        lights = " and ".join([", ".join(self.names[:-1]), self.names[-1]])
+        what = (
+            f"mixes of {lights} light the painted part alike"
+            if self.is_mix
+            else f"{lights} light the painted part alike"
+        )
+        return (
+            f"{what}: only what they do together is determined. A wider mask or another view, "
+            "where they differ, would tell them apart; or tie them, or keep one as it is"
+        )
+
+
+def ambiguities(basis: Basis, solution: Solution) -> tuple[Ambiguity, ...]:
+    """The lights of `basis` that the painting cannot tell apart, as far as its noise lets see.
+
+    Noise makes the images of two lights at one place differ: by its share of their power.
+    """
+    free = np.flatnonzero(~basis.is_fixed)
+    noise, power = (
+        np.square(images[free], dtype=np.float64).sum(axis=(1, 2, 3))
+        for images in (basis.half_differences, basis.images)
+    )
+    shares = noise[power > 0] / power[power > 0]
+    alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE
+    # Where noise is much of a picture, what is alike cannot be seen.
+    M = solution.equations.M[:, free][:, :, free]
+    return indistinguishable(M, [basis.names[k] for k in free], alike=min(alike, MOST_ALIKE))
+
+
+def indistinguishable(
+    M: Doubles, names: Sequence[str], *, alike: float = ALIKE
+) -> tuple[Ambiguity, ...]:
+    """Groups of lights that M cannot tell apart, under the importance it was formed with.
+
+    M: (3, n, n), inner products per channel, or (n, n). Lights that reach nothing are left out.
+    Pairs of one shape of light come first, as groups; then other mixes that cancel.
+    """
+    channels = M[None] if M.ndim == 2 else M
+    # Each channel is scaled on its own: another colour is another weight, not another light.
+    power = np.einsum("cii->ci", channels)
+    lit = power > UNREACHED * power.max(initial=0)
+    scale = np.where(lit, 1 / np.sqrt(np.where(lit, power, 1)), 0)
+    cosines = channels * scale[:, :, None] * scale[:, None, :]
+    reached = np.flatnonzero(lit.any(axis=0))
+
+    groups: list[list[int]] = []
+    for i in reached.tolist():
+        home = next((g for g in groups if _least_cosine(cosines, lit, g[0], i) > 1 - alike), None)
+        if home is None:
+            groups.append([i])
+        else:
+            home.append(i)
+    found = [
+        Ambiguity(
+            tuple(names[i] for i in group),
+            max(0.0, 1 - min(_least_cosine(cosines, lit, group[0], i) for i in group[1:])),
+            is_mix=False,
+        )
+        for group in groups
+        if len(group) > 1
+    ]
+
+    # One light stands for each group; other mixes may cancel, and in one channel suffices.
+    mixes: dict[tuple[str, ...], float] = {}
+    for c in range(len(channels)):
+        heads = np.array([group[0] for group in groups if lit[c, group[0]]], dtype=int)
+        values, vectors = np.linalg.eigh(cosines[c][np.ix_(heads, heads)])
+        for value, vector in zip(values, vectors.T, strict=True):
+            if value <= alike:
+                part = np.abs(vector) > PART * np.abs(vector).max()
+                mixed = tuple(names[i] for i in heads[part].tolist())
+                mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
+    return (*found, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
+
+
+def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:
+    """The cosine between two images in the channel where they differ most."""
+    if (lit[:, i] != lit[:, j]).any():
+        return 0.0
+    return float(cosines[lit[:, i], i, j].min(initial=1.0))

@@ -1,0 +1,226 @@
+"""Why does it not look like the painting? The residual, split by what stands in the way.
+
+With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to every light, so
+
+    ‖Ψ − ΣwΦ‖² = ‖Ψ − ΣuΦ‖² + ‖Σ(u − w)Φ‖²
+
+exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
+noise of the prediction adds to the first is taken out of it. Where the lighting answers several
+views, part of the second is what the best lighting for this view alone would not have missed.
+After reweighting, all of it is of the last linear problem: without what a display clips, and on
+a scale of its own.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
+from lightpaint.lighting.analysis.directions import block_diagonal, columns, unknown_groups
+from lightpaint.lighting.analysis.noise import pseudo_inverse
+from lightpaint.lighting.analysis.release import bounds_of
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.solve import Solution, solution_of
+from lightpaint.target.target import Target
+
+#: Blocks along each side of the image over which it is asked where light is missing, and
+#: regions that are spoken of: left, middle, right.
+BLOCKS, REGIONS = 12, 3
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where most is out of reach of the lights.
+
+    region: row and column, 0 to 2, of the ninth of the image with most of it, and share, how
+    much of it that is. box: top, left, bottom, right, in pixels, of its worst block.
+    painted, reached: mean RGB there, of the painting and of the closest mix of any sign.
+    """
+
+    region: tuple[int, int]
+    share: float
+    box: tuple[int, int, int, int]
+    painted: tuple[float, float, float]
+    reached: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and where it comes from.
+
+    unreachable: what no weights of any sign can reach. forbidden: what they can and w >= 0
+    cannot. compromise: what the best lighting for this view alone would not miss; 0 where
+    there is one view. noise: what the basis' own noise adds. The four sum to `total`.
+    ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
+    missed: what is missed relative to the painting, root mean square, in the space of the fit.
+    unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
+    reason. Their sum is Ψ − ΣwΦ. ignored_map: (h, w), of luminance, weighted.
+    bounds: what holds single lights, the largest gain first. bounds_left_out: how many more
+    there are, which seem to matter less. is_constrained: whether anything was asked of the
+    lights, which then forbids too. place: None where nothing is out of reach. lighting_total:
+    `total` of all views that the lighting answers, to hold gains against.
+    """
+
+    total: float
+    unreachable: float
+    forbidden: float
+    noise: float
+    ignored: float
+    missed: float
+    unreachable_map: Floats
+    forbidden_map: Floats
+    ignored_map: Floats
+    bounds: tuple[Bound, ...]
+    place: Place | None
+    is_constrained: bool = False
+    bounds_left_out: int = 0
+    compromise: float = 0.0
+    lighting_total: float = 0.0
+
+    @property
+    def avoidable(self) -> float:
+        """Energy of `forbidden_map`: what some weights of any sign would not miss."""
+        return self.forbidden + self.compromise
+
+    def gained(self, bound: Bound) -> float:
+        """The gain of `bound` as a share of what the lighting misses, of all views together."""
+        return bound.gain / self.lighting_total if self.lighting_total > 0 else 0.0
+
+    def share(self, part: float) -> float:
+        """`part` of what is missed, 0 to 1."""
+        return part / self.total if self.total > 0 else 0.0
+
+
+def diagnose(
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    *,
+    whole: tuple[Basis, Solution] | None = None,
+) -> Diagnosis:
+    """Split what `solution` misses of `target`. Raises SizeError if they differ in size.
+
+    whole: of one of several views, the joint basis and its solution: what holds the lights does
+    so in all views together.
+    """
+    target = target.fitted_to(basis.size, resize=False)
+    weights = solution.lighting.weights_for(basis)
+    predicted = combine(basis, solution.lighting)
+    free = of_any_sign(basis, solution)
+    D = solution.weight.astype(np.float64)
+    missed = solution.image.astype(np.float64) - predicted.image
+    # The difference of two mixes, so that both maps add up to what is missed, to the bit.
+    forbidden = basis.mix(free - weights).astype(np.float64)
+    unreachable = missed - forbidden
+    total = float((D * np.square(missed)).sum())
+    out_of_reach = min(float((D * np.square(unreachable)).sum()), total)
+    noise = float((D * np.square(predicted.half_difference, dtype=np.float64)).sum())
+    noise = min(noise, out_of_reach)
+    uncounted = np.maximum(1 - solution.importance.astype(np.float64), 0)
+    # Where nothing was painted no colour is missed either.
+    uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
+    outside = target.image.astype(np.float64) - predicted.image
+    seen = outside if solution.loss is None else solution.loss.missed(predicted.image)
+    compromise = min(_given_up(basis, solution, weights), total - out_of_reach)
+    bounds, left_out = bounds_of(*(whole or (basis, solution)))
+    return Diagnosis(
+        total=total,
+        unreachable=out_of_reach - noise,
+        forbidden=total - out_of_reach - compromise,
+        noise=noise,
+        ignored=float((uncounted[..., None] * np.square(seen)).sum()),
+        missed=_relative(solution, D, total),
+        unreachable_map=unreachable,
+        forbidden_map=forbidden,
+        ignored_map=uncounted * luminance(outside),
+        bounds=bounds,
+        bounds_left_out=left_out,
+        lighting_total=total if whole is None else whole[1].energy,
+        is_constrained=bool(solution.constraints),
+        compromise=compromise,
+        place=_place(solution, unreachable) if out_of_reach > noise else None,
+    )
+
+
+def _relative(solution: Solution, D: Floats, total: float) -> float:
+    """What is missed relative to the painting, root mean square."""
+    norm2 = float((D * np.square(solution.image, dtype=np.float64)).sum())
+    if solution.loss is not None:
+        total, norm2 = sum(solution.quality.objective), float(solution.norm2.sum())
+    return float(np.sqrt(total / norm2)) if norm2 > 0 else 0.0
+
+
+def _given_up(basis: Basis, solution: Solution, weights: Doubles) -> float:
+    """By how much the energy of this view exceeds that of the best lighting for it alone.
+
+    After reweighting, both of the same squares: the loss itself is on another scale.
+    """
+    if not solution.is_one_of_several:
+        return 0.0
+    alone = solution_of(basis, solution, start=weights)
+    return max(solution.energy - alone.energy, 0.0)
+
+
+def with_diagnosis(solution: Solution, diagnosis: Diagnosis) -> Solution:
+    """`solution` whose quality has the bounds, for lighting.json."""
+    quality = replace(solution.quality, bounds=diagnosis.bounds)
+    return replace(solution, lighting=replace(solution.lighting, quality=quality))
+
+
+def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
+    """The weights (n, 3) that come closest if they may be negative; kept lights stay at 1."""
+    equations = solution.equations
+    weights = solution.lighting.weights_for(basis)
+    for unknowns in unknown_groups(basis, equations):
+        to = columns(unknowns, len(weights))
+        gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
+        M = to.T @ block_diagonal(equations.M) @ to
+        step = to @ pseudo_inverse(M) @ (to.T @ gradient.ravel())
+        weights = weights - step.reshape(3, -1).T
+    return weights
+
+
+def _place(solution: Solution, unreachable: Floats) -> Place | None:
+    """The region and block of the image with the most energy out of reach."""
+    D = solution.weight.astype(np.float64)
+    rows, columns = (_edges(length, BLOCKS) for length in solution.importance.shape)
+
+    def block_sums(image: Floats) -> Floats:
+        return np.add.reduceat(np.add.reduceat(image, rows[:-1], 0), columns[:-1], 1)
+
+    # Noise has either sign: the square of a block's mean is nearly without it.
+    counted = block_sums(D)
+    safe = np.where(counted > 0, counted, 1)
+    lacking = block_sums(D * unreachable) / safe
+    energy = (counted * np.square(lacking)).sum(axis=-1)
+    if not energy.any():
+        return None
+    region = np.zeros((REGIONS, REGIONS))
+    place_of = [REGIONS * np.arange(length) // length for length in energy.shape]
+    np.add.at(region, np.ix_(*place_of), energy)
+    worst = np.unravel_index(int(np.argmax(region)), region.shape)
+    inside = (place_of[0] == worst[0])[:, None] & (place_of[1] == worst[1])
+    y, x = np.unravel_index(int(np.argmax(np.where(inside, energy, -1))), energy.shape)
+    painted = (block_sums(D * solution.image) / safe)[y, x]
+    return Place(
+        region=(int(worst[0]), int(worst[1])),
+        share=float(region[worst] / energy.sum()),
+        box=(int(rows[y]), int(columns[x]), int(rows[y + 1]), int(columns[x + 1])),
+        painted=_rgb(painted),
+        reached=_rgb(painted - lacking[y, x]),
+    )
+
+
+def _edges(length: int, parts: int) -> npt.NDArray[np.int_]:
+    """Where `length` pixels are cut into that many nearly equal parts, or single pixels."""
+    parts = min(length, parts)
+    return np.asarray(np.arange(parts + 1) * length // parts, dtype=np.int_)
+
+
+def _rgb(values: Floats) -> tuple[float, float, float]:
+    r, g, b = (float(v) for v in values)
+    return r, g, b

@@ -1,0 +1,159 @@
+"""What the half differences of a basis say of its normal equations, and of a prediction.
+
+The two halves of the samples give two gradients of the objective at the solved weights. Half
+their difference, pixel by pixel, has the covariance of the gradient's noise (docs/method.md,
+"How sure").
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduction import channel_groups, reduce_to
+from lightpaint.lighting.normal_equations import BLOCK, NormalEquations
+from lightpaint.lighting.solution import Solution
+
+#: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
+#: the estimate of it is itself noise, and what is left of M would soon be indefinite.
+LARGEST_NOISE = 0.5
+
+#: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
+SINGULAR = 1e-12
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Sums over pixels of products of half differences, per channel.
+
+    power: (3, n, n), N_ij = Σ D h_i h_j, what the noise adds to M. drawn: (3, n), what the
+    noise of the current look, where that is solved for, adds to b.
+    gradient: (3, n, 3, n), covariance of the gradient. objective: as in `Uncertainty`.
+    """
+
+    power: Doubles
+    drawn: Doubles
+    gradient: Doubles
+    objective_error: Doubles
+    objective_noise: Doubles
+
+
+def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
+    """One pass over the pixels that count."""
+    n = len(weights)
+    importance = solution.importance.ravel()
+    # (pixels, 1), or (pixels, 3) where channels differ.
+    weight, share = (x.reshape(-1, x.shape[2]) for x in (solution.weight, solution.current_shares))
+    residual, mixed = residual_and_noise(basis, solution, weights)
+    present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
+    images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
+    # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
+    reduction = reduce_to(solution.constraints or Constraints(), basis.lights)
+    is_coupled = len(channel_groups(reduction)) < 3
+    power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
+    gradient = np.zeros((3, n, 3, n))
+    pulled = _pulled(basis, solution, weights)
+    unseen = ~basis.emitters_seen.ravel()
+    counted = np.flatnonzero((importance > 0) | (unseen & pulled.any()))
+    for start in range(0, counted.size, BLOCK):
+        pixels = counted[start : start + BLOCK]
+        rows = []
+        for c in range(3):
+            D = weight[pixels, c % weight.shape[1]].astype(np.float64)
+            h = halves[:, pixels, c].astype(np.float64)
+            rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
+            if pulled.any():
+                lit = np.where(unseen[pixels], images[:, pixels, c], 0).astype(np.float64)
+                rows[c] += pulled[:, c, None] * lit * h
+            power[c] += (D * h) @ h.T
+            shared = D * share[pixels, c % share.shape[1]]
+            drawn[c] += h @ (shared * present[pixels, c])
+            gradient[c, :, c] += rows[c] @ rows[c].T
+        if is_coupled:
+            # One path carries all three channels, so their noise goes together.
+            for c, d in ((0, 1), (0, 2), (1, 2)):
+                product = rows[c] @ rows[d].T
+                gradient[c, :, d] += product
+                gradient[d, :, c] += product.T
+    return Noise(
+        power,
+        drawn,
+        gradient,
+        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
+        objective_noise=(weight * np.square(mixed)).sum(axis=0),
+    )
+
+
+def _pulled(basis: Basis, solution: Solution, weights: Doubles) -> Doubles:
+    """(n, 3), what Φᵢ hᵢ of a pixel adds to the noise of the gradient by the pull to the present.
+
+    The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by.
+    """
+    strength = solution.constraints.prefer_current if solution.constraints else 0.0
+    return np.asarray(2 * strength * (basis.present_weights - weights))
+
+
+def residual_and_noise(
+    basis: Basis, solution: Solution, weights: Doubles
+) -> tuple[Doubles, Doubles]:
+    """What the answer misses, and half the difference of what its two halves predict.
+
+    Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
+    it holds the current look.
+    """
+    residual = solution.image.astype(np.float64) - basis.mix(weights)
+    noise: Doubles
+    if (r := solution.refinement) is not None:
+        noise = np.asarray(r.noise + mix(basis.half_differences, weights - r.before), np.float64)
+    else:
+        noise = mix(basis.half_differences, weights).astype(np.float64)
+        present = mix(basis.half_differences, basis.present_weights)
+        noise = np.asarray(noise - solution.current_shares * present, np.float64)
+    return residual.reshape(-1, 3), noise.reshape(-1, 3)
+
+
+def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
+    """Some weights, (n, 3), and what noise made b − M w lack there on average, (3, n)."""
+    if (r := solution.refinement) is not None:
+        return r.before, r.lacking
+    n = noise.power.shape[1]
+    # At no light at all the noise of the basis lacks nothing in M: all of it is still to come.
+    nothing = np.zeros((n, 3))
+    if solution.noise_removed == 0:
+        return nothing, -noise.drawn
+    weights = np.array([light.weight for light in solution.lighting.lights])
+    lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.drawn
+    return weights, (1 - solution.noise_removed) * lack
+
+
+def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:
+    """M without the noise in it, (3, n, n), positive semidefinite.
+
+    power: (3, n, n), N. M − N, but in no direction less than 1 − LARGEST_NOISE of M.
+    """
+    made = np.empty_like(equations.M)
+    for c in range(3):
+        root, inverse = _roots(equations.M[c])
+        values, vectors = np.linalg.eigh(inverse @ power[c] @ inverse.T)
+        values = np.clip(values, 0, LARGEST_NOISE)
+        made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
+    return made
+
+
+def pseudo_inverse(M: Doubles) -> Doubles:
+    """Of a positive semidefinite matrix, whatever the sizes of its unknowns."""
+    _, inverse = _roots(M)
+    return np.asarray(inverse.T @ inverse)
+
+
+def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
+    """R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
+    scale = np.sqrt(np.diag(M))
+    safe = np.where(scale > 0, scale, 1)
+    values, vectors = np.linalg.eigh(M / safe[:, None] / safe)
+    seen = values > SINGULAR * values.max(initial=0)
+    root = np.sqrt(values[seen])
+    inverse = (vectors[:, seen] / root).T / safe
+    return np.asarray(safe[:, None] * vectors[:, seen] * root), np.asarray(inverse)

@@ -1,0 +1,1 @@
+"""What is asked of lights, and the unknowns that this leaves."""

@@ -1,0 +1,425 @@
+"""The answer: named lights with their emissions, and its file, lighting.json."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles
+from lightpaint.basis.basis import Basis, BasisLight, mix
+from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.errors import LightingError
+from lightpaint.files import one_line, read_text, strict_json, write_text
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-lighting 1"
+
+
+@dataclass(frozen=True)
+class LightSetting:
+    """One light of a lighting.
+
+    emission: linear RGB in `unit`, the parameter's own unit in Mitsuba.
+    weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
+    is_fixed: whether it is what stays as it is in the scene, with weight 1.
+    members: names of the emitters it consists of; itself if none are given.
+    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
+    constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
+    whether that held it back from what the painting asks for.
+    standard_error: of the emission, from the noise it was solved with, where that is known.
+    """
+
+    name: str
+    plugin: str
+    parameter: str
+    unit: str
+    emission: RGB
+    weight: RGB
+    is_fixed: bool = False
+    members: tuple[str, ...] = ()
+    unit_flux: RGB | None = None
+    constraint: str = ""
+    is_active: bool = False
+    standard_error: RGB | None = None
+
+    def __post_init__(self) -> None:
+        if not self.members:
+            object.__setattr__(self, "members", (self.name,))
+        given = {"emission": self.emission, "weight": self.weight}
+        if self.standard_error is not None and not self.is_fixed:
+            given["standard error"] = self.standard_error
+        for what, rgb in given.items():
+            if not all(math.isfinite(v) and v >= 0 for v in rgb):
+                raise LightingError(
+                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
+                )
+            if self.is_fixed and rgb != (1, 1, 1):
+                raise LightingError(
+                    f"light {self.name!r} is kept as it is, so its {what} is 1 1 1, not {list(rgb)}"
+                )
+        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+            raise LightingError(
+                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: "
+                "need three numbers >= 0"
+            )
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How good a solve is, per colour channel (R, G, B).
+
+    kkt_residual: optimality measure of the solver (see solver.kkt_residual).
+    objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
+    unreached: lights that no weighted pixel sees, which keep what the solve started from, or
+    what is nearest to it under their constraints: their present emission, if no start was given.
+    curve: where only some lights may be on, numbers of lights and the relative residual,
+    √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
+    bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
+    objective_error: standard error of `objective`, from the noise it was solved with, where that
+    is known.
+    display: the view through which the objective is seen; "" where it is of linear light.
+    rounds: linear problems solved one after the other, the last of which is the certified one.
+    """
+
+    kkt_residual: RGB
+    objective: RGB
+    relative_objective: RGB
+    sweeps: tuple[int, int, int]
+    converged: bool
+    unreached: tuple[str, ...] = ()
+    curve: tuple[tuple[int, float], ...] = ()
+    bounds: tuple[Bound, ...] = ()
+    objective_error: RGB | None = None
+    display: str = ""
+    rounds: int = 1
+
+    def of(self, equations: NormalEquations, weights: Doubles) -> "Quality":
+        """With the objective that `weights` (n, 3) have in `equations`."""
+        objective = equations.objective(weights)
+        norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
+        return replace(self, objective=_rgb(objective), relative_objective=_rgb(objective / norm))
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """Emissions for named lights.
+
+    quality: of the solve they come from, if they do.
+    cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+    """
+
+    lights: tuple[LightSetting, ...]
+    target: str = ""
+    scene_identity: str = ""
+    quality: Quality | None = None
+    cd_per_unit: float | None = None
+
+    def __post_init__(self) -> None:
+        names = [light.name for light in self.lights]
+        if len(set(names)) != len(names):
+            raise LightingError(f"light names repeat: {', '.join(names)}")
+        members = [name for light in self.lights for name in light.members]
+        if len(set(members)) != len(members):
+            raise LightingError(f"an emitter is in two lights: {', '.join(sorted(members))}")
+        scale = self.cd_per_unit
+        if scale is not None and not 0 < scale < math.inf:
+            raise LightingError(f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0")
+
+    @property
+    def members(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the emitters of each light, by its name."""
+        return {light.name: light.members for light in self.lights}
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Names of the lights that stay as they are."""
+        return frozenset(light.name for light in self.lights if light.is_fixed)
+
+    @property
+    def emission(self) -> Mapping[str, RGB]:
+        """RGB emission by name of light."""
+        return {light.name: light.emission for light in self.lights}
+
+    def photometry(self, light: LightSetting) -> Photometry:
+        """Colour, temperature and flux of one of its lights."""
+        return photometry(
+            light.emission,
+            unit=light.unit,
+            unit_flux=light.unit_flux,
+            cd_per_unit=self.cd_per_unit,
+        )
+
+    def with_emission(self, name: str, emission: RGB) -> "Lighting":
+        """This lighting with another RGB emission for one light, and no claim to be optimal.
+
+        Raises LightingError if there is no such light.
+        """
+        if name not in self.emission:
+            raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
+        lights = tuple(
+            replace(
+                light,
+                emission=emission,
+                weight=emission,
+                constraint="",
+                is_active=False,
+                standard_error=None,
+            )
+            if light.name == name
+            else light
+            for light in self.lights
+        )
+        return replace(self, lights=lights, quality=None)
+
+    @classmethod
+    def of_weights(
+        cls,
+        basis: Basis,
+        weights: Doubles,
+        *,
+        asked: Sequence[tuple[str, bool]] | None = None,
+        **about: Any,
+    ) -> "Lighting":
+        """From weights (n, 3) in the order of `basis`.
+
+        asked: of each light its `constraint` and whether that `is_active`.
+        """
+        settings = tuple(
+            _setting(light, _rgb(weight), constraint, is_active)
+            for light, weight, (constraint, is_active) in zip(
+                basis.lights, weights, asked or [("", False)] * len(basis.lights), strict=True
+            )
+        )
+        return cls(settings, scene_identity=basis.origin.scene_identity, **about)
+
+    @classmethod
+    def present(cls, basis: Basis) -> "Lighting":
+        """The scene's lighting as it is."""
+        return cls.of_weights(basis, basis.present_weights)
+
+    def weights_for(self, basis: Basis) -> Doubles:
+        """(n, 3) weights in the order of `basis`.
+
+        Raises LightingError if the two do not name the same lights.
+        """
+        given = {light.name: light.weight for light in self.lights}
+        if set(given) != set(basis.names):
+            missing = sorted(set(basis.names) - set(given))
+            unknown = sorted(set(given) - set(basis.names))
+            raise LightingError(
+                "lighting and basis name different lights: "
+                f"missing {', '.join(missing) or 'none'}; unknown {', '.join(unknown) or 'none'}"
+            )
+        for light in basis.lights:
+            if set(light.members) != set(self.members[light.name]):
+                raise LightingError(
+                    f"light {light.name!r} is not the same in both: of "
+                    f"{', '.join(self.members[light.name])} in the lighting, of "
+                    f"{', '.join(light.members)} in the basis"
+                )
+        return np.array([given[name] for name in basis.names], dtype=np.float64)
+
+
+def combine(basis: Basis, lighting: Lighting) -> Estimate:
+    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it."""
+    weights = lighting.weights_for(basis)
+    return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
+
+
+def write_lighting(path: Path, lighting: Lighting) -> None:
+    """Write lighting.json (docs/formats.md), whole or not at all."""
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "lightpaint": __version__,
+        "target": lighting.target,
+        "scene_identity": lighting.scene_identity,
+        **({} if lighting.cd_per_unit is None else {"cd_per_unit": lighting.cd_per_unit}),
+        "lights": {
+            light.name: {
+                "plugin": light.plugin,
+                "parameter": light.parameter,
+                "unit": light.unit,
+                "emission": list(light.emission),
+                "weight": list(light.weight),
+                **_ties(light),
+                **_photometry(lighting, light),
+            }
+            for light in lighting.lights
+        },
+    }
+    if (q := lighting.quality) is not None:
+        data["solve"] = {
+            "kkt_residual": list(q.kkt_residual),
+            "objective": list(q.objective),
+            "relative_objective": list(q.relative_objective),
+            "sweeps": list(q.sweeps),
+            "converged": q.converged,
+            "unreached": list(q.unreached),
+            **({"curve": [list(point) for point in q.curve]} if q.curve else {}),
+            **({"bounds": [bound.fields() for bound in q.bounds]} if q.bounds else {}),
+            **({"objective_error": list(q.objective_error)} if q.objective_error else {}),
+            **({"display": q.display} if q.display else {}),
+            **({"rounds": q.rounds} if q.rounds > 1 else {}),
+        }
+    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_lighting(path: str | Path) -> Lighting:
+    """Read what `write_lighting` wrote. Raises LightingError for anything else."""
+    path = Path(path)
+    text = read_text(path, "lighting file", LightingError)
+    try:
+        data = strict_json(text)
+    except ValueError as error:
+        raise LightingError(f"{path} is not a JSON file: {one_line(str(error))}") from None
+    found = data.get("format") if isinstance(data, dict) else None
+    if found != FORMAT:
+        raise LightingError(f"{path} has the format {one_line(repr(found))}: expected {FORMAT!r}")
+    try:
+        return Lighting(
+            lights=tuple(_read_setting(name, d) for name, d in data["lights"].items()),
+            target=_read_text(data, "target"),
+            scene_identity=_read_text(data, "scene_identity"),
+            quality=_read_quality(data["solve"]) if "solve" in data else None,
+            cd_per_unit=_read_scale(data["cd_per_unit"]) if "cd_per_unit" in data else None,
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
+    except LightingError as error:
+        raise LightingError(f"{path}: {one_line(str(error))}") from None
+
+
+def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -> LightSetting:
+    # One unit of weight is unit-white emission, so that here the two are the same numbers.
+    return LightSetting(
+        light.name,
+        light.plugin,
+        light.parameter,
+        light.unit,
+        emission=weight,
+        weight=weight,
+        is_fixed=light.is_fixed,
+        members=light.members,
+        unit_flux=light.unit_flux,
+        constraint=constraint,
+        is_active=is_active,
+    )
+
+
+def _ties(light: LightSetting) -> dict[str, Any]:
+    """What the file says of a light only where it does not go without saying."""
+    ties: dict[str, Any] = {}
+    if light.standard_error is not None:
+        ties["standard_error"] = list(light.standard_error)
+    if light.is_fixed:
+        ties["is_fixed"] = True
+    if light.members != (light.name,):
+        ties["members"] = list(light.members)
+    if light.constraint:
+        ties |= {"constraint": light.constraint, "is_active": light.is_active}
+    return ties
+
+
+def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
+    """What follows from the emission, for people and programs; only `unit_flux` is read back."""
+    known: dict[str, Any] = {} if light.unit_flux is None else {"unit_flux": list(light.unit_flux)}
+    return known if light.is_fixed else {**known, "photometry": lighting.photometry(light).fields()}
+
+
+def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
+    members = _read_names(data.get("members", [name]), "members")
+    if not members:
+        raise TypeError("members is a list of names, not empty")
+    return LightSetting(
+        name,
+        _read_text(data, "plugin", required=True),
+        _read_text(data, "parameter", required=True),
+        _read_text(data, "unit", required=True),
+        _read_rgb(data["emission"]),
+        _read_rgb(data["weight"]),
+        _read_bool(data.get("is_fixed", False), "is_fixed"),
+        members,
+        _read_rgb(data["unit_flux"]) if "unit_flux" in data else None,
+        _read_text(data, "constraint"),
+        _read_bool(data.get("is_active", False), "is_active"),
+        _read_rgb(data["standard_error"]) if "standard_error" in data else None,
+    )
+
+
+def _read_quality(data: dict[str, Any]) -> Quality:
+    r, g, b = (_read_count(v) for v in data["sweeps"])
+    curve = []
+    for count, missed in data.get("curve", []):
+        if type(missed) not in (int, float):
+            raise TypeError(f"curve has {missed!r} where a number is due")
+        curve.append((_read_count(count), float(missed)))
+    return Quality(
+        _read_rgb(data["kkt_residual"]),
+        _read_rgb(data["objective"]),
+        _read_rgb(data["relative_objective"]),
+        (r, g, b),
+        _read_bool(data["converged"], "converged"),
+        _read_names(data["unreached"], "unreached"),
+        tuple(curve),
+        tuple(_read_bound(bound) for bound in data.get("bounds", [])),
+        _read_rgb(data["objective_error"]) if "objective_error" in data else None,
+        _read_text(data, "display"),
+        _read_count(data.get("rounds", 1)),
+    )
+
+
+def _read_bound(data: dict[str, Any]) -> Bound:
+    bound = Bound.of_fields(data)
+    if any(data[key] != value for key, value in bound.fields().items()):
+        raise TypeError(f"{data!r} is not a bound")
+    return bound
+
+
+def _read_count(value: Any) -> int:
+    if type(value) is not int or value < 0:
+        raise TypeError(f"{value!r} is not a count")
+    return value
+
+
+def _read_bool(value: Any, key: str) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{key} is true or false, not {value!r}")
+    return value
+
+
+def _read_names(value: Any, key: str) -> tuple[str, ...]:
+    if not (isinstance(value, list) and all(isinstance(name, str) for name in value)):
+        raise TypeError(f"{key} is a list of names, not {value!r}")
+    return tuple(value)
+
+
+def _rgb(values: Any) -> RGB:
+    r, g, b = (float(v) for v in values)
+    return r, g, b
+
+
+def _read_text(data: dict[str, Any], key: str, *, required: bool = False) -> str:
+    text = data[key] if required else data.get(key, "")
+    if not isinstance(text, str):
+        raise TypeError(f"{key} is a text, not {text!r}")
+    return text
+
+
+def _read_scale(value: Any) -> float:
+    if type(value) not in (int, float):
+        raise TypeError(f"cd_per_unit is a number, not {value!r}")
+    return float(value)
+
+
+def _read_rgb(values: Any) -> RGB:
+    # float() would also take "1" and true, and a string of three digits for three numbers.
+    if not isinstance(values, list) or not all(type(v) in (int, float) for v in values):
+        raise TypeError(f"{values!r} is not a list of three numbers")
+    return _rgb(values)

@@ -1,0 +1,151 @@
+"""M w = b: the least-squares problem in the lights alone (Schoeneman et al. 1993, Eq 3, 5).
+
+The objective is ‖Ψ − Σ w_i Φ_i‖² under ⟨f, g⟩ = Σ_pixels D f g, one problem per colour
+channel. All sums run in float64 over float32 pixels.
+"""
+
+from contextlib import nullcontext
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import SizeError, TargetError
+from lightpaint.lighting.algebra.quadratic import UNREACHED
+from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.target.target import Target
+
+#: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
+BLOCK = 2**13
+
+#: Lights up to which the product of a block is too small for BLAS to share it out to threads.
+FEW_LIGHTS = 256
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Inner products of basis and target, per colour channel.
+
+    M: (3, n, n), ⟨Φ_i, Φ_j⟩. b: (3, n), ⟨Φ_i, Ψ⟩. target_norm2: (3,), ‖Ψ‖².
+    """
+
+    M: Doubles
+    b: Doubles
+    target_norm2: Doubles
+
+    def __add__(self, other: "NormalEquations") -> "NormalEquations":
+        """The problem of both pictures at once: of two tiles, cameras, frames or machines.
+
+        Raises SizeError if they are not of the same number of lights.
+        """
+        if self.M.shape != other.M.shape:
+            raise SizeError(
+                f"a problem of {self.M.shape[1]} lights and one of {other.M.shape[1]} do not add: "
+                "both need the same lights in the same order"
+            )
+        return NormalEquations(
+            self.M + other.M, self.b + other.b, self.target_norm2 + other.target_norm2
+        )
+
+    @property
+    def reached(self) -> npt.NDArray[np.bool_]:
+        """(n, 3), whether a light reaches something that counts in a channel."""
+        power = np.einsum("cii->ic", self.M)
+        return np.asarray(power > UNREACHED * power.max(initial=0))
+
+    def objective(self, w: Doubles) -> Doubles:
+        """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3)."""
+        quadratic = np.einsum("ic,cij,jc->c", w, self.M, w)
+        value = self.target_norm2 - 2 * np.einsum("ci,ic->c", self.b, w) + quadratic
+        # A perfect fit leaves round-off of either sign.
+        return np.asarray(np.maximum(value, 0))
+
+    def holding(self, is_fixed: npt.NDArray[np.bool_]) -> "NormalEquations":
+        """The problem of the other lights while these have weight 1: Ψ − Σ_fixed Φ_j is left.
+
+        is_fixed: (n,). Known terms of M w = b go to its right-hand side.
+        """
+        free, held = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
+        within = self.M[:, held][:, :, held].sum(axis=(1, 2))
+        return NormalEquations(
+            self.M[:, free][:, :, free],
+            self.b[:, free] - self.M[:, free][:, :, held].sum(axis=2),
+            np.maximum(self.target_norm2 - 2 * self.b[:, held].sum(axis=1) + within, 0),
+        )
+
+    @classmethod
+    def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":
+        """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w) or (h, w, 3)."""
+        return cls(*inner_products(basis.images, image, importance))
+
+
+def inner_products(
+    images: Floats, target: Floats, importance: Floats
+) -> tuple[Doubles, Doubles, Doubles]:
+    """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) under the pixel weights `importance`.
+
+    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), or (h, w, 3) where it differs
+    between the channels, >= 0.
+    """
+    n = images.shape[0]
+    rows = images.reshape(n, -1, 3)
+    # Pixels without weight contribute nothing and need not be read.
+    apart = importance.shape[2:] == (3,)
+    weights = importance.reshape(rows.shape[1], 3 if apart else 1)
+    counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
+    colours = target.reshape(-1, 3)
+    gram = np.zeros((3, n + 1, n + 1))
+    room = np.empty((n + 1, min(BLOCK, counted.size)))
+    with one_thread() if n <= FEW_LIGHTS else nullcontext():
+        for start in range(0, counted.size, BLOCK):
+            pixels = counted[start : start + BLOCK]
+            first, last = int(pixels[0]), int(pixels[-1])
+            # Pixels in one run are looked at where they are; others have to be gathered.
+            in_one_run = last - first + 1 == pixels.size
+            where = slice(first, last + 1) if in_one_run else pixels
+            lit, painted = rows[:, where], colours[where]
+            root = np.sqrt(weights[where].astype(np.float64))
+            # (n + 1, block): the target goes along as one more row.
+            block = room[:, : pixels.size]
+            for c in range(3):
+                its = root[:, c * apart]
+                np.multiply(lit[..., c], its, out=block[:n])
+                np.multiply(painted[:, c], its, out=block[n])
+                gram[c] += block @ block.T
+    return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
+
+
+def weighted_problem(
+    basis: Basis, target: Target, *, unpainted: float = 0.0
+) -> tuple[Floats, Floats]:
+    """The image and importance to solve for, of the size of the basis.
+
+    Pixels in which an emitter is seen directly count nothing unless somebody painted them:
+    at unit emission they would outshine everything the light falls on.
+
+    unpainted: weight of what is not painted against the current look. A pixel of
+    importance a then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖², which is one
+    residual of weight D = a + unpainted (1 − a) against the weighted mean of both images.
+    """
+    if unpainted < 0 or not np.isfinite(unpainted):
+        raise TargetError(f"--unpainted is a weight >= 0, not {unpainted:g}")
+    importance = target.importance.astype(np.float64)
+    image = target.image.astype(np.float64)
+    if target.everything:
+        importance = np.where(basis.emitters_seen, 0, importance)
+        if not importance.any():
+            raise TargetError(
+                f"target {target.name}: the camera sees an emitter in every pixel, so none "
+                "counts; give a mask of those that should"
+            )
+    if unpainted > 0:
+        current = basis.mix(basis.present_weights)
+        rest = unpainted * np.maximum(1 - importance, 0)
+        rest = np.where(basis.emitters_seen, 0, rest)
+        total = importance + rest
+        mixed = importance[..., None] * image + rest[..., None] * current
+        image = mixed / np.where(total > 0, total, 1)[..., None]
+        importance = total
+    return image, importance

@@ -1,0 +1,201 @@
+"""Normal equations that follow the brush (Schoeneman et al. 1993, Eq 7, 8, 9).
+
+The picture is cut into tiles, and M, b and ‖Ψ‖² are sums over them. A stroke makes some tiles
+dirty, whose sums are formed anew: its cost is that of the tiles it touches. Nothing is ever
+subtracted, so that nothing drifts: undoing a stroke gives back the very same bits, and an
+updated problem is bit for bit the one built from scratch.
+"""
+
+from functools import partial
+from itertools import pairwise, product
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.errors import SizeError
+from lightpaint.lighting.algebra.threads import one_thread, side_by_side
+from lightpaint.lighting.normal_equations import NormalEquations
+
+#: Pixels along the side of a tile. Smaller ones fit a brush better and are more to add.
+SIDE = 16
+
+#: Bytes that the sums of all tiles may take; tiles are larger if they would take more.
+ROOM = 2**29
+
+#: Bytes of pixels, in float64, that are summed at a time: they stay in the processor's cache.
+CHUNK = 2**21
+
+#: Lights up to which a tile takes the time of the calls and not of the arithmetic.
+FEW_LIGHTS = 32
+
+
+class TiledEquations:
+    """The problem of one basis, target and importance, updated in place.
+
+    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), >= 0. The images are not
+    copied, target and importance are.
+
+    The sums of the tiles are the base of a pyramid, each of whose nodes is the sum of two by
+    two below it: a dirty tile costs its own sum and three additions per level, and the order
+    of summation does not depend on what has been painted when.
+    """
+
+    def __init__(
+        self, images: Floats, target: Floats, importance: Floats, *, side: int | None = None
+    ) -> None:
+        self._images = images
+        n, height, width, _ = images.shape
+        if target.shape != (height, width, 3) or importance.shape != (height, width):
+            raise SizeError(
+                f"target {target.shape} and importance {importance.shape} do not fit basis images "
+                f"of {(height, width)}"
+            )
+        self._target = np.array(target)
+        self._importance = np.array(importance)
+        self.side = side_for(n, height, width) if side is None else side
+        # What a stroke of colour leaves as it is, M, is kept apart from what it changes, b and
+        # ‖Ψ‖².
+        shape = -(-height // self.side), -(-width // self.side)
+        self._M = _pyramid(shape, (3, n, n))
+        self._b = _pyramid(shape, (3, n + 1))
+        self._update((slice(0, height), slice(0, width)), with_M=True)
+
+    @property
+    def equations(self) -> NormalEquations:
+        """M, b and ‖Ψ‖² as they are now."""
+        M, b = self._M[-1][0, 0], self._b[-1][0, 0]
+        return NormalEquations(M.copy(), b[:, :-1].copy(), b[:, -1].copy())
+
+    def update(
+        self,
+        region: tuple[slice, slice],
+        target: npt.ArrayLike | None = None,
+        importance: npt.ArrayLike | None = None,
+    ) -> None:
+        """Paint over a rectangle: what is given replaces the target or the importance there.
+
+        region: slices of rows and columns. target: (rows, columns, 3) or one colour;
+        importance: (rows, columns) or one number. Raises ValueError, and leaves all as it is,
+        for a negative or infinite importance and for what does not fit the region.
+        """
+        for along, length in zip(region, self._importance.shape, strict=True):
+            _tiles(along, length, self.side)
+        if target is not None:
+            np.broadcast_to(target, self._target[region].shape)
+        if importance is not None:
+            given = np.asarray(importance)
+            if not (np.isfinite(given).all() and (given >= 0).all()):
+                raise ValueError("importance is a finite weight >= 0 of each pixel")
+            self._importance[region] = given
+        if target is not None:
+            self._target[region] = target
+        self._update(region, with_M=importance is not None)
+
+    def _update(self, region: tuple[slice, slice], *, with_M: bool) -> None:
+        rows = _tiles(region[0], self._importance.shape[0], self.side)
+        columns = _tiles(region[1], self._importance.shape[1], self.side)
+        if not (rows and columns):
+            return
+        few = max(CHUNK // (8 * 3 * (len(self._images) + 1) * self.side**2), 1)
+        wide = min(few, len(columns))
+        blocks = product(_parts(rows, few // wide), _parts(columns, wide))
+        sum_block = partial(self._sum, with_M=with_M)
+        if with_M and len(self._images) > FEW_LIGHTS:
+            side_by_side(sum_block, blocks)
+        else:
+            with one_thread():
+                for block in blocks:
+                    sum_block(block)
+        for pyramid in (self._M, self._b) if with_M else (self._b,):
+            _add_up(pyramid, rows, columns)
+
+    def _sum(self, block: tuple[range, range], *, with_M: bool) -> None:
+        """Σ D f g over each of a block of tiles: of images and target, and of pairs of images."""
+        n, side = len(self._images), self.side
+        tiles = len(block[0]), len(block[1])
+        rows, columns = (slice(part.start, part.stop) for part in block)
+        where = (
+            slice(rows.start * side, rows.stop * side),
+            slice(columns.start * side, columns.stop * side),
+        )
+        # The target goes along as one more image.
+        D = np.empty((*tiles, 1, side * side))
+        pixels = np.empty((*tiles, 3, n + 1, side * side))
+        _cut(self._importance[where][None, ..., None], side, out=D[:, :, :, None])
+        _cut(self._images[(slice(None), *where)], side, out=pixels[:, :, :, :n])
+        _cut(self._target[where][None], side, out=pixels[:, :, :, n:])
+        if not D.all():
+            # Pixels without weight may hold anything.
+            np.copyto(pixels, 0, where=(D == 0)[:, :, :, None])
+        painted = pixels[:, :, :, n] * D
+        self._b[0][rows, columns] = np.matmul(pixels, painted[..., None])[..., 0]
+        if with_M:
+            lit = pixels[:, :, :, :n]
+            lit *= np.sqrt(D)[:, :, :, None]
+            # Of one array and itself numpy forms half of the product, of two all of it, which is
+            # faster for few lights.
+            other = lit.copy() if n <= FEW_LIGHTS else lit
+            np.matmul(lit, other.swapaxes(-1, -2), out=self._M[0][rows, columns])
+
+
+def _parts(whole: range, size: int) -> list[range]:
+    """Ranges of `size`, the last one shorter, that make up the whole."""
+    starts = range(whole.start, whole.stop, size)
+    return [range(first, min(first + size, whole.stop)) for first in starts]
+
+
+def _cut(pictures: Floats, side: int, out: Doubles) -> None:
+    """Cut a block of tiles apart: (n, h, w, channels) into (rows, columns, channels, n, side²).
+
+    Tiles that the border of the picture cuts off are 0 beyond it.
+    """
+    n, height, width, channels = pictures.shape
+    rows, columns = out.shape[:2]
+    if (height, width) != (rows * side, columns * side):
+        part = pictures
+        pictures = np.zeros((n, rows * side, columns * side, channels), part.dtype)
+        pictures[:, :height, :width] = part
+    apart = pictures.reshape(n, rows, side, columns, side, channels).transpose(1, 3, 5, 0, 2, 4)
+    out.reshape(rows, columns, channels, n, side, side)[...] = apart
+
+
+def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:
+    """Zeros for rows and columns of nodes, for each two by two of these, and so on up to one."""
+    rows, columns = shape
+    levels = []
+    while rows * columns > 1:
+        # Of every node there are both pairs, if only of zeros.
+        levels.append(np.zeros((rows + rows % 2, columns + columns % 2, *node)))
+        rows, columns = -(-rows // 2), -(-columns // 2)
+    return [*levels, np.zeros((1, 1, *node))]
+
+
+def _add_up(pyramid: list[Doubles], rows: range, columns: range) -> None:
+    """Form anew all that stands on these nodes of the base."""
+    top, bottom, left, right = rows.start, rows.stop, columns.start, columns.stop
+    for below, above in pairwise(pyramid):
+        top, bottom, left, right = top // 2, -(-bottom // 2), left // 2, -(-right // 2)
+        four = below[2 * top : 2 * bottom, 2 * left : 2 * right]
+        two = four[0::2] + four[1::2]
+        np.add(two[:, 0::2], two[:, 1::2], out=above[top:bottom, left:right])
+
+
+def side_for(n: int, height: int, width: int) -> int:
+    """Pixels along the side of a tile: `SIDE`, or as many more as keep all sums within `ROOM`."""
+    node_bytes = 3 * (n * n + n + 1) * 8
+    side = SIDE
+    # There are at most four nodes for each tile, inner ones and unused leaves included.
+    while 4 * node_bytes * -(-height // side) * -(-width // side) > ROOM and side < max(
+        height, width
+    ):
+        side *= 2
+    return side
+
+
+def _tiles(along: slice, length: int, side: int) -> range:
+    """Numbers of the tiles that a slice of pixels touches."""
+    start, stop, step = along.indices(length)
+    if step < 0:
+        raise ValueError("a region is painted from its first row and column on")
+    return range(start // side, -(-stop // side)) if stop > start else range(0)

@@ -1,0 +1,148 @@
+"""A solved problem and the images of lights to try beside it, brought to one size.
+
+Of all there are two halves of the samples, so that what is found on one of them can be held
+against the other (see additional.py).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.errors import SizeError
+from lightpaint.images.blocks import block_mean, whole_factor
+from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.lighting.constraints.constrained import preferring
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduction import Reduction, Unknown, reduce_to
+from lightpaint.lighting.normal_equations import NormalEquations, inner_products
+from lightpaint.lighting.solve import Solution, chosen_reduction
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """A solved problem, and images of lights to try, all of one size.
+
+    images, noise: (n + m, h, w, 3), the n lights of the basis and m candidates at unit emission,
+    and half the differences of halves of their samples. halves: (n + m, 2), shares of the
+    samples in half A and B. image, (h, w, 3), and importance, (h, w, 1 or 3): what is solved
+    for; after reweighting, in the last linear problem. reduction: what may be done
+    with the n lights. pull: of `prefer current`, for these.
+    """
+
+    images: Floats
+    noise: Floats
+    halves: Doubles
+    image: Floats
+    importance: Floats
+    reduction: Reduction
+    pull: NormalEquations | None
+    count: int
+
+    @classmethod
+    def of(cls, basis: Basis, solution: Solution, added: Basis) -> "Candidates":
+        """added: images of candidates, at the size of `basis` or a whole part of it.
+
+        Lights in it that are fixed are no candidates. Raises SizeError for other sizes.
+        """
+        size = added.size
+        factor = whole_factor(basis.size, size)
+        if factor is None:
+            raise SizeError(
+                f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
+                f"{basis.size[0]}: render them at a whole part of its size"
+            )
+        image, importance = _reduced(solution.image, solution.weight, factor)
+        free = ~added.is_fixed
+        count = int(free.sum())
+        images, noise = (
+            np.concatenate([[block_mean(one, factor) for one in its], more[free]])
+            for its, more in (
+                (basis.images, added.images),
+                (basis.half_differences, added.half_differences),
+            )
+        )
+        return cls(
+            images,
+            noise,
+            np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
+            image,
+            importance,
+            _with_free_lights(_reduction(basis, solution), count),
+            _pull(basis, solution, count),
+            count,
+        )
+
+    @property
+    def lights(self) -> int:
+        """n, the lights of the basis."""
+        return len(self.images) - self.count
+
+    def picture(self, weights: Doubles) -> Floats:
+        """Σ w_i Φ_i, (h, w, 3). weights: (n + m, 3)."""
+        return mix(self.images, weights)
+
+    def half(self, k: int) -> Floats:
+        """The images as half A (0) or B (1) of the samples has them."""
+        sign = 1 if k == 0 else -1
+        scale = sign * 2 * self.halves[:, 1 - k]
+        return np.asarray(self.images + self.noise * _column(scale), np.float32)
+
+    def noise_of_half(self, k: int) -> Floats:
+        """What has the variance of `half(k)`, as its square."""
+        return np.asarray(self.noise * _column(2 * np.sqrt(self.halves[:, 1 - k])), np.float32)
+
+    def equations(self, images: Floats) -> NormalEquations:
+        """Of these images, and of what is solved for."""
+        with one_thread():
+            return NormalEquations(*inner_products(images, self.image, self.importance))
+
+
+def _reduction(basis: Basis, solution: Solution) -> Reduction:
+    if solution.constraints:
+        return chosen_reduction(basis, solution)
+    return reduce_to(Constraints(), basis.lights)
+
+
+def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
+    """`reduction` with that many lights more, of which nothing is asked."""
+    n = len(reduction.held)
+    held = np.vstack([reduction.held, np.zeros((count, 3))])
+    labels = [*reduction.labels, *[""] * count]
+    more = Reduction(held, labels, [*reduction.unknowns], [*reduction.caps], [*reduction.knobs])
+    for k in range(n, n + count):
+        more.add([Unknown(((k, axis),)) for axis in np.eye(3)], None)
+    return more
+
+
+def _pull(basis: Basis, solution: Solution, count: int) -> NormalEquations | None:
+    """What draws the lights to their present emission; nothing draws the candidates."""
+    if not (solution.constraints and solution.constraints.prefer_current):
+        return None
+    n = len(basis.lights)
+    nothing = NormalEquations(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros(3))
+    strength = solution.constraints.prefer_current
+    pull = preferring(nothing, basis, basis.present_weights, strength)
+    return NormalEquations(
+        np.pad(pull.M, ((0, 0), (0, count), (0, count))),
+        np.pad(pull.b, ((0, 0), (0, count))),
+        pull.target_norm2,
+    )
+
+
+def _reduced(image: Floats, importance: Floats, factor: int) -> tuple[Floats, Floats]:
+    """Means of blocks, weighted with importance, and the importance of whole blocks."""
+    weight = block_mean(importance.astype(np.float64), factor)
+    weighted = block_mean(image * importance.astype(np.float64), factor)
+    return weighted / np.where(weight > 0, weight, 1), weight * factor**2
+
+
+def _shares(basis: Basis, count: int) -> Doubles:
+    """(count, 2), the part of the samples that half A and B have."""
+    a, b = basis.origin.halves
+    return np.tile([a / (a + b), b / (a + b)], (count, 1))
+
+
+def _column(values: Doubles) -> Doubles:
+    return values[:, None, None, None]

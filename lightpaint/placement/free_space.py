@@ -1,0 +1,185 @@
+"""Places where a light could stand and shine on what the camera sees.
+
+Light that reaches a visible point in a straight line comes from somewhere between that point
+and the next surface. So rays are cast from the camera, from what they hit into the half space
+before it, and places are taken along these: inside a room, out through its windows, behind the
+camera. Of many such places a few are kept that lie far apart.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.scene.parsed import Position
+from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.scene import Scene
+
+#: Points of the picture from which places are looked for, and rays from each.
+POINTS, RAYS = 600, 24
+
+#: How far a ray goes that hits nothing, and beyond which points are too far off to count,
+#: over how far visible points spread.
+REACH, FAR = 2.0, 12.0
+
+#: Distance from all surfaces, over how far visible points spread, and directions it is tried in.
+CLEARANCE, AROUND = 0.03, 26
+
+#: Visible points that a place is held against, and the share of them that it has to see.
+ASKED, LEAST_SEEN = 64, 0.05
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Places that see something of what the camera sees.
+
+    places: (k, 3), units of the scene. spread: median distance of visible points from their
+    middle, which is what near and far is measured by.
+    """
+
+    places: Floats
+    spread: float
+
+
+def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
+    """Look for places in `loaded`, which is `scene` loaded. None if the camera hits nothing."""
+    rng = np.random.default_rng(pass_seed(seed, Stream.CANDIDATES, 0))
+    points, normals = _visible(scene, loaded, rng)
+    if not len(points):
+        return FreeSpace(np.zeros((0, 3)), 0.0)
+    middle = np.median(points, axis=0)
+    away = np.linalg.norm(points - middle, axis=1)
+    spread = float(np.median(away))
+    if not spread > 0:
+        return FreeSpace(np.zeros((0, 3)), 0.0)
+    near = away <= FAR * spread
+    # The normal first: straight up from a floor, straight out of a wall.
+    origin = np.repeat(points[near], RAYS, axis=0)
+    normal = np.repeat(normals[near], RAYS, axis=0)
+    direction = _unit(rng.normal(size=origin.shape))
+    direction *= np.where((direction * normal).sum(axis=1, keepdims=True) < 0, -1, 1)
+    direction[::RAYS] = normal[::RAYS]
+    length = np.minimum(_distance(loaded, origin, direction, normal), REACH * spread)
+    places = origin + (rng.uniform(0.05, 0.95, len(origin)) * length)[:, None] * direction
+    places = rng.permutation(places)
+    places = places[_is_clear(loaded, places, CLEARANCE * spread)]
+    asked = rng.permutation(points[near])[:ASKED]
+    return FreeSpace(places[_seen_share(loaded, places, asked) >= LEAST_SEEN], spread)
+
+
+def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Floats:
+    """At most `count` of `places` (k, 3), each as far as can be from those before it.
+
+    start: (m, 3), places that are taken already.
+    """
+    if not len(places):
+        return places
+    chosen: list[int] = []
+    if start is None or not len(start):
+        # The one nearest to the middle of all.
+        start = np.median(places, axis=0, keepdims=True)
+        chosen = [int(np.argmin(np.linalg.norm(places - start, axis=1)))]
+        start = places[chosen]
+    distance = np.linalg.norm(places[:, None] - start[None], axis=2).min(axis=1)
+    while len(chosen) < min(count, len(places)):
+        k = int(np.argmax(distance))
+        if distance[k] <= 0:
+            break
+        chosen.append(k)
+        distance = np.minimum(distance, np.linalg.norm(places - places[k], axis=1))
+    return places[chosen]
+
+
+def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, float] | None]:
+    """Where in the picture each of `places` is, from (0, 0) top left to (1, 1); None if not in it.
+
+    None too for cameras that cannot tell, as orthographic ones.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    camera = scene.camera(loaded)
+    at = dr.zeros(mi.Interaction3f, len(places))
+    at.p = mi.Point3f(places.T.astype(np.float32))
+    try:
+        seen, _ = camera.sample_direction(at, mi.Point2f(0.5))
+    except RuntimeError:
+        return [None] * len(places)
+    inside = np.broadcast_to(np.array(seen.pdf) > 0, len(places))
+    height, width = scene.size
+    uv = np.array(seen.uv).reshape(2, -1).T / (width, height)
+    return [
+        (float(x), float(y)) if ok and 0 <= x <= 1 and 0 <= y <= 1 else None
+        for (x, y), ok in zip(uv, inside, strict=True)
+    ]
+
+
+def as_position(place: Floats) -> Position:
+    """A row of `places`."""
+    x, y, z = (float(v) for v in place)
+    return x, y, z
+
+
+def _visible(scene: Scene, loaded: Any, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Points that the camera sees, (k, 3), and their normals towards it, (k, 3)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    height, width = scene.size
+    rows = max(1, round(np.sqrt(POINTS * height / width)))
+    columns = max(1, POINTS // rows)
+    y, x = np.mgrid[:rows, :columns]
+    cells = np.stack([x.ravel(), y.ravel()]) + rng.random((2, rows * columns))
+    position = mi.Point2f((cells / [[columns], [rows]]).astype(np.float32))
+    camera = scene.camera(loaded)
+    ray, _ = camera.sample_ray(camera.shutter_open(), 0.5, position, mi.Point2f(0.5))
+    si = loaded.ray_intersect(ray)
+    normal = np.array(si.n * -dr.sign(dr.dot(si.n, ray.d))).T
+    valid = np.array(si.is_valid())
+    return np.array(si.p).T[valid].astype(np.float64), normal[valid].astype(np.float64)
+
+
+def _distance(loaded: Any, origin: Floats, direction: Floats, normal: Floats) -> Floats:
+    """How far it is from surface points to the next surface; inf for nowhere. All (k, 3)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    start = dr.zeros(mi.SurfaceInteraction3f, len(origin))
+    start.p = mi.Point3f(origin.T.astype(np.float32))
+    start.n = mi.Normal3f(normal.T.astype(np.float32))
+    ray = start.spawn_ray(mi.Vector3f(direction.T.astype(np.float32)))
+    return np.array(loaded.ray_intersect_preliminary(ray).t, dtype=np.float64)
+
+
+def _is_clear(loaded: Any, places: Floats, distance: float) -> Floats:
+    """(k,), whether nothing is nearer to a place than `distance`, in some directions around."""
+    import mitsuba as mi
+
+    clear = np.ones(len(places), dtype=bool)
+    # Points of a spiral on the sphere, which cover it evenly.
+    k = np.arange(AROUND) + 0.5
+    z, angle = 1 - 2 * k / AROUND, np.pi * (1 + np.sqrt(5)) * k
+    ring = np.sqrt(1 - z * z)
+    for towards in np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1):
+        ray = mi.Ray3f(mi.Point3f(places.T.astype(np.float32)), mi.Vector3f(*towards.tolist()))
+        ray.maxt = distance
+        clear &= ~np.array(loaded.ray_test(ray))
+    return clear
+
+
+def _seen_share(loaded: Any, places: Floats, points: Floats) -> Floats:
+    """(k,), the share of `points` (m, 3) that each place sees."""
+    import mitsuba as mi
+
+    start = np.repeat(places, len(points), axis=0)
+    # Not quite to the surface, so that it is not in its own way.
+    way = 0.999 * (np.tile(points, (len(places), 1)) - start)
+    ray = mi.Ray3f(mi.Point3f(start.T.astype(np.float32)), mi.Vector3f(way.T.astype(np.float32)))
+    ray.maxt = 1.0
+    hidden = np.array(loaded.ray_test(ray)).reshape(len(places), len(points))
+    return np.asarray(1 - hidden.mean(axis=1))
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

@@ -1,0 +1,255 @@
+"""Which light is missing? Point lights are tried all over the scene, and the best are named.
+
+Candidates stand in free space from which they shine on what the camera sees. The images of all
+of them are rendered in one pass, like a basis, on a small film; what each would take away of the
+miss is then a matter of algebra (solve/additional.py). Near the best a second pass looks closer.
+"""
+
+import gc
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import RGB, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.render import render_basis, why_not_one_pass
+from lightpaint.colour.photometry import Photometry, photometry, point_flux
+from lightpaint.errors import SceneError
+from lightpaint.images.blocks import whole_factor
+from lightpaint.lighting.solve import Solution
+from lightpaint.placement.additions import Addition, find_additions
+from lightpaint.placement.candidates import Candidates
+from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
+from lightpaint.progress import Progress, silent
+from lightpaint.relit.xml_edit import tag
+from lightpaint.scene.emitters import PLUGINS
+from lightpaint.scene.lights import free_names
+from lightpaint.scene.parsed import Position
+from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.resolution import reductions
+from lightpaint.scene.scene import Scene
+
+#: Suggestions that are made where no number is given.
+SUGGESTED = 3
+
+#: Positions that are tried: all over, near the best of these, nearer, and the best once more,
+#: with all samples for them. Fewest on a film that cannot be made small.
+TRIED, FEWEST = (96, 48, 24, 0), 8
+
+#: How many more than are asked for are looked at closer: the best of few is not near the best.
+BESIDE = 5
+
+#: Pixels of the film that candidates are rendered on, where it can be reduced; values of all
+#: their images; camera samples of a pass.
+PIXELS, VALUES, SAMPLES = 2**14, 2**24, 2**19
+
+#: What is missed of a painting, RMS, below which its lights can do it.
+NOTHING_MISSED = 0.01
+
+#: Gains below this share of the miss are not worth a light.
+SMALLEST_SHARE = 0.01
+
+#: Distance that two suggestions have at least, over the spread of what is seen.
+APART = 0.25
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A point light to add to the scene.
+
+    position: in units of the scene. emission: intensity per channel, W/sr.
+    gain_share: of what is missed (energy), what this light takes away beside those before it.
+    missed_share: what is left of it, with this light and those before it.
+    xml: the emitter, to be put into the scene's XML as it is.
+    seen_at: where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
+    without, with_it: (h, w, 3) linear, the solved picture before and with this light, small.
+    """
+
+    name: str
+    position: Position
+    emission: RGB
+    gain_share: float
+    missed_share: float
+    xml: str
+    seen_at: tuple[float, float] | None
+    without: Floats = field(repr=False, compare=False)
+    with_it: Floats = field(repr=False, compare=False)
+
+    def photometry(self, cd_per_unit: float | None = None) -> Photometry:
+        """Its colour, and how much light it is."""
+        flux = point_flux()
+        unit_flux = (flux, flux, flux)
+        unit = PLUGINS["point"][1]
+        return photometry(self.emission, unit=unit, unit_flux=unit_flux, cd_per_unit=cd_per_unit)
+
+
+def check_suggestible(scene: Scene) -> None:
+    """Raise SceneError for a scene that no lights can be suggested for, before it renders."""
+    if reason := why_not_one_pass(scene):
+        raise SceneError(
+            f"--suggest renders many lights in one pass, and {reason}: leave it out, or use "
+            "the integrator path and a variant like llvm_ad_rgb"
+        )
+
+
+def suggest_lights(
+    scene: Scene,
+    basis: Basis,
+    solution: Solution,
+    *,
+    count: int = SUGGESTED,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> tuple[Suggestion, ...]:
+    """Point lights that would bring `solution` closest to its painting, the best first.
+
+    scene: what `basis` was made of, on the same film or a larger one. count: at most so many;
+    none where nothing is missed, or no light would surely take a hundredth of it away.
+    seed: of the positions and of their images.
+
+    Raises SceneError for scenes that one pass cannot serve (see `check_suggestible`).
+    """
+    if count < 1:
+        raise SceneError(f"--suggest {count}: ask for one light or more")
+    check_suggestible(scene)
+    norm2 = float(solution.norm2.sum())
+    if sum(solution.quality.objective) <= NOTHING_MISSED**2 * norm2:
+        return ()
+    # The gains are of the last linear problem, which may be on another scale.
+    total = solution.energy
+    small = _on_small_film(scene, basis)
+    space = _look_around(small, seed)
+    if not len(space.places):
+        return ()
+    best: Floats = np.zeros((0, 3))
+    radius = np.inf
+    additions: list[Addition] = []
+    progress("candidates", 0, len(TRIED))
+    for k, tried in enumerate(TRIED):
+        places = _places(space, best, radius, _most(small, tried))
+        lit = _render(small, places, pass_seed(seed, Stream.CANDIDATES, 1 + k))
+        is_last = k + 1 == len(TRIED)
+        additions = find_additions(
+            Candidates.of(basis, solution, lit),
+            count=count if is_last else count + BESIDE,
+            least=SMALLEST_SHARE * total if is_last else 0.0,
+            # Few samples, and far from the best places: only the last pass can promise.
+            surely=is_last,
+            too_near=_too_near(places, space),
+        )
+        progress("candidates", k + 1, len(TRIED))
+        if not additions:
+            break
+        best = places[[addition.candidate for addition in additions]]
+        radius = _spacing(places) if k == 0 else radius / 2
+    return _suggestions(scene, additions, best, total) if additions else ()
+
+
+def _on_small_film(scene: Scene, basis: Basis) -> Scene:
+    """`scene` on a film that is a whole part of that of `basis`, as near to PIXELS as can be."""
+    height, width = scene.size
+    fitting = [
+        k
+        for k in reductions(scene.view)
+        if whole_factor(basis.size, (height // k, width // k)) is not None
+    ]
+    if not fitting:
+        raise SceneError(
+            f"the basis is {basis.size[1]}x{basis.size[0]}, which is no whole part of the film "
+            f"of {scene.path}, {width}x{height}: make it again"
+        )
+    enough = (k for k in fitting if height * width <= PIXELS * k * k)
+    return scene.reduced(f"1/{next(enough, fitting[-1])}")
+
+
+def _most(small: Scene, tried: int) -> int:
+    """How many of `tried` positions fit at once."""
+    height, width = small.size
+    return min(tried, max(VALUES // (height * width * 3), FEWEST))
+
+
+def _look_around(scene: Scene, seed: int) -> FreeSpace:
+    loaded = scene.load()
+    try:
+        return free_space(scene, loaded, seed=seed)
+    finally:
+        del loaded
+        gc.collect()
+
+
+def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats:
+    """The best so far, and `count` positions more within `radius` of these, far apart."""
+    if not len(best):
+        return far_apart(space.places, count)
+    near = [best]
+    for place in best:
+        its = space.places[np.linalg.norm(space.places - place, axis=1) < radius]
+        near.append(far_apart(its, count // len(best), start=np.concatenate(near)))
+    return np.concatenate(near)
+
+
+def _spacing(places: Floats) -> float:
+    """Median distance from one to the next."""
+    between = np.linalg.norm(places[:, None] - places[None], axis=2)
+    np.fill_diagonal(between, np.inf)
+    return float(np.median(between.min(axis=1)))
+
+
+def _too_near(places: Floats, space: FreeSpace) -> npt.NDArray[np.bool_]:
+    between = np.linalg.norm(places[:, None] - places[None], axis=2)
+    return np.asarray(between < APART * space.spread)
+
+
+def _render(small: Scene, places: Floats, seed: int) -> Basis:
+    height, width = small.size
+    spp = max(4, SAMPLES // (height * width))
+    lit = small.lit_by_points([as_position(place) for place in places])
+    return render_basis(lit, spp=spp, seed=seed)
+
+
+def _suggestions(
+    scene: Scene,
+    additions: Sequence[Addition],
+    places: Floats,
+    total: float,
+) -> tuple[Suggestion, ...]:
+    loaded = scene.load()
+    try:
+        seen = pixels_of(scene, loaded, places)
+    finally:
+        del loaded
+        gc.collect()
+    names = free_names("suggested", len(additions), [x.name for x in scene.emitters])
+    made = []
+    missed = total
+    for k, addition in enumerate(additions):
+        missed -= addition.gain
+        r, g, b = (float(f"{v:.4g}") for v in addition.weights[-1])
+        x, y, z = (float(f"{v:.6g}") for v in places[k])
+        made.append(
+            Suggestion(
+                name=names[k],
+                position=(x, y, z),
+                emission=(r, g, b),
+                gain_share=addition.gain / total,
+                missed_share=max(missed, 0.0) / total,
+                xml=emitter_xml(names[k], (x, y, z), (r, g, b)),
+                seen_at=seen[k],
+                without=addition.without,
+                with_it=addition.with_it,
+            )
+        )
+    return tuple(made)
+
+
+def emitter_xml(name: str, position: Position, intensity: RGB) -> str:
+    """A point light as an element to be put directly into <scene>."""
+    x, y, z = (f"{v:g}" for v in position)
+    lines = [
+        tag("point", name="position", x=x, y=y, z=z),
+        tag("rgb", name="intensity", value=" ".join(f"{v:g}" for v in intensity)),
+    ]
+    inner = "".join(f"    {line}\n" for line in lines)
+    return f'<emitter type="point" id="{name}">\n{inner}</emitter>'

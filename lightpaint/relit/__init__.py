@@ -1,0 +1,1 @@
+"""Does the scene really look like that? The relit XML, and an independent render of it."""

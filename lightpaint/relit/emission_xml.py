@@ -1,0 +1,119 @@
+"""The emission of one light, written into its element of the scene XML."""
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Floats
+from lightpaint.errors import SceneError
+from lightpaint.relit.xml_edit import Element, XmlFile, tag
+from lightpaint.scene.emitters import AS_AUTHORED, Scaling
+from lightpaint.scene.lights import Emitter
+from lightpaint.scene.scene import Scene
+
+
+@dataclass
+class Changes:
+    """Children of one element to be replaced, or inserted where there are none yet."""
+
+    xml: XmlFile
+    element: Element
+    _missing: list[str] = field(default_factory=list)
+
+    def set(self, kind: str, name: str, value: str) -> None:
+        """Give the element a child `<kind name=… value=…/>`, in the place of its namesake.
+
+        name: in snake_case; a namesake keeps its spelling, for Mitsuba refuses a mixture.
+        """
+        child = self._child_named(name)
+        if child is None:
+            self._missing.append(tag(kind, name=name, value=value))
+        else:
+            self.xml.replace(child, tag(kind, name=child.attributes["name"], value=value))
+
+    def number(self, name: str, otherwise: float) -> float:
+        """The number that stands in the child called `name` now, or `otherwise`."""
+        child = self._child_named(name)
+        text = child.attributes.get("value", "") if child is not None else f"{otherwise}"
+        try:
+            return float(text)
+        except ValueError:
+            raise SceneError(
+                f"cannot scale {name}={text!r}: write a number in the place of the parameter"
+            ) from None
+
+    def child(self, name: str) -> "Changes":
+        """Changes to the child called `name`, which must be an element of its own."""
+        child = self._child_named(name)
+        if child is None or child.tag == "ref":
+            raise SceneError(
+                f"the {name} of a light is given by reference, and others may share it: write "
+                f"the texture into the light itself"
+            )
+        return Changes(self.xml, child)
+
+    def _child_named(self, name: str) -> Element | None:
+        """The child of that name, or None if there is certainly none."""
+        child = self.element.child_named(name)
+        unknown = next((c for c in self.element.children if "$" in c.name), None)
+        if child is None and unknown is not None:
+            spelt = unknown.attributes["name"]
+            raise SceneError(
+                f"{self.xml.place_of(unknown)}: <{unknown.tag} name={spelt!r}> in "
+                f"{self._title()} may be its {name}: write the name in the place of the parameter"
+            )
+        return child
+
+    def _title(self) -> str:
+        given = self.element.attributes
+        id_or_name = given.get("id") or given.get("name") or given.get("type", "")
+        return f"<{self.element.tag}> {id_or_name!r}"
+
+    def finish(self) -> None:
+        """Hand the insertions on; call once, last."""
+        if self._missing:
+            self.xml.insert_first(self.element, self._missing)
+
+
+def write_emission(
+    changes: Changes, scene: Scene, emitter: Emitter, rgb: RGB, *, stem: str
+) -> dict[str, Floats]:
+    """Set the emission of `emitter` to `rgb`, in the unit of its kind.
+
+    stem: what the names of images begin with.
+
+    Returns the images, (h, w, 3) linear, that have to lie beside the relit scene, by file name.
+    """
+    kind = emitter.kind
+    assert kind is not None  # what cannot be scaled is never set
+    if kind.scaling is Scaling.COLOUR:
+        changes.set("rgb", kind.parameter, " ".join(f"{np.float32(v):.9g}" for v in rgb))
+    elif kind.scaling is Scaling.FACTORS:
+        holder = changes if emitter.plugin == "sunsky" else changes.child(kind.parameter)
+        for factor in kind.factors:
+            holder.set("float", factor, f"{holder.number(factor, 1.0) * rgb[0]:.9g}")
+        if holder is not changes:
+            holder.finish()
+    elif emitter.plugin != "area" and len(set(rgb)) == 1:
+        changes.set("float", "scale", f"{changes.number('scale', 1.0) * rgb[0]:.9g}")
+    elif not any(rgb):
+        changes.set("rgb", kind.parameter, "0 0 0")
+    elif rgb != AS_AUTHORED:
+        return _scale_image(changes, scene, emitter, kind.parameter, rgb, stem)
+    return {}
+
+
+def _scale_image(
+    changes: Changes, scene: Scene, emitter: Emitter, parameter: str, rgb: RGB, stem: str
+) -> dict[str, Floats]:
+    """Scale the image of `emitter` by `rgb` and refer to the result."""
+    # The number keeps apart what a file name cannot: names differ in any character.
+    safe = re.sub(r"[^\w-]+", "_", emitter.name)
+    name = f"{stem}.{scene.emitters.index(emitter)}.{safe}.exr"
+    holder = changes if emitter.plugin == "envmap" else changes.child(parameter)
+    holder.set("string", "filename", name)
+    if holder is not changes:
+        holder.set("boolean", "raw", "true")
+        holder.finish()
+    return {name: scene.emitted_image(emitter) * np.asarray(rgb, np.float32)}

@@ -1,0 +1,102 @@
+"""The answer, in the forms that other programs take: table, Blender, Nuke, image."""
+
+import csv
+import io
+import math
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.colour.color import luminance
+from lightpaint.files import write_text
+from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.lighting.lighting import Lighting, LightSetting
+from lightpaint.relit.export.nuke import nuke_script
+
+#: Everything that `write_exports` may write.
+EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", "relit.exr")
+
+#: Renderers whose answer a Blender script may take; `--pattern` may be of Blender as well.
+BLENDER = ("Blender", "--pattern")
+
+#: The largest finite float16.
+LARGEST_HALF = 65504.0
+
+
+def write_exports(folder: Path, groups: LightGroups, lighting: Lighting) -> list[Path]:
+    """Write `lighting`, solved from `groups`, into `folder` for other programs.
+
+    lights.csv, a table of multipliers; set_lights.py for Blender's light groups, unless another
+    renderer made the file; relit.nk for Nuke; relit.exr, the sum with these multipliers.
+    Returns the files. Raises LightingError if `lighting` is of other lights, OutputError.
+    """
+    folder = Path(folder)
+    texts = {"lights.csv": lights_table(groups, lighting)}
+    if groups.renderer.startswith(BLENDER):
+        texts["set_lights.py"] = blender_script(groups, lighting)
+    texts["relit.nk"] = nuke_script(groups, lighting)
+    parts = [relit_part(groups, lighting)]
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    write_parts(folder / "relit.exr", parts)
+    return [folder / name for name in EXPORTS if name in texts or name == "relit.exr"]
+
+
+def lights_table(groups: LightGroups, lighting: Lighting) -> str:
+    """CSV: name, layer, multipliers, and what they do to the luminance of a white light."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["light", "layer", "red", "green", "blue", "luminance", "stops", "kept"])
+    layers = {
+        light.name: layer.name
+        for light, layer in zip(groups.basis.lights, groups.layers, strict=False)
+    }
+    for light in lighting.lights:
+        y = float(luminance(np.array(light.weight)))
+        stops = f"{math.log2(y):+.3f}" if y > 0 else "off"
+        numbers = [f"{v:.9g}" for v in (*light.weight, y)]
+        kept = "yes" if light.is_fixed else "no"
+        table.writerow([light.name, layers.get(light.name, ""), *numbers, stops, kept])
+    return text.getvalue()
+
+
+def blender_script(groups: LightGroups, lighting: Lighting) -> str:
+    """Python for Blender that multiplies what is in each light group."""
+    rows = [f"    {light.name!r}: {_tuple(light)},\n" for light in _free(lighting)]
+    template = resources.files("lightpaint.relit.export").joinpath("set_lights.py.in")
+    return Template(template.read_text(encoding="utf-8")).substitute(
+        target=_in_docstring(lighting.target),
+        source=_in_docstring(groups.path.name),
+        multipliers="{\n" + "".join(rows) + "}",
+        render=repr(groups.basis.origin.scene_identity),
+    )
+
+
+def relit_part(groups: LightGroups, lighting: Lighting) -> Part:
+    """Σ multiplier × layer, with the rest and the alpha of the beauty, as precise as the file."""
+    image = groups.basis.mix(lighting.weights_for(groups.basis))
+    channels = rgb_channels(image)
+    if groups.beauty is not None and groups.beauty.alpha is not None:
+        channels["A"] = groups.beauty.alpha.astype(np.float32)
+    if groups.is_half:
+        channels = {
+            name: np.clip(pixels, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)
+            for name, pixels in channels.items()
+        }
+    return Part("relit", channels)
+
+
+def _free(lighting: Lighting) -> list[LightSetting]:
+    return [light for light in lighting.lights if not light.is_fixed]
+
+
+def _tuple(light: LightSetting) -> str:
+    return "(" + ", ".join(f"{v:.9g}" for v in light.weight) + ")"
+
+
+def _in_docstring(text: str) -> str:
+    """A name from elsewhere that cannot end the string it stands in."""
+    return repr(text).replace('"', "'").replace("\\", "/")

@@ -1,0 +1,208 @@
+"""Writing a lighting back into the user's own scene XML.
+
+The original text is edited, not written anew, so that comments, includes and defaults
+survive and a diff shows the lights and nothing else.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Floats
+from lightpaint.errors import LightingError, OutputError, SceneError
+from lightpaint.files import write_bytes
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.relit.emission_xml import Changes, write_emission
+from lightpaint.relit.xml_edit import XmlFile, tag
+from lightpaint.scene.emitters import Scaling
+from lightpaint.scene.lights import Emitter
+from lightpaint.scene.scene import Scene, load_scene
+
+
+def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
+    """Write `scene` with the emissions of `lighting` to `path`, and load it back.
+
+    The file refers to the original folder by relative path, so it loads in plain Mitsuba
+    from where it lies. Included files that hold lights are copied beside it, and so are
+    scaled images of lights that emit one. A light that is off keeps its emitter, is black
+    and is never sampled.
+
+    Which emitters make up each light is what `lighting` says, however `scene` ties them;
+    those it keeps are not touched. In the scene returned every emitter is a light.
+
+    Raises LightingError if the two name different emitters, SceneError where the XML cannot
+    express the answer, OutputError if `path` cannot be written.
+    """
+    path = Path(path)
+    scene = scene_of(scene, lighting)
+    for file, content in relit_files(scene, lighting.emission, path).items():
+        if isinstance(content, bytes):
+            write_bytes(file, content)
+        else:
+            write_rgb(file, content)
+    relit = load_scene(path, sensor=scene.sensor, use_lights_file=False)
+    taken = {emitter.name: emitter.emission for emitter in relit.emitters}
+    for emitter, wanted in _settings(scene, lighting.emission):
+        if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
+            continue  # as authored means something else there
+        if not np.array_equal(
+            np.asarray(wanted, np.float32), np.asarray(taken[emitter.name], np.float32)
+        ):
+            raise SceneError(f"{path} did not take the emission of light {emitter.name!r}")
+    return relit
+
+
+def check_relightable(scene: Scene, path: Path) -> list[Path]:
+    """Raise what `relight` would raise for some lighting, before a render is paid for.
+
+    Returns the files that it would write at most.
+
+    The probe is a colour that no light has, so that every light needs all it may need.
+    """
+    probe: dict[str, RGB] = {
+        light.name: (0.5, 0.5, 0.5) if light.is_scalar else (0.5, 0.25, 0.125)
+        for light in scene.lights
+        if not light.is_fixed
+    }
+    return list(relit_files(scene, probe, path))
+
+
+def scene_of(scene: Scene, lighting: Lighting) -> Scene:
+    """`scene` with its emitters tied as `lighting` ties them.
+
+    Raises LightingError unless it names exactly the emitters of `scene`, and gives each light
+    in the unit that the scene has it in.
+    """
+    given = {name for members in lighting.members.values() for name in members}
+    there = {emitter.name for emitter in scene.emitters}
+    if given != there:
+        raise LightingError(
+            f"the lighting does not fit {scene.path}: it lacks "
+            f"{', '.join(sorted(there - given)) or 'no light'} and names "
+            f"{', '.join(sorted(given - there)) or 'none'} that the scene has not"
+        )
+    tied = scene.with_lights(lighting.members, lighting.fixed)
+    for setting in lighting.lights:
+        if (unit := tied.light(setting.name).unit) != setting.unit:
+            raise LightingError(
+                f"the lighting has light {setting.name!r} in {setting.unit}, but in {scene.path} "
+                f"as it is now it would be {unit}: solve again"
+            )
+    return tied
+
+
+def _settings(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
+    """What each emitter that is adjusted is set to. emission: by name of light."""
+    for light in scene.lights:
+        if not light.is_fixed:
+            for member in light.members:
+                yield member, light.emission_of(member, emission[light.name])
+
+
+@dataclass
+class _Edits:
+    """What changes in one file: the settings of the emitters in it, by byte offset."""
+
+    original: Path
+    settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
+
+
+def relit_files(
+    scene: Scene, emission: Mapping[str, RGB], path: Path
+) -> dict[Path, bytes | Floats]:
+    """Content of the relit XML at `path`, and of the includes and images it needs beside it.
+
+    Raises OutputError if one of them would take the place of a file of the scene itself.
+    """
+    root = scene.files[0]
+    edits = {root.resolve(): _Edits(root)}
+    changed = dict(_settings(scene, emission))
+    kept = [emitter for emitter in scene.emitters if emitter not in changed]
+    # Mitsuba refuses a scene in which no emitter may be sampled.
+    sampled = any(any(rgb) and not emitter.by_chance for emitter, rgb in changed.items())
+    sampled = sampled or any(emitter.sampling_weight for emitter in kept)
+    for emitter, rgb in changed.items():
+        file = scene.files[emitter.file]
+        setting = (emitter, rgb, _sampling_weight(emitter, rgb, sampled))
+        here = edits.setdefault(file.resolve(), _Edits(file)).settings
+        if emitter.offset in here and here[emitter.offset][1:] != setting[1:]:
+            raise _included_twice(file, here[emitter.offset][0], emitter)
+        here[emitter.offset] = setting
+    for emitter in kept:
+        file = scene.files[emitter.file]
+        here = edits.get(file.resolve(), _Edits(file)).settings
+        if emitter.offset in here:
+            raise _included_twice(file, here[emitter.offset][0], emitter)
+
+    written: dict[Path, bytes | Floats] = {}
+    for edit in edits.values():
+        is_root = edit.original == root
+        target = path if is_root else path.parent / _place_of_include(edit.original, root)
+        defaults = scene.parameters if is_root else {}
+        content, images = _edit(edit, target.parent, scene, path.stem, defaults)
+        # Mitsuba looks for images beside the scene, also for those of an included file.
+        written |= {path.parent / name: image for name, image in images.items()}
+        written[target] = content
+    originals = {file.resolve() for file in scene.originals}
+    if taken := [file for file in written if file.resolve() in originals]:
+        raise OutputError(
+            f"{taken[0]} belongs to the scene itself: write the relit scene to another folder"
+        )
+    return written
+
+
+def _included_twice(file: Path, one: Emitter, other: Emitter) -> SceneError:
+    return SceneError(
+        f"{file} is included more than once, and its light would have to be both "
+        f"{one.name!r} and {other.name!r} with different emissions: "
+        "include two copies of it, or tie the two into a group"
+    )
+
+
+def _sampling_weight(emitter: Emitter, rgb: RGB, sampled: bool) -> float | None:
+    """The sampling weight to write, or None to leave it as it is.
+
+    sampled: whether any other emitter is: Mitsuba refuses a scene in which none may be.
+    """
+    if any(rgb) and not (emitter.by_chance and sampled):
+        return 1.0 if emitter.sampling_weight == 0 else None
+    return 0.0 if sampled else None
+
+
+def _place_of_include(file: Path, root: Path) -> Path:
+    """Where the edited copy must lie, relative to relit.xml, to be found first."""
+    try:
+        return file.resolve().relative_to(root.resolve().parent)
+    except ValueError:
+        raise SceneError(
+            f"{file} holds lights but lies outside the folder of {root}, so an edited copy of it "
+            "would not be found: move it below that folder"
+        ) from None
+
+
+def _edit(
+    edit: _Edits, folder: Path, scene: Scene, stem: str, defaults: Mapping[str, str]
+) -> tuple[bytes, dict[str, Floats]]:
+    """The edited XML, to be written into `folder`, and the images it refers to, by name.
+
+    stem: what the names of the images begin with.
+    """
+    xml = XmlFile(edit.original)
+    if xml.root.tag == "scene":
+        # Assets and includes lie where the original lies; the first default wins.
+        origin = os.path.relpath(edit.original.resolve().parent, folder.resolve())
+        lines = [tag("path", value=Path(origin).as_posix())]
+        lines += [tag("default", name=k, value=v) for k, v in defaults.items()]
+        xml.insert_first(xml.root, lines)
+    images: dict[str, Floats] = {}
+    for offset, (emitter, rgb, weight) in edit.settings.items():
+        changes = Changes(xml, xml.element_at(offset))
+        if weight is not None:
+            changes.set("float", "sampling_weight", f"{weight:g}")
+        images |= write_emission(changes, scene, emitter, rgb, stem=stem)
+        changes.finish()
+    return xml.edited(), images

@@ -1,0 +1,1 @@
+"""What a person looks at: pictures, tables and sentences about a result. It solves nothing."""

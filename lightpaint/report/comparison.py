@@ -1,0 +1,175 @@
+"""comparison.png: target | predicted | verified | residual, side by side."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.display import to_8_bit
+from lightpaint.files import write_bytes
+from lightpaint.images.blocks import block_mean, enlarged
+from lightpaint.images.png import png_bytes
+from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.solve import Solution
+from lightpaint.report.pictures import (
+    diverging,
+    painted,
+    residual_limit,
+    residual_picture,
+    spoken_view,
+    target_picture,
+    view_of,
+)
+from lightpaint.report.verdict import relative_residual
+from lightpaint.target.target import Target
+
+#: Narrower images are enlarged, pixel by pixel, until their captions can be read.
+NARROWEST = 240
+#: Pillow's own font has little beyond Latin-1: no minus, no Greek.
+SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One of the pictures, (h, w, 3) in display values, and what stands below it.
+
+    limit: end of its false-colour scale, drawn as a bar, if it has one.
+    """
+
+    title: str
+    detail: str
+    picture: Floats
+    limit: float | None = None
+
+
+def comparison_image(
+    *,
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Floats,
+    verified: Floats | None,
+) -> npt.NDArray[np.uint8]:
+    """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
+
+    predicted, verified: (h, w, 3) linear, the latter possibly larger by a whole factor; what
+    is smaller is shown with larger pixels. Three pictures where `verified` is None. The
+    residual is false-coloured luminance of prediction minus target; pixels that do not
+    count are grey, dim and hatched. Raises SizeError if target and basis differ in size.
+    """
+    target = target.fitted_to(basis.size, resize=False)
+    current = combine(basis, Lighting.present(basis)).image
+    view = view_of(target, predicted, verified)
+    share = float(painted(target, solution).mean())
+    at = f" ({spoken_view(view)})" if spoken_view(view) else ""
+    tiles = [
+        Tile(
+            f"target: {target.name}",
+            f"{_percent(share)} painted{', the rest hatched' if share < 0.995 else ''}",
+            target_picture(target, solution, current, view=view),
+        ),
+        Tile(
+            f"predicted{at}",
+            f"misses {_percent(relative_residual(solution))} of the target (RMS, with noise)",
+            view.encode(predicted),
+        ),
+    ]
+    if verified is not None:
+        factor = verified.shape[0] // predicted.shape[0]
+        gap = predicted.astype(np.float64) - block_mean(verified, factor)
+        rmse = float(np.sqrt(np.square(gap).mean()))
+        tiles.append(
+            Tile(
+                f"verified{at}",
+                f"independent render, {rmse:.2g} RMS off the prediction",
+                view.encode(verified),
+            )
+        )
+    limit = residual_limit(solution, predicted, view=view)
+    picture = residual_picture(solution, predicted, current, view=view, limit=limit)
+    tiles.append(Tile("residual", "luminance, predicted - target", picture, limit))
+    return compose(tiles)
+
+
+def write_comparison(
+    path: Path,
+    *,
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Floats,
+    verified: Floats | None,
+) -> None:
+    """Write `comparison_image` as PNG, whole or not at all."""
+    image = comparison_image(
+        basis=basis, target=target, solution=solution, predicted=predicted, verified=verified
+    )
+    write_bytes(path, png_bytes(image))
+
+
+def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
+    """Tiles in a row on neutral grey, captions below. Returns (H, W, 3).
+
+    The size of the largest tile is a whole multiple of the others'.
+    """
+    height, width = max(tile.picture.shape[:2] for tile in tiles)
+    zoom = max(1, -(-NARROWEST // width))
+    height, width = height * zoom, width * zoom
+    text = min(max(width // 24, 12), 28)
+    gap = text
+    size = (gap + len(tiles) * (width + gap), gap + height + 4 * text)
+    sheet = Image.new("RGB", size, SURROUND)
+    for k, tile in enumerate(tiles):
+        x = gap + k * (width + gap)
+        picture = enlarged(to_8_bit(tile.picture), width // tile.picture.shape[1])
+        sheet.paste(Image.fromarray(picture), (x, gap))
+        _caption(ImageDraw.Draw(sheet), tile, (x, gap + height + text // 2), width, text)
+        if tile.limit is not None:
+            _scale_bar(sheet, tile.limit, (x, gap + height + text // 2), width, text)
+    return np.asarray(sheet)
+
+
+def _caption(
+    draw: ImageDraw.ImageDraw, tile: Tile, corner: tuple[int, int], width: int, text: int
+) -> None:
+    x, y = corner
+    title, small = ImageFont.load_default(text), ImageFont.load_default(round(0.8 * text))
+    # The residual's upper line leaves its right half to the scale bar.
+    room = width if tile.limit is None else width // 3
+    draw.text((x, y), _fitted(tile.title, title, room), TEXT, title)
+    draw.text((x, y + round(1.5 * text)), _fitted(tile.detail, small, width), FAINT, small)
+
+
+def _scale_bar(
+    sheet: Image.Image, limit: float, corner: tuple[int, int], width: int, text: int
+) -> None:
+    """A bar from −limit to +limit in the right part of the caption, its ends in numbers."""
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(round(0.8 * text))
+    low, high = f"too dark -{limit:g}", f"+{limit:g} too bright"
+    right = corner[0] + width
+    x = right - round(draw.textlength(high, font))
+    draw.text((x, corner[1] + text // 5), high, FAINT, font)
+    length = width // 6
+    bar = to_8_bit(diverging(np.linspace(-1, 1, length)))[None].repeat(round(0.7 * text), axis=0)
+    x -= length + text // 3
+    sheet.paste(Image.fromarray(bar), (x, corner[1] + round(0.3 * text)))
+    x -= round(draw.textlength(low, font)) + text // 3
+    draw.text((x, corner[1] + text // 5), low, FAINT, font)
+
+
+def _fitted(words: str, font: Any, width: int) -> str:
+    """`words`, cut short with … where they are wider than `width` pixels."""
+    if font.getlength(words) <= width:
+        return words
+    while words and font.getlength(words + "…") > width:
+        words = words[:-1]
+    return words.rstrip() + "…"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.1f} %"

@@ -1,0 +1,107 @@
+"""The part of the report on what constraints cost the picture. Returns HTML."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.view import View
+from lightpaint.images.blocks import block_mean
+from lightpaint.lighting.solve import Solution, solution_of
+from lightpaint.report.figures import Picture, figure
+from lightpaint.report.sentences import spoken_percent
+from lightpaint.report.verdict import relative_residual
+
+#: Width in pixels that the pictures are reduced to, by a whole factor: this to twice this.
+WIDTH = 320
+
+#: How many lights fewer and more than asked for have their picture.
+AROUND = 2
+
+
+def constraints_section(basis: Basis, solution: Solution, *, view: View) -> str:
+    """The best lighting without constraints beside the one as asked, both from the basis.
+
+    With `sparse`, what other numbers of lights would miss. Empty where nothing is asked, and for
+    one of several views, whose lighting answers the others too.
+    """
+    if not solution.constraints or solution.is_one_of_several:
+        return ""
+    start = solution.lighting.weights_for(basis)
+    anew = replace(solution, constraints=None, method="polished", reweighting=None)
+    free = solution_of(basis, anew, start=start)
+    without, asked = (spoken_percent(relative_residual(x)) for x in (free, solution))
+    pictures = [
+        (free.lighting.weights_for(basis), "Without constraints", f"{without} missed."),
+        (start, "As asked", f"{asked} missed."),
+    ]
+    return (
+        '<section><h2>What the constraints cost</h2><div class="explained"><div>'
+        f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
+        f"painted light (RMS). As asked, they miss {asked}. Both pictures are sums of the "
+        f"basis images.</p></div>{_curve(solution, free)}</div>"
+        f'<div class="maps">{_figures(basis, pictures, view)}{_numbers(basis, solution, view)}'
+        "</div></section>"
+    )
+
+
+def _curve(solution: Solution, free: Solution) -> str:
+    """With `sparse`, what is missed by number of lights."""
+    curve = solution.quality.curve
+    if not curve:
+        return ""
+    used = _used(solution)
+    rows = [
+        _row(f"{_lights(count)}{', as asked' if count == used else ''}", missed)
+        for count, missed in curve
+    ]
+    rows.append(_row("without constraints", relative_residual(free)))
+    return (
+        '<table><thead><tr><th scope="col">lights on, the best that were found</th>'
+        f'<th scope="col">missed</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+    )
+
+
+def _row(what: str, missed: float) -> str:
+    return (
+        f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(missed)}</span>'
+        '<div class="bar" aria-hidden="true">'
+        f'<i style="width: {100 * min(missed, 1.0):.2f}%"></i></div></td></tr>'
+    )
+
+
+def _numbers(basis: Basis, solution: Solution, view: View) -> str:
+    """With `sparse`, pictures with fewer and with more lights."""
+    used, missed_with = _used(solution), dict(solution.quality.curve)
+    pictures = [
+        (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
+        for count, weights in solution.tried
+        if count in missed_with and 0 < abs(count - used) <= AROUND
+    ]
+    return _figures(basis, pictures, view)
+
+
+def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], view: View) -> str:
+    """Pictures of weights (n, 3), each with its name and a caption."""
+    height, width = basis.size
+    factor = max(1, width // WIDTH)
+    whole = (slice(height // factor * factor), slice(width // factor * factor))
+    figures = []
+    for weights, name, caption in pictures:
+        # What does not make a whole block at the border is left out; it is for looking at.
+        image = block_mean(basis.mix(weights)[whole], factor)
+        pixels = view.encode(np.asarray(image, np.float32))
+        figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
+    return "".join(figures)
+
+
+def _used(solution: Solution) -> int:
+    """The number of lights of the curve that the answer has."""
+    assert solution.constraints is not None
+    most = solution.constraints.sparse or 0
+    return max((count for count, _ in solution.quality.curve if count <= most), default=0)
+
+
+def _lights(count: int) -> str:
+    return f"{count} light{'' if count == 1 else 's'}"

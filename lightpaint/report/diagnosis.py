@@ -1,0 +1,206 @@
+"""The parts of the report on how sure the answer is and what is missed. Each returns HTML."""
+
+from html import escape
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
+from lightpaint.colour.view import View
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.solve import Solution
+from lightpaint.report.figures import SIGNED, Picture, figure, scale
+from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
+from lightpaint.report.sentences import (
+    how_sure,
+    relative_errors,
+    spoken_hold,
+    spoken_percent,
+    what_is_missed,
+)
+from lightpaint.report.verdict import energy_shares
+
+#: Rows of a table, beyond which only those that matter most are shown.
+ROWS = 8
+
+#: Bounds with a smaller share of the miss are not worth a row.
+SMALLEST_GAIN = 0.002
+
+
+def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> str:
+    """How far noise may have moved the answer: a sentence, and the lights it matters for."""
+    if uncertainty is None:
+        return ""
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
+    low, high = (luminance(end) for end in uncertainty.interval)
+    effect = np.where(np.isfinite(errors), errors, 0) * shares
+    # Those that are off and may be on come behind, by how bright they may be.
+    order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
+    rows = [
+        f'<tr><th scope="row">{escape(basis.names[k])}</th>'
+        f"<td>{float(luminance(uncertainty.weights[k])):.3g}</td>"
+        f"<td>{low[k]:.3g} … {high[k]:.3g}</td>"
+        f"<td>{f'± {spoken_percent(float(errors[k]))}' if np.isfinite(errors[k]) else '–'}</td>"
+        f"<td>{f'± {spoken_percent(float(effect[k]))}' if effect[k] else '–'}</td></tr>"
+        for k in order[:ROWS]
+        if errors[k] > 0
+    ]
+    more = int((errors > 0).sum()) - len(rows)
+    others = f" {more} lights that matter less are left out." if more > 0 else ""
+    return (
+        '<section><h2>How sure</h2><div class="explained">'
+        f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
+        "<p>The table shows the brightness of each light, and between which values many samples "
+        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
+        "yet make up for each other in the picture: together these errors miss about "
+        f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).{others}</p>"
+        f"{_steps(solution)}</div>"
+        '<table><thead><tr><th scope="col">light</th><th scope="col">solved</th>'
+        '<th scope="col">95 % between</th><th scope="col">of it</th>'
+        f'<th scope="col">of the picture</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+        "</div></section>"
+    )
+
+
+def _steps(solution: Solution) -> str:
+    """What was done against noise, besides sampling."""
+    steps = []
+    if solution.noise_removed:
+        steps.append(
+            f"{spoken_percent(solution.noise_removed)} of the noise's power in the "
+            "equations was taken out of them"
+        )
+    if solution.refinement is not None:
+        steps.append(
+            "the answer was refined by a render of the mix, which decided "
+            f"{spoken_percent(solution.refinement.share)} of the last step"
+        )
+    text = "; ".join(steps)
+    return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
+
+
+def missed_section(
+    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, view: View
+) -> str:
+    """Why it does not look like the painting: sentences, shares, maps and bounds."""
+    if diagnosis is None:
+        return ""
+    sentences = "".join(f"<p>{escape(text)}</p>" for text in what_is_missed(diagnosis))
+    return (
+        f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
+        f"{_shares(diagnosis)}</div>"
+        f'<div class="maps">{_maps(solution, diagnosis, current, view=view)}</div>'
+        f"{_bounds(diagnosis)}</section>"
+    )
+
+
+def _shares(diagnosis: Diagnosis) -> str:
+    d = diagnosis
+    by_what = "by zero or by what is asked" if d.is_constrained else "needs light below zero"
+    parts = [
+        ("out of reach of any mix", d.unreachable),
+        (f"forbidden: {by_what}", d.forbidden),
+        *([("noise of the basis", d.noise)] if d.noise > 0 else []),
+    ]
+    if d.compromise > 0:
+        parts.insert(2, ("given up for the other views", d.compromise))
+    rows = [
+        f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(d.share(part))}'
+        '</span><div class="bar" aria-hidden="true">'
+        f'<i style="width: {100 * d.share(part):.2f}%"></i></div></td></tr>'
+        for what, part in parts
+    ]
+    if d.ignored > 0:
+        times = d.ignored / d.total if d.total > 0 else np.inf
+        rows.append(
+            '<tr><th scope="row">besides, where it does not count</th>'
+            f"<td>{f'{times:.2g} times as much' if np.isfinite(times) else 'all'}</td></tr>"
+        )
+    return f"<table><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, view: View) -> str:
+    parts = [
+        (
+            "Out of reach",
+            diagnosis.unreachable_map,
+            "What no mix of the lights makes, negative ones included.",
+        ),
+        (
+            "Forbidden",
+            diagnosis.forbidden_map,
+            "What only light below zero, or beyond what is asked, would mend."
+            + " So is what other views ask for." * (diagnosis.compromise > 0),
+        ),
+    ]
+    counted = solution.importance > 0
+    sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]
+    limit = round_up(max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-view.stops))
+    share = coverage(solution.importance)[..., None]
+    grey = unpainted_look(current, view=view)
+    figures = []
+    for name, image, caption in parts:
+        if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:
+            continue  # an empty picture
+        # As in the residual's map: predicted − painted, so that bright is too bright.
+        colours = diverging(-luminance(image) / limit)
+        figures.append(
+            figure(
+                Picture(name, f"False-colour map: {name}.", share * colours + (1 - share) * grey),
+                caption,
+                scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+            )
+        )
+    if diagnosis.ignored > 0:
+        colours = diverging(-diagnosis.ignored_map / limit)
+        figures.append(
+            figure(
+                Picture("Not counted", "False-colour map of what does not count.", colours),
+                "Painted and missed where the importance is small.",
+                scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+            )
+        )
+    return "".join(figures)
+
+
+def _bounds(diagnosis: Diagnosis) -> str:
+    rows = [
+        f'<tr><th scope="row">{escape(", ".join(bound.lights))}</th>'
+        f"<td>{escape(_held_by(bound))}</td>"
+        f"<td>{spoken_percent(diagnosis.gained(bound))}</td>"
+        f'<td class="rgb">{_multiplier(bound)}</td></tr>'
+        for bound in diagnosis.bounds
+        if diagnosis.gained(bound) >= SMALLEST_GAIN
+    ]
+    if not rows:
+        return ""
+    more = diagnosis.bounds_left_out
+    others = f" {more} more seem to matter less, and were not looked into." if more else ""
+    return (
+        '<div class="explained" style="margin-top: 32px"><div><h3>What holds the lights back</h3>'
+        "<p>What would be gained if one of these alone were let go, and all others stayed. "
+        "A light that is kept, locked, "
+        "limited, coloured or tied would then have any emission; one that is off for no other "
+        "reason would go below zero and so take light away: a hint at which other lights spill "
+        f"where they should not.{others}</p><p>At first: how the objective would change, per unit, "
+        "if that which holds were raised a little.</p></div>"
+        '<table><thead><tr><th scope="col">light</th><th scope="col">held by</th>'
+        '<th scope="col">less missed<br>without that</th><th scope="col">at first</th></tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
+    )
+
+
+def _held_by(bound: Bound) -> str:
+    """Zero, so that nobody takes it for somebody's wish, or what else holds."""
+    held = spoken_hold(bound)
+    return held.replace("off", "zero") if bound.kind == "zero" else held
+
+
+def _multiplier(bound: Bound) -> str:
+    numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
+    per = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
+    return f"{', '.join(numbers)}<small>per {per.get(bound.per, 'present brightness')}</small>"

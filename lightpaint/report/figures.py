@@ -1,0 +1,173 @@
+"""The pictures of the report: the wipe, the maps, thumbnails. HTML with data: URIs."""
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.display import encode_display, to_8_bit
+from lightpaint.colour.view import View
+from lightpaint.images.png import png_bytes
+from lightpaint.lighting.solve import Solution
+from lightpaint.relit.verify import LIMIT, Verification
+from lightpaint.report.pictures import (
+    DIVERGING,
+    diverging,
+    importance_picture,
+    residual_limit,
+    residual_picture,
+)
+
+#: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
+UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
+
+#: Colours of a signed quantity from its lower to its upper end, for the legend.
+SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
+
+#: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
+LARGEST_PNG = 150_000
+#: Width of the lights' pictures in the table, in pixels.
+THUMBNAIL = 144
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the page, (h, w, 3) in display values. alt: what it shows, in words."""
+
+    name: str
+    alt: str
+    pixels: Floats
+
+
+def data_uri(image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = LARGEST_PNG) -> str:
+    """An (h, w, 3) picture as a data: URI: lossless while it is small, else a good JPEG."""
+    data, kind = png_bytes(image_8_bit), "png"
+    if len(data) > largest_png:
+        buffer = io.BytesIO()
+        Image.fromarray(image_8_bit).save(buffer, "JPEG", quality=91, subsampling=0)
+        data, kind = buffer.getvalue(), "jpeg"
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def thumbnail(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> tuple[Floats, float]:
+    """A small display-encoded picture of what one light does, and its exposure in stops.
+
+    image: (h, w, 3) linear. The 98th percentile of what it lights, seen emitters aside, is
+    brought to white; reduced in linear light.
+    """
+    height, width = image.shape[:2]
+    bright = image.max(axis=-1)
+    lit = bright[(bright > 0) & ~emitters_seen]
+    lit = lit if lit.size else bright[bright > 0]
+    stops = float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+    if width > THUMBNAIL:
+        size = (THUMBNAIL, max(1, round(height * THUMBNAIL / width)))
+        box = Image.Resampling.BOX
+        planes = [
+            np.asarray(Image.fromarray(image[..., c].astype(np.float32)).resize(size, box))
+            for c in range(3)
+        ]
+        image = np.stack(planes, axis=-1)
+    return encode_display(image, stops=stops), stops
+
+
+def wipe(looks: list[Picture]) -> str:
+    """Two of the looks over each other, with a movable border between them."""
+    # The verification may be larger than the rest, which the page then enlarges.
+    height, width = max(look.pixels.shape[:2] for look in looks)
+    # The prediction first: it is the answer, and less noisy than the render that checks it.
+    a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("target", "predicted"))
+
+    def choices(chosen: int) -> str:
+        return "".join(
+            f'<option value="{k}"{" selected" if k == chosen else ""}>{look.name}</option>'
+            for k, look in enumerate(looks)
+        )
+
+    images = "".join(
+        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" width="{width}" '
+        f'height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
+        f'src="{data_uri(to_8_bit(look.pixels))}">'
+        for k, look in enumerate(looks)
+    )
+    return (
+        f'<figure class="wipe" id="wipe" style="--aspect: {width / height:.5f}">'
+        f'<div class="stage" id="stage" style="aspect-ratio: {width} / {height}">{images}'
+        '<div class="edge" aria-hidden="true"><i></i></div>'
+        f'<span class="tag tag-a" id="tag-a" aria-hidden="true">{looks[a].name}</span>'
+        f'<span class="tag tag-b" id="tag-b" aria-hidden="true">{looks[b].name}</span></div>'
+        '<figcaption class="controls">'
+        f'<label>Left <select id="a">{choices(a)}</select></label>'
+        '<label class="slide">Wipe <input type="range" id="split" min="0" max="100" step="1" '
+        'value="50"></label>'
+        f'<label>Right <select id="b">{choices(b)}</select></label></figcaption></figure>'
+    )
+
+
+def maps(
+    solution: Solution,
+    predicted: Floats,
+    current: Floats,
+    *,
+    verification: Verification | None,
+    view: View,
+) -> str:
+    """False-colour pictures: what is missed, what counts, and where the render disagrees.
+
+    predicted, current: (h, w, 3) linear.
+    """
+    limit = residual_limit(solution, predicted, view=view)
+    picture = residual_picture(solution, predicted, current, view=view, limit=limit)
+    figures = [
+        figure(
+            Picture("Residual", "False-colour map of the residual.", picture),
+            "Luminance, predicted − target. Hatched pixels do not count.",
+            scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+        ),
+        figure(
+            Picture(
+                "Importance",
+                "Map of how much each pixel counts.",
+                importance_picture(solution.importance, current, view=view),
+            ),
+            f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
+            f"{solution.importance.max():.3g} at most.",
+            scale([UNCOUNTED, COUNTED], "hatched: does not count", "yellow: counts fully"),
+        ),
+    ]
+    if verification is not None:
+        z = verification.z.mean(axis=-1, dtype=np.float64)
+        figures.append(
+            figure(
+                Picture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
+                "Predicted − verified in standard errors, mean of the channels. Noise alone "
+                "looks like even grain; a shape in it is an error.",
+                scale(
+                    SIGNED, f"−{LIMIT:g} predicted darker", "0", f"predicted brighter +{LIMIT:g}"
+                ),
+            )
+        )
+    return "".join(figures)
+
+
+def figure(picture: Picture, caption: str, legend: str) -> str:
+    """A map with its legend, as `scale` makes it, and what it shows."""
+    height, width = picture.pixels.shape[:2]
+    return (
+        f'<figure><img width="{width}" height="{height}" alt="{picture.alt} {caption}" '
+        f'src="{data_uri(to_8_bit(picture.pixels))}">{legend}'
+        f"<figcaption><strong>{picture.name}.</strong> {caption}</figcaption></figure>"
+    )
+
+
+def scale(colours: list[str], *ends: str) -> str:
+    """The legend of a map: its colours from left to right, and what they are in words."""
+    words = "".join(f"<span>{end}</span>" for end in ends)
+    gradient = f"linear-gradient(to right, {', '.join(colours)})"
+    return (
+        f'<div class="scale" style="background: {gradient}"></div><div class="ends">{words}</div>'
+    )

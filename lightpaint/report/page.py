@@ -1,0 +1,160 @@
+"""report.html: one self-contained page about one result.
+
+The page's frame is report.html.in; what is filled in comes from report_pictures.py and
+report_tables.py. Pictures are data: URIs; nothing is loaded from anywhere, and the page's own
+content policy forbids it.
+"""
+
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+from string import Template
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.view import View
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.solve import Solution
+from lightpaint.placement.suggest import Suggestion
+from lightpaint.relit.verify import Verification
+from lightpaint.report.constraints import constraints_section
+from lightpaint.report.diagnosis import missed_section, sure_section
+from lightpaint.report.figures import Picture, maps, wipe
+from lightpaint.report.pictures import target_picture, view_of
+from lightpaint.report.suggestion import suggestion_section
+from lightpaint.report.tables import (
+    amounts_heading,
+    fit_table,
+    lights_table,
+    render_table,
+    verification_table,
+    versions,
+)
+from lightpaint.report.verdict import verdict
+from lightpaint.target.target import Target
+
+
+def report_page(
+    *,
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    command: str,
+    uncertainty: Uncertainty | None = None,
+    diagnosis: Diagnosis | None = None,
+    suggestions: Sequence[Suggestion] | None = None,
+) -> str:
+    """The page as HTML text.
+
+    verification: None where nothing was rendered to check the prediction.
+    command: the shell command that made the result.
+    uncertainty, diagnosis, suggestions: without them the page has no section on what they tell.
+
+    Raises SizeError if target and basis differ in size.
+    """
+    target = target.fitted_to(basis.size, resize=False)
+    current = combine(basis, Lighting.present(basis)).image
+    verified = None if verification is None else verification.verified.image
+    view = view_of(target, predicted.image, verified)
+    looks = _looks(target, solution, current, predicted.image, verified, view=view)
+    template = resources.files("lightpaint.report").joinpath("page.html.in")
+    return Template(template.read_text(encoding="utf-8")).substitute(
+        title=escape(f"{target.name} · {basis.origin.scene}"),
+        target=escape(target.name),
+        scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
+        verdict=escape(verdict(solution, predicted, verification)),
+        banner=_banner(verification),
+        wipe=wipe(looks),
+        exposure=_exposure(view, predicted.image),
+        maps=maps(solution, predicted.image, current, verification=verification, view=view),
+        missed=missed_section(solution, diagnosis, current, view=view)
+        + constraints_section(basis, solution, view=view),
+        suggestions=suggestion_section(
+            suggestions, view=view, cd_per_unit=solution.lighting.cd_per_unit
+        ),
+        sure=sure_section(basis, solution, uncertainty),
+        lights=lights_table(basis, solution, uncertainty),
+        amounts=amounts_heading(solution),
+        fit=fit_table(solution),
+        verification=verification_table(verification),
+        render=render_table(basis, target, solution, predicted, verification),
+        command=escape(command or "(made from Python, without a command line)"),
+        again=_paint_again(basis, target, verification),
+        versions=escape(versions(basis)),
+    )
+
+
+def _looks(
+    target: Target,
+    solution: Solution,
+    current: Floats,
+    predicted: Floats,
+    verified: Floats | None,
+    *,
+    view: View,
+) -> list[Picture]:
+    """What can be put side by side under the wipe, in the order of its lists."""
+    looks = [
+        Picture("current look", "The scene as it is.", view.encode(current)),
+        Picture(
+            "target",
+            "The painting. Unpainted pixels are grey, dim and hatched.",
+            target_picture(target, solution, current, view=view),
+        ),
+        Picture(
+            "predicted",
+            "The solved lighting, as the sum of the basis images.",
+            view.encode(predicted),
+        ),
+    ]
+    if verified is not None:
+        shown = view.encode(verified)
+        looks.append(Picture("verified", "An independent render of the relit scene.", shown))
+    return looks
+
+
+def _banner(verification: Verification | None) -> str:
+    """What must be known before looking: loud where the render contradicts the prediction."""
+    if verification is None:
+        return (
+            '<p class="note">Not verified: solved from a saved basis, without a render of the '
+            "relit scene to compare with.</p>"
+        )
+    if verification.agrees:
+        return ""
+    return (
+        '<div class="warning" role="alert"><strong>⚠ Warning: do not trust the prediction.</strong>'
+        "<p>The independent render of the relit scene differs from it by more than the noise of "
+        "both explains. See the map of the verification below for where; check that basis and "
+        "scene belong together, and render both with more samples.</p></div>"
+    )
+
+
+def _exposure(view: View, predicted: Floats) -> str:
+    """How linear light became these pictures, and what of it they cannot show."""
+    at = f"exposure {view.stops:+.1f} stops" if view.stops else "the scene's own exposure"
+    clipped = float((predicted.max(axis=-1) > view.white).mean())
+    text = f"All at {at}, {'sRGB' if view.name == 'srgb' else view.name}."
+    if clipped > 0:
+        text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
+    return text
+
+
+def _paint_again(basis: Basis, target: Target, verification: Verification | None) -> str:
+    """How to change the painting and solve once more, for those who open the page much later."""
+    text = (
+        "Open the painting with its layers, change it, save it under the same name, and give the "
+        "command again. The basis is kept"
+    )
+    text += "." if verification is None else "; only the verification is rendered anew."
+    if target.content:
+        text += " What counts is what differs from the template."
+    elif target.everything and basis.origin.scene.endswith(".xml"):
+        make = f"<code>lightpaint template {escape(basis.origin.scene)}</code>"
+        text += f" Here every pixel counts; painted over what {make} renders, only the paint does."
+    return text

@@ -1,0 +1,126 @@
+"""The pictures that comparison and report show: what was painted, what is missed, and where.
+
+All are (h, w, 3) in display values [0, 1]. Pixels that do not count are shown as the
+current look, grey, dim and hatched, so that they cannot be taken for paint.
+"""
+
+import math
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.color import luminance
+from lightpaint.colour.display import choose_exposure
+from lightpaint.colour.view import View
+from lightpaint.lighting.solve import Solution
+from lightpaint.target.target import Target
+
+#: False colours of a signed quantity from −1 to +1, in display values. Their lightness
+#: rises all the way, so that the sign also shows without colour.
+DIVERGING = np.array(
+    [
+        (0.02, 0.12, 0.40),
+        (0.13, 0.33, 0.63),
+        (0.45, 0.45, 0.45),
+        (0.90, 0.60, 0.22),
+        (1.00, 0.89, 0.60),
+    ]
+)
+
+#: A residual below this part of display white cannot be seen, so no scale is finer.
+FINEST_SCALE = 0.01
+
+
+def view_of(target: Target, predicted: Floats, verified: Floats | None) -> View:
+    """The one view for all pictures of a result: that of the painting, if it was seen through one.
+
+    Else sRGB at the exposure that suits its best render.
+    """
+    return target.view or View("srgb", choose_exposure(predicted if verified is None else verified))
+
+
+def coverage(importance: Floats) -> Floats:
+    """How much of a pixel to show as painted, (h, w) in [0, 1].
+
+    Importance itself, as alpha; where all of it is below 1, relative to its largest.
+    """
+    largest = float(importance.max(initial=0))
+    return np.clip(importance / min(1.0, largest), 0, 1) if largest > 0 else 0 * importance
+
+
+def painted(target: Target, solution: Solution) -> Floats:
+    """Coverage of what somebody painted and the solve counted, (h, w) in [0, 1]."""
+    return np.where(solution.importance > 0, coverage(target.importance), 0)
+
+
+def unpainted_look(current: Floats, *, view: View) -> Floats:
+    """The current look as the background of what counts: grey, dim, with diagonal lines."""
+    height, width = current.shape[:2]
+    grey = luminance(view.encode(current))
+    period = max(6, width // 80)
+    y, x = np.mgrid[:height, :width]
+    lines = (x + y) % period < max(1, period // 5)
+    dim = 0.07 + 0.28 * grey + 0.08 * lines
+    return np.repeat(dim[..., None], 3, axis=-1)
+
+
+def target_picture(target: Target, solution: Solution, current: Floats, *, view: View) -> Floats:
+    """The painting, laid over the dimmed current look by its importance.
+
+    current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
+    display encoding of the target.
+    """
+    share = painted(target, solution)[..., None]
+    paint = view.encode(target.image)
+    return np.asarray(share * paint + (1 - share) * unpainted_look(current, view=view))
+
+
+def importance_picture(importance: Floats, current: Floats, *, view: View) -> Floats:
+    """The current look in pale yellow where it counts; dimmed and hatched where not."""
+    share = coverage(importance)[..., None]
+    grey = luminance(view.encode(current))[..., None]
+    counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
+    return np.asarray(share * counted + (1 - share) * unpainted_look(current, view=view))
+
+
+def residual(solution: Solution, predicted: Floats) -> Floats:
+    """Luminance of prediction minus what was solved for, (h, w), in scene units."""
+    return luminance(predicted.astype(np.float64) - solution.meant(predicted))
+
+
+def residual_limit(solution: Solution, predicted: Floats, *, view: View) -> float:
+    """The end of the residual's scale: its 99th percentile where it counts, rounded up."""
+    counted = np.abs(residual(solution, predicted))[solution.importance > 0]
+    return round_up(max(float(np.percentile(counted, 99)), FINEST_SCALE * 2.0**-view.stops))
+
+
+def residual_picture(
+    solution: Solution, predicted: Floats, current: Floats, *, view: View, limit: float
+) -> Floats:
+    """False colours of the residual from −limit to +limit, dimmed where it does not count."""
+    share = coverage(solution.importance)[..., None]
+    colours = diverging(residual(solution, predicted) / limit)
+    return np.asarray(share * colours + (1 - share) * unpainted_look(current, view=view))
+
+
+def diverging(values: Floats) -> Floats:
+    """The colour, (…, 3), of values from −1 to +1; what lies beyond takes the end's."""
+    places = np.linspace(-1, 1, len(DIVERGING))
+    channels = [np.interp(values, places, DIVERGING[:, c]) for c in range(3)]
+    return np.stack(channels, axis=-1)
+
+
+def round_up(value: float) -> float:
+    """The next number >= value > 0 of the form 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(value))
+    for step in (1, 2, 5):
+        # Within round-off, 0.2 is not above 2 x 0.1.
+        if value <= step * power * (1 + 1e-9):
+            return step * power
+    return 10 * power
+
+
+def spoken_view(view: View) -> str:
+    """`agx, exposure +1.5 stops`, or nothing where sRGB shows the picture as it is."""
+    name = [] if view.name == "srgb" else [view.name]
+    return ", ".join([*name, *([f"exposure {view.stops:+.1f} stops"] if view.stops else [])])

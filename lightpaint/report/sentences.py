@@ -1,0 +1,185 @@
+"""In plain sentences: how sure the answer is, and why it does not look like the painting."""
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import LUMINANCE, luminance
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place
+from lightpaint.lighting.analysis.uncertainty import SIDES, Uncertainty
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.lighting import LightSetting
+from lightpaint.lighting.solve import Solution
+from lightpaint.report.verdict import energy_shares
+
+#: Shares of the miss, or of a light, that are too small to speak of.
+SMALL = 0.05
+
+#: The same of a light that is switched off: it is easily switched on.
+SMALLER = 0.01
+
+#: What the painting and the light there must differ by to be called another colour.
+SEEN = 0.06
+
+
+def relative_errors(uncertainty: Uncertainty) -> Doubles:
+    """Half the 95 % interval of each light's luminance over its luminance, (n,).
+
+    Not finite where the light is off and may be on; 0 where it has no error.
+    """
+    # One path carries all channels, so that their errors go together.
+    side = SIDES * uncertainty.standard_error @ LUMINANCE
+    size = luminance(uncertainty.weights)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(side > 0, side / size, 0.0)
+
+
+def spoken_error(light: LightSetting, error: float) -> str:
+    """`± 4 %` of a light; empty if nothing is known of it."""
+    if light.is_fixed or light.standard_error is None:
+        return ""
+    if not np.isfinite(error):
+        at_most = SIDES * luminance(np.array(light.standard_error))
+        return f"≤ {at_most:.2g}"
+    return f"± {spoken_percent(error)}" if error else ""
+
+
+def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
+    """What more samples would change, of the light whose error changes the picture most."""
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
+    effect = np.where(np.isfinite(errors), errors, 0) * shares
+    if not effect.any():
+        has_noise = bool(basis.half_differences.any())
+        why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
+        return f"More samples would change no light: {why}."
+    k = int(np.argmax(effect))
+    light = f"light {solution.lighting.lights[k].name}, {spoken_percent(shares[k])} of the picture"
+    change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
+    return (
+        f"More samples would change {light}, by {change} (95 %); "
+        f"--spp {halving_spp(basis, uncertainty, k)} halves that."
+    )
+
+
+def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
+    """Samples per pixel at which the error of light k is half of what it is.
+
+    Scatter falls with the root of the samples, bias with their number.
+    """
+    scatter, bias = (np.square(x[k]).sum() for x in (uncertainty.scatter, uncertainty.bias))
+    # scatter / m + bias / m² = (scatter + bias) / 4
+    total = scatter + bias
+    times = 2 * (scatter + np.sqrt(scatter**2 + total * bias)) / total if total > 0 else 1.0
+    exact = times * basis.origin.spp
+    power = 2 ** int(np.floor(np.log2(exact)) - 2)
+    return int(np.ceil(exact / power) * power) if power >= 1 else int(np.ceil(exact))
+
+
+def what_is_missed(diagnosis: Diagnosis) -> list[str]:
+    """At most four sentences on why it does not look like the painting, the first first."""
+    d = diagnosis
+    if d.missed < 0.01:
+        return ["The lights can do what is painted."]
+    # What is kept has a bound of its own below.
+    which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
+    parts = {
+        f"no mix of {which} can reach": d.unreachable,
+        "only light below zero could"
+        if not d.is_constrained
+        else "what is asked of the lights, or zero, forbids": d.forbidden,
+        "is given up for the other views": d.compromise,
+        "is noise of the basis": d.noise,
+    }
+    told = [
+        (d.share(energy), what)
+        for what, energy in sorted(parts.items(), key=lambda item: -item[1])
+        if d.share(energy) >= 0.005
+    ]
+    shares = [f"{spoken_percent(share)} {what}" for share, what in told]
+    sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
+    if d.place is not None and d.share(d.unreachable) >= SMALL:
+        sentences.append(spoken_place(d.place))
+    most = [bound for bound in d.bounds[:1] if d.gained(bound) >= SMALL]
+    to_switch_on = [
+        bound for bound in d.bounds if bound.is_switched_off and d.gained(bound) >= SMALLER
+    ]
+    for bound in dict.fromkeys([*most, *to_switch_on[:1]]):
+        sentences.append(spoken_bound(bound, d.gained(bound)))
+    return sentences
+
+
+def spoken_bound(bound: Bound, share: float) -> str:
+    """What holds a light, and which share of the miss that is."""
+    is_one = len(bound.lights) == 1
+    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {', '.join(bound.lights)} are"
+    if bound.kind == "zero":
+        return (
+            f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
+            f"the other lights leave it ({spoken_percent(share)} of the miss)."
+        )
+    it = "it" if is_one else "them"
+    held = {
+        "kept": f"kept as it is; adjusting {it} too",
+        "lock": f"locked ({bound.held_by}); adjusting {it}",
+        "off": f"switched off, as asked; switching {it} on",
+        "left out": f"left out, as only so many may be on; switching {it} on too",
+        "tie": "on one dimmer; adjusting each by itself",
+        "limits": f"at a limit ({bound.held_by}); letting go of that",
+        "colour": f"held to a colour ({bound.held_by}); any other",
+    }[bound.kind]
+    return f"{lights} {held} would take away {spoken_percent(share)} of the miss."
+
+
+def spoken_hold(bound: Bound) -> str:
+    """What holds a light, in few words; of one at zero, in which channels by where it is felt."""
+    if bound.kind == "kept":
+        return "kept as it is"
+    if bound.kind != "zero":
+        return bound.held_by
+    if len(bound.multiplier) != 3:
+        return "off"
+    names = ("red", "green", "blue")
+    felt = zip(names, bound.multiplier, strict=True)
+    held = [n for n, m in felt if m > 0.01 * max(bound.multiplier)]
+    return "off" if len(held) == 3 else f"off in {' and '.join(held)}"
+
+
+def spoken_place(place: Place) -> str:
+    """Where light is missing, and what it lacks."""
+    rows, columns = ("top", "middle", "bottom"), ("left", "middle", "right")
+    row, column = rows[place.region[0]], columns[place.region[1]]
+    where = "in the middle" if row == column == "middle" else f"{row} {column}"
+    where = {"middle left": "on the left", "middle right": "on the right"}.get(where, where)
+    where = {"top middle": "at the top", "bottom middle": "at the bottom"}.get(where, where)
+    return (
+        f"Most of that out of reach is {where} ({spoken_percent(place.share)}): painted "
+        f"{spoken_difference(place.painted, place.reached)} than any mix of the lights makes it."
+    )
+
+
+def spoken_difference(
+    painted: tuple[float, float, float], reached: tuple[float, float, float]
+) -> str:
+    """`brighter and bluer`: how a painted colour differs from the one that lights reach."""
+    a, b = np.array(painted), np.maximum(np.array(reached), 0)
+    bright_a, bright_b = float(luminance(a)), float(luminance(b))
+    words = []
+    if bright_a > 1.2 * bright_b:
+        words.append("brighter")
+    elif 1.2 * bright_a < bright_b:
+        words.append("darker")
+    if a.sum() > 0 and b.sum() > 0:
+        shift = a / a.sum() - b / b.sum()
+        most = int(np.argmax(np.abs(shift)))
+        if abs(shift[most]) > SEEN:
+            more, less = ("redder", "greener", "bluer"), ("cooler", "pinker", "yellower")
+            words.append(more[most] if shift[most] > 0 else less[most])
+    if not words:
+        words = ["a little brighter" if bright_a > bright_b else "a little darker"]
+    return " and ".join(words)
+
+
+def spoken_percent(share: float) -> str:
+    """`0.4 %`, `7 %`, `62 %`."""
+    return f"{100 * share:.1f} %" if 0 < share < 0.0095 else f"{100 * share:.0f} %"

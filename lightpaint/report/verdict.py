@@ -1,0 +1,120 @@
+"""What a result comes to, in a few numbers and one sentence."""
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import LUMINANCE
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.normal_equations import BLOCK
+from lightpaint.lighting.solve import Solution
+from lightpaint.relit.verify import LIMIT, Verification
+
+
+def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
+    """Share of each light in the predicted image's energy, (n,) float64, in basis order.
+
+    Energy is luminance Y summed over all pixels, painted or not: Σ Y(w_i Φ_i) over
+    Σ_j Σ Y(w_j Φ_j). The shares sum to 1; where every light is off they are all 0.
+    """
+    energy = (_flux(basis.images) * lighting.weights_for(basis)) @ LUMINANCE
+    total = energy.sum()
+    return np.asarray(energy / total if total > 0 else np.zeros_like(energy))
+
+
+def _flux(images: Floats) -> Doubles:
+    """Σ_pixels Φ_i per light and channel, (n, 3) float64. images: (n, h, w, 3)."""
+    rows = images.reshape(len(images), -1, 3)
+    # A sum over axes this short is slow in NumPy, a product with ones is not; in float64 and
+    # by blocks it is as exact as the sum, and needs no copy of the basis.
+    ones = np.ones(BLOCK)
+    flux = np.zeros((len(images), 3))
+    for start in range(0, rows.shape[1], BLOCK):
+        block = rows[:, start : start + BLOCK].astype(np.float64)
+        flux += ones[: block.shape[1]] @ block
+    return flux
+
+
+def relative_residual(solution: Solution) -> float:
+    """RMS of what the prediction misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
+
+    E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
+    by importance; in display space, both of display values. 0 is a perfect match, 1 is what all
+    lights off would give. Without the square root a miss of 10 % of the light would look like
+    one of 1 %.
+    """
+    norm2 = _norm2(solution)
+    # A painting that is black wherever it counts is met by darkness alone.
+    missed = sum(solution.quality.objective)
+    return float(np.sqrt(missed / norm2)) if norm2 > 0 else float(missed > 0)
+
+
+def noise_residual(solution: Solution, predicted: Estimate) -> float:
+    """The part of `relative_residual` that is the basis' own noise, in the same measure."""
+    norm2 = _norm2(solution)
+    squares = np.square(predicted.half_difference, dtype=np.float64)
+    noise2 = float((solution.weight * squares).sum())
+    return float(np.sqrt(noise2 / norm2)) if norm2 > 0 else 0.0
+
+
+def share_met(solution: Solution, predicted: Estimate) -> float:
+    """How much of the painting the lighting meets, 0 to 1, were it rendered without noise.
+
+    Noise in the prediction adds its power to the objective; what is left without it is what
+    the lighting itself misses.
+    """
+    missed2 = relative_residual(solution) ** 2 - noise_residual(solution, predicted) ** 2
+    return max(0.0, 1.0 - float(np.sqrt(max(missed2, 0.0))))
+
+
+def linear_residual(solution: Solution, predicted: Estimate) -> float:
+    """`relative_residual` as it is in linear light, whatever was fitted."""
+    D = solution.importance[..., None]
+    meant = solution.meant(predicted.image)
+    missed2, norm2 = (
+        float((D * np.square(x, dtype=np.float64)).sum()) for x in (meant - predicted.image, meant)
+    )
+    return float(np.sqrt(missed2 / norm2)) if norm2 > 0 else float(missed2 > 0)
+
+
+def codes_missed(solution: Solution) -> float:
+    """What is missed in display space, RMS over pixels and channels, in codes of 255."""
+    mean = sum(solution.quality.objective) / (3 * float(solution.importance.sum()))
+    return 255 * float(np.sqrt(mean))
+
+
+def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
+    """One plain sentence: how well the painting is met, and whether a render confirms it."""
+    # No render of light is without noise: where there is none, nobody has measured it.
+    noise = "whatever noise the layers have included"
+    if predicted.half_difference.any() or not predicted.image.any():
+        noise = f"noise adds {100 * noise_residual(solution, predicted):.0f} %"
+    fit = f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting"
+    if solution.space == "linear":
+        fit += f" (RMS; {noise})"
+    else:
+        fit += f" as {solution.quality.display} shows it (RMS, {codes_missed(solution):.1f} of 255 "
+        fit += f"codes missed; {noise}) and "
+        fit += f"{100 * max(1 - linear_residual(solution, predicted), 0):.0f} % in linear light"
+    if not solution.quality.converged:
+        fit += ", from a solve that stopped before it converged"
+    return f"{fit}; {agreement(verification)}."
+
+
+def _norm2(solution: Solution) -> float:
+    if solution.loss is not None:
+        return float(solution.norm2.sum())
+    weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
+    return float(weighted.sum())
+
+
+def agreement(verification: Verification | None) -> str:
+    """Whether prediction and verification agree, as a clause with its numbers."""
+    if verification is None:
+        return "the prediction is not verified by a render"
+    word = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
+    return (
+        f"prediction and verification {word} "
+        f"({verification.difference:.1f} standard errors apart, limit {LIMIT:g})"
+    )

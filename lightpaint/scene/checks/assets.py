@@ -1,0 +1,89 @@
+"""What is looked at in the files that a scene refers to before Mitsuba reads them.
+
+Mitsuba's own readers never return from a pipe, end the process over a damaged OpenEXR or mesh,
+and take whatever memory a header asks for.
+"""
+
+import struct
+from pathlib import Path
+
+from lightpaint.errors import ImageError, SceneError
+from lightpaint.files import file_length, one_line
+from lightpaint.images.exr import read_parts
+from lightpaint.scene.checks.mesh import MeshError, check_ply, check_serialized
+
+#: Longest file that is read, in bytes.
+MAX_ASSET = 2**32
+
+#: A picture that says it has more bytes than this, four to a pixel, and more than so many for
+#: each of the file's, is not decoded.
+MAX_BYTES = 2**29
+MAX_COMPRESSION = 1000
+
+
+def check_asset(path: Path, plugin: str, index: int = 0) -> None:
+    """Raise SceneError unless the file at `path` is one that `plugin` can be given.
+
+    index: of the mesh in it. What Mitsuba itself refuses in good order is left to it.
+    """
+    length = file_length(path, "file to read", SceneError, limit=MAX_ASSET)
+    try:
+        if plugin == "ply":
+            check_ply(path)
+        elif plugin == "serialized":
+            check_serialized(path, index)
+        elif plugin == "gridvolume":
+            _check_volume(path, length)
+        elif plugin in ("bitmap", "envmap", "projector", "spot", "area"):
+            _check_picture(path, length)
+    except MeshError as damage:
+        raise SceneError(f"{path} is damaged: {one_line(str(damage))}; export it again") from None
+    except ImageError as error:
+        raise SceneError(one_line(str(error))) from None
+    except OSError as error:
+        raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
+    except MemoryError:
+        raise SceneError(f"{path} takes more memory than there is") from None
+
+
+def _check_picture(path: Path, length: int) -> None:
+    with path.open("rb") as file:
+        head = file.read(32)
+        if head.startswith(b"\x76\x2f\x31\x01"):
+            # No cheaper look tells whether Mitsuba's reader survives.
+            read_parts(path)
+            return
+        width = height = 0
+        if head.startswith(b"\x89PNG") and len(head) >= 24:
+            width, height = struct.unpack(">II", head[16:24])
+        elif head.startswith(b"\xff\xd8"):
+            file.seek(2)
+            width, height = _jpeg_size(file.read(2**24))
+    if 4 * width * height > max(MAX_BYTES, MAX_COMPRESSION * length):
+        raise ImageError(
+            f"{path} says it has {width}x{height} pixels, in {length} bytes: too many to read"
+        )
+
+
+def _jpeg_size(data: bytes) -> tuple[int, int]:
+    """(width, height) as the head says, 0 where it does not; `data` from behind the first mark."""
+    at = 0
+    while at + 9 <= len(data) and data[at] == 0xFF:
+        mark = data[at + 1]
+        if mark == 0xFF:  # which fills
+            at += 1
+            continue
+        if 0xC0 <= mark <= 0xCF and mark not in (0xC4, 0xC8, 0xCC):
+            height, width = struct.unpack(">HH", data[at + 5 : at + 9])
+            return width, height
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return 0, 0
+
+
+def _check_volume(path: Path, length: int) -> None:
+    with path.open("rb") as file:
+        head = file.read(24)
+    if len(head) == 24 and head.startswith(b"VOL\x03"):
+        kind, width, height, depth, channels = struct.unpack("<5i", head[4:])
+        if kind == 1 and 4 * channels * width * height * depth > length:
+            raise SceneError(f"{path} is damaged: it is shorter than it says")

@@ -1,0 +1,100 @@
+"""Which layer is the sum of others: as the plain definition says, at a pass over each."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from light_groups import pictures
+
+from lightpaint.basis.lightgroups.beauty import LayerSum, beauty_among, beauty_by_sum, rounding
+from lightpaint.basis.lightgroups.layers import Layer
+
+
+def _layers(images: Any, kind: Any = np.float32) -> list[Layer]:
+    return [
+        Layer(f"l{k}", Path("a.exr"), "", ("R", "G", "B"), (), image.astype(kind))
+        for k, image in enumerate(images)
+    ]
+
+
+def _adds_up(beauty: Layer, lights: list[Layer]) -> bool:
+    """The definition: off by more than rounding, in all, by a 1e-5 of the light."""
+    total = sum(layer.image.astype(np.float64) for layer in lights)
+    beyond = np.maximum(np.abs(beauty.image - total) - rounding([*lights, beauty]), 0)
+    size = np.abs(beauty.image.astype(np.float64)).sum()
+    return bool(size > 0 and np.nansum(beyond) <= 1e-5 * size)
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32])
+@pytest.mark.parametrize("off", [0, 2e-6, 2e-5, 1e-3])
+@pytest.mark.parametrize("where", ["everywhere", "in one pixel"])
+def test_sums_are_found_as_the_definition_says(kind: Any, off: float, where: str):
+    images = pictures(5, size=(37, 29))
+    whole = images.sum(axis=0)
+    error = off * whole if where == "everywhere" else np.zeros_like(whole)
+    if where == "in one pixel":
+        # One that a coarse look does not see.
+        error[3, 5] = off * whole.sum() / 3
+    layers = _layers([*images, whole + error], kind)
+    lights, picture = layers[:-1], layers[-1]
+    expected = _adds_up(picture, lights)
+    # In float16 some of it is rounding, unless it is all in one place.
+    rounds_away = kind == np.float16 and where == "everywhere" and off < 1e-4
+    assert expected is (off < 1e-5 or rounds_away)
+    assert LayerSum.of(lights).is_of(picture) is expected
+    assert (beauty_by_sum([lights[0], picture], lights) is picture) is expected
+    assert (beauty_among(layers) is picture) is expected
+    for light in lights:
+        assert not _adds_up(light, [x for x in layers if x is not light])
+        assert not LayerSum.of(layers).is_of(light, less_itself=True)
+
+
+def test_black_is_no_sum():
+    black = _layers(np.zeros((3, 9, 9, 3)))
+    assert beauty_among(black) is None
+    assert beauty_by_sum(black, black) is None
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_pixels_without_a_number_have_no_say(bad: float):
+    images = pictures(4, size=(20, 20))
+    whole = images.sum(axis=0)
+    images[1, 3, 3] = bad
+    layers = _layers([*images, whole])
+    assert beauty_among(layers) is layers[-1]
+    assert beauty_by_sum(layers[-1:], layers[:-1]) is layers[-1]
+
+
+def test_one_more_layer():
+    layers = _layers(pictures(4))
+    added = LayerSum.of(layers[:3])
+    more, whole = added.and_also(layers[3]), LayerSum.of(layers)
+    np.testing.assert_allclose(more.total, whole.total, rtol=1e-14)
+    np.testing.assert_allclose(more.bound, whole.bound, rtol=1e-14)
+    assert whole.lacks(layers[0]) == pytest.approx(
+        np.abs(sum(x.image.astype(np.float64) for x in layers[1:])).sum(), rel=1e-12
+    )
+
+
+class _Counted(np.ndarray):
+    """Counts how many numbers are taken from it to compute with, in any arithmetic."""
+
+    read = 0
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        _Counted.read += sum(x.size for x in inputs if isinstance(x, _Counted))
+        plain = [np.asarray(x) if isinstance(x, _Counted) else x for x in inputs]
+        return getattr(ufunc, method)(*plain, **options)
+
+
+def test_every_layer_is_gone_through_a_few_times_however_many_there_are():
+    images = pictures(24, size=(40, 40))
+    layers = _layers(images)
+    for layer in layers:
+        object.__setattr__(layer, "image", layer.image.view(_Counted))
+    _Counted.read = 0
+    assert beauty_among(layers) is None
+    # Sum, bound, size and the coarse look. With a sum for each candidate it would be 24 times
+    # as many.
+    assert 0 < _Counted.read < 12 * images.size

@@ -1,0 +1,177 @@
+"""Which layers of a file are lights, by their names alone."""
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers, short_names
+from lightpaint.errors import BasisError
+
+
+def _choose(*names: str, pattern: str | None = None) -> Choice:
+    return choose_layers(dict.fromkeys(names, ()), pattern=pattern, where="a.exr")
+
+
+CASES: list[tuple[str, list[str], dict[str, str], str | None]] = [
+    (
+        "Blender Cycles",
+        [
+            "ViewLayer.Combined",
+            "ViewLayer.Combined_Key Area",
+            "ViewLayer.Combined_sun",
+            "ViewLayer.Depth",
+        ],
+        {"Key Area": "ViewLayer.Combined_Key Area", "sun": "ViewLayer.Combined_sun"},
+        "ViewLayer.Combined",
+    ),
+    ("Blender Cycles", ["Combined", "Combined_a"], {"a": "Combined_a"}, "Combined"),
+    (
+        "Arnold",
+        ["", "RGBA_key", "RGBA_default", "diffuse_key", "N"],
+        {"key": "RGBA_key", "default": "RGBA_default"},
+        "",
+    ),
+    ("Karma", ["C", "C_key", "C_a.b", "N"], {"key": "C_key", "a.b": "C_a.b"}, "C"),
+    ("RenderMan or Redshift", ["Ci", "beauty_key"], {"key": "beauty_key"}, "Ci"),
+    (
+        "RenderMan or Redshift",
+        ["", "Beauty_key", "Beauty_fill", "Beauty_denoised"],
+        {"key": "Beauty_key", "fill": "Beauty_fill"},
+        "",
+    ),
+    (
+        "LuxCore",
+        ["RADIANCE_GROUP_0", "RADIANCE_GROUP_12"],
+        {"group_0": "RADIANCE_GROUP_0", "group_12": "RADIANCE_GROUP_12"},
+        None,
+    ),
+    (
+        "V-Ray or Corona",
+        ["", "LightSelect_key", "VRayLightSelect_sun"],
+        {"key": "LightSelect_key", "sun": "VRayLightSelect_sun"},
+        "",
+    ),
+    (
+        "Octane",
+        ["Main", "Light 1", "Light pass 2", "Light 1 direct"],
+        {"light_1": "Light 1", "light_2": "Light pass 2"},
+        "Main",
+    ),
+]
+
+
+@pytest.mark.parametrize(("renderer", "names", "lights", "beauty"), CASES)
+def test_each_renderer_by_its_names(
+    renderer: str, names: list[str], lights: dict[str, str], beauty: str | None
+):
+    found = _choose(*names)
+    assert found.renderer == renderer
+    assert found.lights == lights
+    assert list(found.lights) == list(lights)  # in the order of the file
+    assert found.beauty == beauty
+
+
+def test_layers_that_may_belong_to_the_sum_are_told_apart():
+    found = _choose("", "LightSelect_key", "Environment", "Self Illumination", "Rest", "Reflection")
+    assert found.lights == {"key": "LightSelect_key"}
+    assert sorted(found.beside) == ["Environment", "Rest", "Self Illumination"]
+
+
+def test_of_several_view_layers_the_first():
+    names = ["far.Combined", "far.Combined_a", "near.Combined", "near.Combined_a"]
+    found = _choose(*names)
+    assert (found.lights, found.beauty, found.view) == (
+        {"a": "far.Combined_a"},
+        "far.Combined",
+        "far",
+    )
+    [remark] = found.remarks
+    assert "--pattern 'near.Combined_{name}' takes near" in remark
+    other = _choose(*names, pattern="near.Combined_{name}")
+    assert (other.lights, other.beauty) == ({"a": "near.Combined_a"}, "near.Combined")
+
+
+def test_of_several_eyes_one_must_be_named():
+    names = [f"View.Combined{n}.{eye}" for n in ("", "_a", "_b") for eye in ("left", "right")]
+    with pytest.raises(BasisError, match=r"the views left and right.*_\{name\}\.left'"):
+        _choose(*names)
+    found = _choose(*names, pattern="View.Combined_{name}.left")
+    assert list(found.lights) == ["a", "b"]
+    assert found.beauty == "View.Combined.left"
+    # Names with dots are no eyes.
+    assert list(_choose("C", "C_lamp.1", "C_lamp.2", "C_key").lights) == ["lamp.1", "lamp.2", "key"]
+
+
+def test_the_group_of_all_lights_is_none_of_them():
+    found = _choose("Beauty_all", "Beauty_key", "Beauty_other")
+    assert (list(found.lights), found.beauty) == (["key", "other"], "Beauty_all")
+    found = _choose("Beauty", "Beauty_all", "Beauty_key")
+    assert (list(found.lights), found.beauty) == (["key"], "Beauty")
+    assert list(_choose("Beauty", "Beauty_all").lights) == ["all"]
+
+
+def test_a_pattern_finds_what_no_convention_does():
+    found = _choose("beauty", "L[1].key!", "L[1].fill!", "depth", pattern="L[1].{name}!")
+    assert found.lights == {"key": "L[1].key!", "fill": "L[1].fill!"}
+    assert found.beauty == "beauty"
+    # Parts and files have names too.
+    found = choose_layers({"x": ("key.light",), "y": ("z",)}, pattern="{name}.light", where="a")
+    assert found.lights == {"key": "x"}
+    # So wide a pattern must not take the picture for a light.
+    assert _choose("rgba", "key", "fill", pattern="{name}").beauty == "rgba"
+    # A plain R, G, B is the picture before a light that is called like one.
+    found = _choose("", "L_main", "L_key", pattern="L_{name}")
+    assert (list(found.lights), found.beauty) == (["main", "key"], "")
+
+
+@pytest.mark.parametrize(
+    ("names", "pattern", "says"),
+    [
+        (
+            ["", "L_key", "L_fill"],
+            None,
+            r"like --pattern 'L_\{name\}'; .* are R, G, B, L_key, L_fill",
+        ),
+        (["depth"], None, r"like --pattern 'Light_\{name\}'; its RGB layers are depth"),
+        (["RGBA_key", "C_key"], None, "1 as of Arnold, 1 as of Karma"),
+        (["a", "b"], "L_{name}", r"'L_\{name\}' fits no layer of a\.exr: its RGB layers are a, b"),
+        (["a"], "L_", r"must have \{name\} once"),
+        (["a"], "{name}{name}", r"must have \{name\} once"),
+        (["LightSelect_a", "VRayLightSelect_a"], None, "has the light 'a' twice"),
+        ([f"x{k}" for k in range(99)], None, "x29 and 69 more$"),
+    ],
+)
+def test_what_cannot_be_told_lists_the_layers(names: list[str], pattern: Any, says: str):
+    with pytest.raises(BasisError, match=says) as raised:
+        _choose(*names, pattern=pattern)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("stems", "short"),
+    [
+        (["shot_key_v1", "shot_fill_v1", "shot_beauty_v1"], ["key", "fill", "beauty"]),
+        (["key", "keyring"], ["key", "keyring"]),
+        (["a.0001", "b.0001"], ["a", "b"]),
+        (["spot_1", "spot_2"], ["1", "2"]),
+        (["a_b", "a"], ["a_b", "a"]),
+        (["one"], ["one"]),
+    ],
+)
+def test_what_all_files_share_is_left_out(stems: list[str], short: list[str]):
+    assert list(short_names(stems).values()) == short
+
+
+@given(st.lists(st.text("ab_.- ", min_size=1, max_size=6), min_size=1, max_size=5, unique=True))
+def test_short_names_stay_apart(stems: list[str]):
+    short = short_names(stems)
+    assert list(short) == stems
+    assert len(set(short.values())) == len(stems)
+    assert all(name and name in stem for stem, name in short.items())
+
+
+def test_files_of_any_name_are_lights_but_for_the_beauty():
+    found = choose_files(["key", "Beauty", "fill"])
+    assert (found.lights, found.beauty) == ({"key": "key", "fill": "fill"}, "Beauty")

@@ -1,0 +1,81 @@
+"""A basis that goes on where it stopped: same samples, same result, nothing mixed."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from renderer import same_basis, write_room
+
+import lightpaint.scene.render
+from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.render.render import render_basis
+from lightpaint.errors import BasisError
+from lightpaint.progress import Interrupted
+from lightpaint.scene.render import plan_passes
+from lightpaint.scene.scene import load_scene
+
+
+@pytest.fixture(autouse=True)
+def small_passes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Passes of four samples per pixel of the test room."""
+    monkeypatch.setattr(lightpaint.scene.render, "SAMPLES_PER_PASS", 4 * 24 * 20)
+
+
+def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:
+    whole = plan_passes(24 * 20, 40)
+    for done in range(0, 20, 4):
+        rest = plan_passes(24 * 20, 40, done=(done, done))
+        assert rest == whole[2 * done // 4 :]
+    assert plan_passes(24 * 20, 40, done=(8, 4))[0] == (1, 4)
+    assert sum(size for half, size in plan_passes(24 * 20, 40, done=(8, 4)) if half) == 16
+    assert plan_passes(24 * 20, 40, done=(20, 20)) == []
+
+
+@pytest.mark.parametrize("through_a_file", [True, False])
+def test_in_two_goes_as_in_one(tmp_path: Path, through_a_file: bool) -> None:
+    scene = load_scene(write_room(tmp_path))
+    first = render_basis(scene, spp=16, seed=3)
+    if through_a_file:
+        write_basis(tmp_path / "b.exr", first)
+        first = read_basis(tmp_path / "b.exr")
+    same_basis(
+        render_basis(scene, spp=40, seed=3, start=first), render_basis(scene, spp=40, seed=3)
+    )
+
+
+@pytest.mark.parametrize("after", [2, 3, 5])
+def test_an_interrupt_keeps_what_is_done(tmp_path: Path, after: int) -> None:
+    scene = load_scene(write_room(tmp_path))
+    kept: list[Basis] = []
+
+    def keep(basis: Basis) -> bool:
+        kept.append(basis)
+        return True
+
+    def press_ctrl_c(_label: str, done: int, _total: int) -> None:
+        if done == after:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    plan = plan_passes(24 * 20, 40)
+    done = sum(size for _, size in plan[:after])
+    with pytest.raises(Interrupted, match=f"{done} of 40"):
+        render_basis(scene, spp=40, keep=keep, progress=press_ctrl_c)
+    assert kept[-1].origin.spp == done
+    same_basis(render_basis(scene, spp=40, start=kept[-1]), render_basis(scene, spp=40))
+
+
+def test_enough_is_enough(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    basis = render_basis(scene, spp=16)
+    assert render_basis(scene, spp=8, start=basis) is basis
+
+
+def test_nothing_is_mixed(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    basis = render_basis(scene, spp=4)
+    with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
+        render_basis(scene, spp=8, seed=1, start=basis)
+    changed = load_scene(write_room(tmp_path), parameters={"width": 20})
+    with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
+        render_basis(changed, spp=8, start=basis)

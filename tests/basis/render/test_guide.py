@@ -1,0 +1,148 @@
+"""Choosing emitters by what was learned: probabilities, no bias, less noise, and going on."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from renderer import write_room
+
+from lightpaint.basis.basis import read_basis, write_basis
+from lightpaint.basis.render.budget import Budget, Keeper
+from lightpaint.basis.render.render import _render_one_by_one, render_basis
+from lightpaint.progress import silent
+from lightpaint.scene.scene import load_scene
+from lightpaint.scene.variant import use_variant
+
+#: Two spots that each light one end of the floor, and a lamp behind the wall.
+SPOTS = "".join(
+    f"""<emitter type="spot" id="spot{x}"><float name="cutoff_angle" value="12"/>
+    <transform name="to_world"><lookat origin="{x} 1.8 0.5" target="{x} 0 0.2" up="1 0 0"/>
+    </transform></emitter>"""
+    for x in (-0.7, 0.7)
+)
+BEHIND = '<emitter type="point" id="behind"><point name="position" x="0" y="1" z="-3"/></emitter>'
+
+
+def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) -> np.ndarray:
+    use_variant()
+    from lightpaint.basis.render.guide import _probabilities
+
+    sampled = np.ones(len(lights), dtype=bool)
+    return _probabilities(received, asked, np.asarray(lights), sampled)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 5))
+def test_probabilities_are_probabilities(seed: int, emitters: int, cells: int) -> None:
+    use_variant()
+    from lightpaint.basis.render.guide import EVEN_SHARE
+
+    rng = np.random.default_rng(seed)
+    asked = rng.integers(0, 5, (cells, emitters)).astype(float)
+    received = rng.lognormal(0, 10, (cells, emitters)) * (asked > rng.integers(0, 4))
+    found = probabilities(received, asked, rng.integers(0, emitters, emitters).tolist())
+    # Precision of float64.
+    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-12)
+    assert found.min() >= EVEN_SHARE / emitters * (1 - 1e-12)
+
+
+def test_nothing_learned_is_an_even_choice() -> None:
+    np.testing.assert_allclose(
+        probabilities(np.zeros((3, 4)), np.zeros((3, 4)), [0, 1, 2, 3]), 0.25
+    )
+
+
+def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
+    from lightpaint.basis.render.guide import EVEN_SHARE
+
+    asked = np.full((2, 2), 1e6)
+    found = probabilities(np.array([[1e6, 0], [0, 1.0]]), asked, [0, 1])
+    # Each reaches one cell alone and gets that cell, but for the even share.
+    sure = 1 - EVEN_SHARE / 2
+    # 1e-6: what one sample of trust in the mean does beside a million.
+    np.testing.assert_allclose(found, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
+
+
+@pytest.mark.parametrize("enough", [2**12, 2**24])
+def test_guided_planes_are_those_of_separate_renders_within_noise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, enough: int
+) -> None:
+    """While it learns, and after."""
+    use_variant()
+    import lightpaint.basis.render.guide
+
+    monkeypatch.setattr(lightpaint.basis.render.guide, "ENOUGH", enough)
+    monkeypatch.setattr(lightpaint.basis.render.guide, "ENOUGH_EACH", 0)
+    from renderer import LIGHTS
+
+    lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    basis = render_basis(scene, spp=512)
+    separate = _render_one_by_one(scene, Budget(256), 1, None, Keeper(None), silent)
+    for k, name in enumerate(basis.names):
+        gap = basis.images[k] - separate.images[k]
+        noise = np.square(basis.half_differences[k], dtype=np.float64)
+        noise += np.square(separate.half_differences[k], dtype=np.float64)
+        # Noise: five standard errors of the sums over the left and the right half.
+        for half in (np.s_[:, :12], np.s_[:, 12:]):
+            assert abs(gap[half].sum(dtype=np.float64)) <= 5 * np.sqrt(noise[half].sum()), name
+
+
+def test_lights_that_reach_little_get_their_samples_there(tmp_path: Path) -> None:
+    from renderer import one_pass
+
+    integrator = '<integrator type="path"><integer name="max_depth" value="2"/></integrator>'
+    scene = load_scene(write_room(tmp_path, lights=SPOTS + BEHIND, integrator=integrator))
+    guided = render_basis(scene, spp=512, seed=1)
+    chance = np.stack([one_pass(scene, seed=k, spp=16) for k in range(8)])
+    variance = np.square(guided.half_differences, dtype=np.float64).mean(axis=(1, 2, 3)) * 512
+    by_chance = chance.var(axis=0, ddof=1).mean(axis=(1, 2, 3)) * 16
+    # At least twice lower for both spots; no claim for a lamp that the wall hides.
+    assert (variance[:2] < 0.5 * by_chance[:2]).all()
+
+
+def test_what_was_learned_goes_through_the_file(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path, lights=SPOTS + BEHIND))
+    basis = render_basis(scene, spp=8)
+    assert basis.learned is not None
+    received, asked = basis.learned
+    assert asked.sum() > 0
+    assert (received[asked == 0] == 0).all()
+    write_basis(tmp_path / "b.exr", basis)
+    again = read_basis(tmp_path / "b.exr").learned
+    assert again is not None
+    np.testing.assert_array_equal(again, basis.learned)
+
+
+@pytest.mark.parametrize("damage", ["nan", "negative", "shape", "none"])
+def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
+    from dataclasses import replace
+
+    scene = load_scene(write_room(tmp_path, lights=SPOTS))
+    basis = render_basis(scene, spp=4)
+    assert basis.learned is not None
+    learned = basis.learned.copy()
+    if damage in ("nan", "negative"):
+        learned[0, 0, 0] = np.nan if damage == "nan" else -1
+    spoilt = {"shape": learned[:, :1], "none": None}.get(damage, learned)
+    gone_on = render_basis(scene, spp=64, start=replace(basis, learned=spoilt))
+    assert np.isfinite(gone_on.images).all()
+    assert gone_on.images.max() > 0
+
+
+def test_a_kept_emitter_that_is_never_sampled_is_as_dark_as_in_mitsuba(tmp_path: Path) -> None:
+    from renderer import LIGHTS, mitsuba_render
+
+    never = '<float name="sampling_weight" value="0"/></emitter>'
+    bulb, panel = (LIGHTS[name].replace("</emitter>", never) for name in ("bulb", "panel"))
+    path = write_room(tmp_path, lights=bulb + panel + LIGHTS["sky"])
+    scene = load_scene(path, lights=["sky"])
+    basis = render_basis(scene, spp=512)
+    rendered = mitsuba_render(scene, {"sky": (0.0, 0.0, 0.0)}, seed=1, spp=512)
+    kept = basis.image("rest")
+    noise = 2 * np.square(basis.half_differences[basis.names.index("rest")]).sum(dtype=np.float64)
+    # Noise: five standard errors of the difference of the sums. The panel is there by chance
+    # hits alone, the bulb not at all.
+    assert abs((kept - rendered).sum(dtype=np.float64)) <= 5 * np.sqrt(noise)
+    assert rendered.sum() > 0

@@ -1,0 +1,366 @@
+"""The one-pass basis against Mitsuba's own renders: its plain twin, n of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from renderer import CORNELL, LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
+
+from lightpaint.basis.render.budget import Budget, Keeper
+from lightpaint.basis.render.render import (
+    ONE_PASS,
+    SEPARATE,
+    _render_one_by_one,
+    memory_needed,
+    render_basis,
+    why_not_one_pass,
+)
+from lightpaint.basis.render.separate import BLACK, WHITE
+from lightpaint.errors import SceneError
+from lightpaint.progress import silent
+from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes
+from lightpaint.scene.scene import Scene, load_scene
+
+INTEGRATORS = {
+    "path": '<integrator type="path"><integer name="max_depth" value="5"/></integrator>',
+    "unlimited": '<integrator type="path"/>',
+    "early roulette": '<integrator type="path"><integer name="rr_depth" value="2"/></integrator>',
+    "direct only": '<integrator type="path"><integer name="max_depth" value="2"/></integrator>',
+    "emitters only": '<integrator type="path"><integer name="max_depth" value="1"/></integrator>',
+}
+
+
+@pytest.mark.parametrize("kind", INTEGRATORS)
+def test_sum_of_planes_is_mitsubas_render_at_the_same_seed(tmp_path: Path, kind: str) -> None:
+    scene = load_scene(write_room(tmp_path, integrator=INTEGRATORS[kind]))
+    planes = one_pass(scene, seed=11, spp=16)
+    white = {light.name: WHITE for light in scene.lights}
+    rendered = mitsuba_render(scene, white, seed=11, spp=16)
+    assert rendered.max() > 0
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+def test_sum_of_planes_on_the_cornell_box() -> None:
+    scene = load_scene(CORNELL)
+    planes = one_pass(scene, seed=3, spp=16)
+    white = {light.name: WHITE for light in scene.lights}
+    rendered = mitsuba_render(scene, white, seed=3, spp=16)
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+def test_weighted_planes_are_the_relit_render_at_the_same_seed(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    planes = one_pass(scene, seed=5, spp=16)
+    rng = np.random.default_rng(1)
+    weights = rng.uniform(0.1, 3, (len(scene.lights), 3))
+    emission = {x.name: tuple(w) for x, w in zip(scene.lights, weights.tolist(), strict=True)}
+    rendered = mitsuba_render(scene, emission, seed=5, spp=16)
+    mixed = np.einsum("nhwc,nc->hwc", planes, weights)
+    # float32 throughput times weights in another order.
+    assert np.abs(mixed - rendered).max() <= 1e-5 * rendered.max()
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_plane_of_an_only_light_is_exactly_its_render(tmp_path: Path, name: str) -> None:
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS[name]))
+    [plane] = one_pass(scene, seed=2, spp=8)
+    rendered = mitsuba_render(scene, {name: WHITE}, seed=2, spp=8)
+    assert rendered.max() > 0
+    assert np.abs(plane - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+def test_each_plane_is_that_light_alone_within_noise(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    basis = render_basis(scene, spp=256, seed=0)
+    separate = _render_one_by_one(scene, Budget(256), 0, None, Keeper(None), silent)
+    images, differences = separate.images, separate.half_differences
+    seen = separate.emitters_seen
+    for k, name in enumerate(basis.names):
+        gap = float((basis.images[k] - images[k]).sum(dtype=np.float64))
+        noise = np.square(basis.half_differences[k], dtype=np.float64)
+        noise += np.square(differences[k], dtype=np.float64)
+        # Noise: four and a half standard errors of the whole image's sum, five lights.
+        assert abs(gap) <= 4.5 * np.sqrt(noise.sum()), name
+    # The two look for seen emitters in different ways; only edges may differ, by chance.
+    assert (basis.emitters_seen != seen).mean() < 0.02
+    assert seen.any()
+    assert not seen.all()
+
+
+def test_a_light_alone_is_black_elsewhere(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    names = [light.name for light in scene.lights]
+    only = {name: WHITE if name == "beam" else BLACK for name in names}
+    image = mitsuba_render(scene, only, seed=0, spp=16)
+    everything = mitsuba_render(scene, dict.fromkeys(names, WHITE), seed=0, spp=16)
+    assert 0 < image.sum() < everything.sum()
+
+
+def test_furnace_a_white_room_under_a_white_sky_has_radiance_1(tmp_path: Path) -> None:
+    furnace = """<scene version="3.0.0"><integrator type="path"/>
+        <sensor type="perspective"><transform name="to_world">
+        <lookat origin="0 0 4" target="0 0 0" up="0 1 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/>
+        </film></sensor>
+        <shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></shape>
+        <emitter type="constant" id="sky"><rgb name="radiance" value="5"/></emitter></scene>"""
+    path = tmp_path / "furnace.xml"
+    path.write_text(furnace, encoding="utf-8")
+    basis = render_basis(load_scene(path), spp=1024)
+    # A convex white body under a uniform sky of radiance 1 scatters just what it receives.
+    # Beside it the sky is seen as it is: precision of float32.
+    np.testing.assert_allclose(basis.images[0, 0, 0], 1, rtol=1e-6)
+    # On it, noise: four and a half standard errors of the mean.
+    error = np.sqrt(np.square(basis.half_differences, dtype=np.float64).sum())
+    count = basis.images.size
+    assert abs(basis.images.mean(dtype=np.float64) - 1) <= 4.5 * error / count
+    assert error / count < 1e-3
+
+
+def test_point_light_over_a_plane_has_its_closed_form(tmp_path: Path) -> None:
+    albedo, height, width = np.array([0.7, 0.5, 0.4]), 1.5, 31
+    path = tmp_path / "plane.xml"
+    path.write_text(
+        f"""<scene version="3.0.0"><integrator type="path"/>
+        <sensor type="orthographic"><transform name="to_world">
+        <scale x="1" y="1"/><lookat origin="0 5 0" target="0 0 0" up="0 0 1"/></transform>
+        <film type="hdrfilm"><integer name="width" value="{width}"/>
+        <integer name="height" value="{width}"/></film></sensor>
+        <shape type="rectangle"><transform name="to_world"><scale value="9"/>
+        <rotate x="1" angle="-90"/></transform>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.7 0.5 0.4"/></bsdf></shape>
+        <emitter type="point" id="bulb"><point name="position" x="0" y="{height}" z="0"/>
+        <rgb name="intensity" value="7"/></emitter></scene>""",
+        encoding="utf-8",
+    )
+    basis = render_basis(load_scene(path), spp=64)
+    middle = basis.images[0, width // 2, width // 2]
+    # Radiance below a lamp of intensity 1: albedo/π · 1/h². A pixel 1/31 wide around it
+    # varies by less than 0.2 %.
+    np.testing.assert_allclose(middle, albedo / np.pi / height**2, rtol=2e-3)
+    # And away from it the cube of the cosine: irradiance I cosθ/r² with r = h/cosθ.
+    x = (np.arange(width) + 0.5) / width * 2 - 1
+    cos = height / np.hypot(height, x)
+    expected = albedo[0] / np.pi / height**2 * cos**3
+    row = basis.images[0, width // 2, :, 0]
+    np.testing.assert_allclose(row, expected, rtol=1e-2)
+
+
+def test_the_present_look_comes_back_from_present_weights(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    planes = one_pass(scene, seed=9, spp=16)
+    present = np.array([light.emission for light in scene.lights])
+    rendered = mitsuba_render(scene, seed=9, spp=16)
+    mixed = np.einsum("nhwc,nc->hwc", planes, present)
+    assert np.abs(mixed - rendered).max() <= 1e-5 * rendered.max()
+
+
+def test_a_light_switched_off_in_the_scene_still_has_its_image(tmp_path: Path) -> None:
+    off = LIGHTS["bulb"].replace("0.5 0.6 0.7", "0 0 0")
+    off = off.replace("</emitter>", '<float name="sampling_weight" value="0"/></emitter>')
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["sky"] + off))
+    basis = render_basis(scene, spp=16)
+    assert basis.images[basis.names.index("bulb")].max() > 0
+
+
+def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
+    crop = """<integer name="crop_offset_x" value="5"/><integer name="crop_offset_y" value="3"/>
+        <integer name="crop_width" value="12"/><integer name="crop_height" value="9"/>"""
+    lens = """<sensor type="thinlens" id="close"><float name="aperture_radius" value="0.1"/>
+        <float name="focus_distance" value="3"/><transform name="to_world">
+        <lookat origin="1 1 2" target="0 0.5 0" up="0 1 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="10"/><integer name="height" value="14"/>
+        </film></sensor>"""
+    path = write_room(tmp_path, film=crop, sensors=lens)
+    for sensor, size in (("camera", (9, 12)), ("close", (14, 10))):
+        scene = load_scene(path, sensor=sensor)
+        assert scene.size == size
+        planes = one_pass(scene, seed=4, spp=8)
+        white = {light.name: WHITE for light in scene.lights}
+        rendered = mitsuba_render(scene, white, seed=4, spp=8)
+        assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+@pytest.mark.parametrize(
+    ("integrator", "why"),
+    [
+        ('<integrator type="volpath"/>', "volpath"),
+        ('<integrator type="ptracer"/>', "ptracer"),
+    ],
+)
+def test_what_one_pass_cannot_serve_is_rendered_separately(
+    tmp_path: Path, integrator: str, why: str
+) -> None:
+    scene = load_scene(write_room(tmp_path, integrator=integrator))
+    assert why in str(why_not_one_pass(scene))
+    basis = render_basis(scene, spp=4)
+    assert basis.origin.method == SEPARATE
+    assert (basis.images.reshape(len(basis.lights), -1).sum(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize("option", ["emitter_samples", "bsdf_samples", "shading_samples"])
+def test_direct_with_other_sample_counts_is_not_one_path(tmp_path: Path, option: str) -> None:
+    integrator = f'<integrator type="direct"><integer name="{option}" value="2"/></integrator>'
+    scene = load_scene(write_room(tmp_path, integrator=integrator))
+    assert "draws other than one" in str(why_not_one_pass(scene))
+
+
+def test_rays_that_only_pass_surfaces_are_left_to_mitsuba(tmp_path: Path) -> None:
+    ghost = """<shape type="rectangle" id="ghost"><transform name="to_world">
+        <translate z="0.8" y="1"/></transform><bsdf type="null"/><emitter type="area"/></shape>"""
+    scene = load_scene(write_room(tmp_path, lights=ghost + LIGHTS["bulb"]))
+    assert "pass surfaces" in str(why_not_one_pass(scene))
+    basis = render_basis(scene, spp=256)
+    white = {light.name: WHITE for light in scene.lights}
+    rendered = mitsuba_render(scene, white, seed=1, spp=256)
+    gap = float((basis.images.sum(axis=0) - rendered).sum(dtype=np.float64))
+    noise = 2 * np.square(basis.half_differences.sum(axis=0), dtype=np.float64).sum()
+    # Noise: five standard errors of the difference of the sums.
+    assert abs(gap) <= 5 * np.sqrt(noise)
+    # With a sky, what passes is seen against it, and one pass serves.
+    lit = load_scene(write_room(tmp_path, lights=ghost + LIGHTS["sky"]))
+    assert why_not_one_pass(lit) is None
+    planes = one_pass(lit, seed=3, spp=16)
+    rendered = mitsuba_render(lit, {x.name: WHITE for x in lit.lights}, seed=3, spp=16)
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+@pytest.mark.parametrize("sampler", ["stratified", "multijitter", "orthogonal", "ldsampler"])
+def test_other_samplers(tmp_path: Path, sampler: str) -> None:
+    path = write_room(tmp_path)
+    text = path.read_text(encoding="utf-8").replace('"independent"', f'"{sampler}"')
+    path.write_text(text, encoding="utf-8")
+    scene = load_scene(path)
+    planes = one_pass(scene, seed=3, spp=16)
+    rendered = mitsuba_render(scene, {x.name: WHITE for x in scene.lights}, seed=3, spp=16)
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+@pytest.mark.parametrize(
+    "wrapper",
+    [
+        '<integrator type="aov"><string name="aovs" value="dd:depth,nn:sh_normal"/>{}</integrator>',
+        '<integrator type="moment">{}</integrator>',
+        '<integrator type="moment"><integrator type="aov"><string name="aovs" value="dd:depth"/>'
+        "{}</integrator></integrator>",
+    ],
+)
+def test_a_wrapped_path_is_one_pass(tmp_path: Path, wrapper: str) -> None:
+    scene = load_scene(write_room(tmp_path, integrator=wrapper.format(INTEGRATORS["path"])))
+    assert why_not_one_pass(scene) is None
+    planes = one_pass(scene, seed=11, spp=16)
+    rendered = mitsuba_render(scene, {x.name: WHITE for x in scene.lights}, seed=11, spp=16)
+    assert rendered.max() > 0
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+    inside = load_scene(
+        write_room(tmp_path, integrator=wrapper.format("<integrator type='volpath'/>"))
+    )
+    assert "volpath" in str(why_not_one_pass(inside))
+
+
+def test_wrapped_integrators_hide_what_the_inner_one_hides(tmp_path: Path) -> None:
+    inner = '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>'
+    aovs = '<string name="aovs" value="dd:depth"/>'
+    scene = load_scene(
+        write_room(tmp_path, integrator=f'<integrator type="aov">{aovs}{inner}</integrator>')
+    )
+    assert scene.integrator.hide_emitters
+    assert not render_basis(scene, spp=4).emitters_seen.any()
+    with pytest.raises(SceneError, match="none inside that renders light"):
+        load_scene(write_room(tmp_path, integrator=f'<integrator type="aov">{aovs}</integrator>'))
+
+
+def test_direct_is_path_of_depth_2(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path, integrator='<integrator type="direct"/>'))
+    assert why_not_one_pass(scene) is None
+    basis = render_basis(scene, spp=256)
+    assert basis.origin.method == ONE_PASS
+    white = {light.name: WHITE for light in scene.lights}
+    rendered = mitsuba_render(scene, white, seed=1, spp=256)
+    gap = float((basis.images.sum(axis=0) - rendered).sum(dtype=np.float64))
+    # Noise: both have about the same; five standard errors of the difference of the sums.
+    noise = 2 * np.square(basis.half_differences.sum(axis=0), dtype=np.float64).sum()
+    assert abs(gap) <= 5 * np.sqrt(noise)
+
+
+def test_equal_seeds_repeat_and_others_differ(tmp_path: Path) -> None:
+    scene: Scene = load_scene(write_room(tmp_path))
+    a, b, c = (render_basis(scene, spp=4, seed=s) for s in (0, 0, 1))
+    # Threads add in any order: the last bits of float32.
+    assert np.abs(a.images - b.images).max() <= SAME_SAMPLES * a.images.max()
+    assert np.abs(a.images - c.images).max() > 0.01 * a.images.max()
+
+
+@pytest.mark.parametrize("lights", [("panel", "sky"), ("panel", "bulb", "beam")])
+def test_hidden_emitters_are_hidden_from_the_camera_alone(
+    tmp_path: Path, lights: tuple[str, ...]
+) -> None:
+    hidden = '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>'
+    veil = """<shape type="rectangle" id="veil"><transform name="to_world"><scale value="0.4"/>
+        <translate z="1.5" y="1"/></transform><emitter type="area"/></shape>"""
+    here = "".join(LIGHTS[name] for name in lights) + veil
+    scene = load_scene(write_room(tmp_path, lights=here, integrator=hidden))
+    assert why_not_one_pass(scene) is None
+    white = {light.name: WHITE for light in scene.lights}
+    planes = one_pass(scene, seed=3, spp=16)
+    rendered = mitsuba_render(scene, white, seed=3, spp=16)
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+    assert not render_basis(scene, spp=4).emitters_seen.any()
+    shown = mitsuba_render(load_scene(write_room(tmp_path, lights=here)), white, seed=3, spp=16)
+    assert shown.sum() > 1.1 * rendered.sum()
+
+
+def test_better_numbers_are_unbiased_at_any_length_and_less_noisy(tmp_path: Path) -> None:
+    """Against choosing at random, for a scene whose lights have no other noise."""
+    lamps = "".join(
+        f"""<emitter type="point"><point name="position" x="{0.4 * k - 0.8}" y="1" z="1"/>
+        </emitter>"""
+        for k in range(5)
+    )
+    integrator = '<integrator type="path"><integer name="max_depth" value="2"/></integrator>'
+    scene = load_scene(write_room(tmp_path, lights=lamps, integrator=integrator))
+    for spp in (3, 40):
+        better = np.stack([one_pass(scene, seed=k, spp=spp, plain=False) for k in range(1, 9)])
+        chance = np.stack([one_pass(scene, seed=k, spp=spp) for k in range(100, 108)])
+        gap = better.mean(axis=(0, 2, 3)) - chance.mean(axis=(0, 2, 3))
+        error = np.sqrt(
+            sum(x.mean(axis=(2, 3)).var(axis=0, ddof=1) / len(x) for x in (better, chance))
+        )
+        # Noise: four and a half standard errors, five lights in three channels.
+        assert (np.abs(gap) <= 4.5 * error).all()
+        # What is left is the noise of edges within a pixel.
+        assert better.var(axis=0).mean() < 0.8 * chance.var(axis=0).mean()
+
+
+def test_pass_seeds_never_meet() -> None:
+    seeds = [
+        pass_seed(seed, stream, k) for seed in range(20) for stream in Stream for k in range(20)
+    ]
+    assert len(set(seeds)) == len(seeds)
+
+
+@pytest.mark.parametrize("pixels", [1, 400, 230_400, 8_294_400])
+@pytest.mark.parametrize("spp", [2, 3, 64, 1000])
+def test_passes_make_up_two_equal_halves_of_the_samples(pixels: int, spp: int) -> None:
+    plan = plan_passes(pixels, spp)
+    sizes = [[size for half, size in plan if half == h] for h in range(2)]
+    assert sizes[0] == sizes[1]
+    assert spp <= sum(map(sum, sizes)) <= spp + 1
+    assert [half for half, _ in plan] == [0, 1] * len(sizes[0])
+    assert min(sizes[0]) >= 1
+    assert max(sizes[0]) * pixels <= max(SAMPLES_PER_PASS, pixels)
+
+
+def test_what_does_not_fit_is_refused_before_it_is_tried(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    huge = load_scene(path, parameters={"width": 10_000_000})
+    with pytest.raises(SceneError, match="5 lights at 10000000x20"):
+        render_basis(huge, spp=2)
+    large = load_scene(path, parameters={"width": 600_000})
+    assert memory_needed(large) > 5 * 600_000 * 20 * 3 * 4 * 6
+
+
+def test_too_few_samples_are_refused(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    with pytest.raises(SceneError, match="too few for two halves"):
+        render_basis(scene, spp=1)

@@ -1,0 +1,675 @@
+"""The command line as a user meets it: real processes, real files, exit codes."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from command import refused, run, succeed
+from PIL import Image
+from renderer import LIGHTS, REPOSITORY, write_room
+
+from lightpaint import paint_with_light, read_basis
+from lightpaint.basis.render.render import render_basis
+from lightpaint.errors import BasisError
+from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+from lightpaint.results import verify_result
+from lightpaint.scene.scene import load_scene
+from lightpaint.target.target import Target
+
+CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"
+GALLERY = REPOSITORY / "scenes" / "gallery" / "scene.xml"
+WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
+COOL = REPOSITORY / "targets" / "cornell" / "cool.exr"
+COOL_MASK = REPOSITORY / "targets" / "cornell" / "cool.mask.exr"
+
+RESULTS = {
+    "lighting.json",
+    "relit.xml",
+    "predicted.exr",
+    "verified.exr",
+    "comparison.png",
+    "report.html",
+}
+
+
+@pytest.fixture(scope="module")
+def basis_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("basis") / "cornell.basis.exr"
+    assert "5 lights" in succeed(path.parent, "basis", CORNELL, "-o", path, "--spp", 8)
+    return path
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The main job: a scene and a painting in, a verified lighting out."""
+    folder = tmp_path_factory.mktemp("solved")
+    return folder / "warm", succeed(folder, "solve", CORNELL, WARM, "--spp", 32)
+
+
+def test_solve_leaves_everything_it_promises(solved: tuple[Path, str]) -> None:
+    folder, output = solved
+    assert {p.name for p in folder.iterdir()} == RESULTS
+    assert "agree" in output
+    for name in ("ceiling", "left_spot", "right_spot", "lamp", "window"):
+        assert name in output
+    data = json.loads((folder / "lighting.json").read_text(encoding="utf-8"))
+    assert data["format"].startswith("lightpaint-lighting ")
+    assert max(data["solve"]["kkt_residual"]) <= 1e-10
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert f"lightpaint solve {CORNELL} {WARM} --spp 32" in page
+
+
+def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: Path) -> None:
+    folder, _ = solved
+    assert "agree within noise" in succeed(tmp_path, "verify", folder, "--seed", 5)
+    copies = []
+    for name in ("one", "two"):
+        data = json.loads((folder / "lighting.json").read_text(encoding="utf-8"))
+        data["target"] = name
+        copies.append(tmp_path / f"{name}.json")
+        copies[-1].write_text(json.dumps(data), encoding="utf-8")
+    succeed(tmp_path, "relight", CORNELL, *copies, "-o", "looks", "--spp", 4)
+    for name in ("one", "two"):
+        made = {p.name for p in (tmp_path / "looks" / name).iterdir()}
+        assert made == {"relit.xml", "relit.exr", "relit.png"}
+
+
+def test_verify_tells_a_tampered_scene(solved: tuple[Path, str], tmp_path: Path) -> None:
+    folder = tmp_path / "warm"
+    shutil.copytree(solved[0], folder)
+    # The copy lies elsewhere: point it at the original's assets.
+    relit = folder / "relit.xml"
+    origin = os.path.relpath(CORNELL.parent, folder)
+    lines = relit.read_text(encoding="utf-8").splitlines()
+    lines = [f'<path value="{origin}"/>' if "<path " in line else line for line in lines]
+    relit.write_text("\n".join(lines).replace('max_depth" value="6"', 'max_depth" value="3"'))
+    done = run(tmp_path, "verify", folder)
+    assert done.returncode == 1
+    assert "DISAGREE" in done.stdout
+
+
+def test_several_targets_share_one_basis(tmp_path: Path) -> None:
+    done = run(
+        tmp_path,
+        "solve",
+        CORNELL,
+        WARM,
+        COOL,
+        "--mask",
+        COOL_MASK,
+        "--no-cache",
+        "--spp",
+        4,
+        "-o",
+        "out",
+    )
+    assert done.returncode == 0, done.stderr
+    for name in ("warm", "cool"):
+        assert {p.name for p in (tmp_path / "out" / name).iterdir()} == RESULTS
+    assert done.stderr.count("basis:") == 1
+
+
+def test_each_target_with_its_own_mask(basis_file: Path, tmp_path: Path) -> None:
+    write_parts(tmp_path / "m.exr", [Part("", {"Y": np.ones((128, 128), np.float32)})])
+    masks = ("--mask", "m.exr", "--mask", COOL_MASK)
+    succeed(tmp_path, "solve", basis_file, WARM, COOL, *masks, "-o", "both")
+    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", "cool")
+    together = tmp_path / "both" / "cool" / "lighting.json"
+    assert together.read_bytes() == (tmp_path / "cool" / "lighting.json").read_bytes()
+    assert "3 masks for 2 targets" in refused(
+        tmp_path, "solve", basis_file, WARM, COOL, *masks, "--mask", "m.exr"
+    )
+
+
+def test_a_basis_of_another_view_is_noticed(tmp_path: Path) -> None:
+    sensor = """<sensor type="perspective" id="side"><transform name="to_world">
+        <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">
+        <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
+    path = write_room(tmp_path, sensors=sensor)
+    scene, side = load_scene(path), load_scene(path, sensor="side")
+    basis = render_basis(side, spp=16)
+    target = Target("t", basis.images[0], np.ones(basis.size, np.float32), everything=True)
+    with pytest.raises(BasisError, match="another sensor"):
+        paint_with_light(scene, target, tmp_path / "out", basis=basis)
+    room = path.read_text(encoding="utf-8")
+    path.write_text(room.replace("0.7 0.5 0.4", "0.7 0.5 0.5"), encoding="utf-8")
+    with pytest.raises(BasisError, match="another state"):
+        paint_with_light(load_scene(path, sensor="side"), target, tmp_path / "out", basis=basis)
+    assert not (tmp_path / "out").exists()
+    # What was solved through one sensor is verified through it.
+    path.write_text(room, encoding="utf-8")
+    look = paint_with_light(side, target, tmp_path / "out", basis=basis)
+    assert look.verification is not None
+    assert look.verification.agrees
+    again = verify_result(tmp_path / "out")
+    assert again.agrees
+    assert np.abs(again.verified.image - look.verification.verified.image).max() > 0
+
+
+def test_solving_from_a_basis_needs_no_mitsuba(basis_file: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys\n"
+        "class Wall:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('mitsuba', 'drjit'): raise ImportError(name)\n"
+        "sys.meta_path.insert(0, Wall())\n"
+        "from lightpaint.cli import main\n"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "solve", str(basis_file), str(WARM)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (tmp_path / "warm").iterdir()} == RESULTS - {
+        "relit.xml",
+        "verified.exr",
+    }
+
+
+def test_lights_as_table_and_json(tmp_path: Path) -> None:
+    assert "left_spot" in succeed(tmp_path, "lights", CORNELL)
+    data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json"))
+    assert data["lights"][0]["name"] == "ceiling"
+    np.testing.assert_allclose(data["lights"][0]["emission"], [7, 6.8, 6.4], rtol=1e-6)
+
+
+def test_lights_in_candela_and_lumen_where_the_scene_has_a_unit(tmp_path: Path) -> None:
+    plain = succeed(tmp_path, "lights", CORNELL)
+    assert "K" in plain
+    assert "lm" not in plain
+    assert "cd/m²" in succeed(tmp_path, "lights", CORNELL, "--unit", 100)
+    data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json", "--unit", 100))
+    assert data["cd_per_unit"] == 100
+    lamp = next(light for light in data["lights"] if light["name"] == "lamp")
+    found, y = lamp["photometry"], np.dot(lamp["emission"], [0.2126, 0.7152, 0.0722])
+    assert found["luminous_unit"] == "cd"
+    assert found["luminous"] == pytest.approx(100 * y)
+    assert found["flux_lm"] == pytest.approx(4 * np.pi * 100 * y, rel=1e-6)
+    assert lamp["members"][0]["photometry"] == found
+    for wrong in ("0", "-1", "bright", "inf"):
+        assert "cd/m²" in refused(tmp_path, "lights", CORNELL, f"--unit={wrong}")
+
+
+def test_template_is_the_current_look(tmp_path: Path) -> None:
+    succeed(tmp_path, "template", CORNELL, "-o", "t.exr", "--spp", 4)
+    [part] = read_parts(tmp_path / "t.exr")
+    assert part.rgb().shape == (128, 128, 3)
+    assert (tmp_path / "t.png").is_file()
+
+
+def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
+    for output, file in (("t.exr", "t.exr"), ("t.exr", "t.png"), ("template", "template.png")):
+        command = ("template", CORNELL, "--spp", 2, "-o", output)
+        succeed(tmp_path, *command, "--force")
+        painted = (tmp_path / output).parent / file if "." in output else tmp_path / output / file
+        painted.write_bytes(b"hours of work")
+        assert "may have been painted on" in refused(tmp_path, *command)
+        assert painted.read_bytes() == b"hours of work"
+        succeed(tmp_path, *command, "--force")
+        assert painted.read_bytes() != b"hours of work"
+
+
+def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
+    said = succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 64)
+    assert "template/template.png" in said
+    folder = tmp_path / "template"
+    names = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()}
+    plain = {"template.exr", "template.png", "albedo.exr", "normals.exr", "depth.exr"}
+    assert plain | {"template.json"} <= names
+    assert {"lights/ceiling.png", "lights/lamp.png"} <= names
+    assert "mattes/floor.png" in names
+    with Image.open(folder / "template.png") as file:
+        pixels = np.array(file.convert("RGB"))
+    pixels[8:20, 8:20] = 250, 200, 120
+    # Whatever a program calls it, and whatever it forgets of the view.
+    Image.fromarray(pixels).save(folder / "warmer.png")
+    command = ("solve", CORNELL, "template/warmer.png", "--resolution", "1/4", "--spp", 16)
+    done = run(tmp_path, *command, "-o", "out")
+    assert done.returncode == 0, done.stderr
+    # 12 x 12 of 32 x 32 pixels.
+    assert "warmer: 14.1 % painted: what differs from the template in template" in done.stderr
+    assert "nothing in" in refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    about = folder / "template.json"
+    other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
+    about.write_text(other, encoding="utf-8")
+    assert "a template of the sensor balcony, not of camera" in refused(tmp_path, *command)
+
+
+def test_a_template_that_is_forced_leaves_nothing_of_the_earlier_one(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    succeed(tmp_path, "template", room, "--spp", 2)
+    (tmp_path / "template" / "painting.png").write_bytes(b"mine")
+    room.write_text(room.read_text(encoding="utf-8").replace('id="ball"', 'id="globe"'))
+    succeed(tmp_path, "template", room, "--spp", 2, "--force")
+    mattes = {file.name for file in (tmp_path / "template" / "mattes").iterdir()}
+    assert "globe.png" in mattes
+    assert "ball.png" not in mattes
+    assert (tmp_path / "template" / "painting.png").read_bytes() == b"mine"
+
+
+def test_results_of_two_solves_never_stand_together(
+    solved: tuple[Path, str], basis_file: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "look"
+    shutil.copytree(solved[0], folder)
+    (folder / "notes.txt").write_text("mine", encoding="utf-8")
+    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder)
+    left = {p.name for p in folder.iterdir()}
+    assert left == (RESULTS - {"relit.xml", "verified.exr"}) | {"notes.txt"}
+    # A folder that no solve has written to is not tidied.
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "relit.xml").write_text("mine", encoding="utf-8")
+    succeed(tmp_path, "solve", basis_file, WARM, "-o", other)
+    assert (other / "relit.xml").read_text(encoding="utf-8") == "mine"
+
+
+def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
+    command = f"{sys.executable} -m lightpaint.cli.parser solve {basis_file} {WARM} {COOL} -o out"
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {command} | true"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    for name in ("warm", "cool"):
+        assert (tmp_path / "out" / name / "report.html").is_file()
+
+
+def test_a_terminal_without_unicode_loses_no_result(tmp_path: Path) -> None:
+    done = run(tmp_path, "lights", CORNELL, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "W/(m? sr)" in done.stdout
+
+
+def test_a_lighting_cannot_name_a_folder_elsewhere(
+    solved: tuple[Path, str], tmp_path: Path
+) -> None:
+    data = json.loads((solved[0] / "lighting.json").read_text(encoding="utf-8"))
+    for target in ("../elsewhere", "/tmp/elsewhere", "..", 5):
+        path = tmp_path / "l.json"
+        path.write_text(json.dumps({**data, "target": target}), encoding="utf-8")
+        refused(tmp_path, "relight", CORNELL, path)
+
+
+def test_doctor_fails_where_something_is_missing(tmp_path: Path) -> None:
+    done = run(tmp_path, "doctor", "-m", "llvm_nonsense_rgb")
+    assert done.returncode == 2
+    assert "MISSING" in done.stdout
+
+
+def test_resize_does_not_stretch(basis_file: Path, tmp_path: Path) -> None:
+    write_rgb(tmp_path / "wide.exr", np.ones((64, 128, 3), np.float32))
+    assert "another shape" in refused(tmp_path, "solve", basis_file, "wide.exr", "--resize")
+
+
+def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    done = run(tmp_path, "basis", room, "-m", "scalar_rgb", "--spp", 4, "-D", "width=8")
+    assert done.returncode == 0, done.stderr
+    assert "separately" in done.stderr
+    assert (tmp_path / "room.basis.exr").is_file()
+
+
+def test_doctor_names_what_it_found(tmp_path: Path) -> None:
+    output = succeed(tmp_path, "doctor")
+    for word in ("mitsuba", "LLVM", "cores", "GPU", "backend"):
+        assert word in output
+
+
+def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:
+    code = "import sys, lightpaint.cli as c\ntry: c.main(['--help'])\nfinally: print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "solve" in done.stdout
+    loaded = done.stdout.split()
+    assert "mitsuba" not in loaded
+    assert "drjit" not in loaded
+    for command in ("lights", "basis", "template", "solve", "relight", "verify", "doctor"):
+        assert "--help" in succeed(tmp_path, command, "--help")
+
+
+def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path: Path) -> None:
+    image = np.ones((128, 128, 3), np.float32)
+    bad = tmp_path / "bad"
+    bad.mkdir()
+    write_rgb(bad / "small.exr", image[:64])
+    write_parts(bad / "unpainted.exr", [Part("", {**rgb_channels(image), "A": image[..., 0] * 0})])
+    write_parts(bad / "negative.exr", [Part("", {**rgb_channels(image), "W": -image[..., 0]})])
+    write_rgb(bad / "nan.exr", image * np.nan)
+    whole = WARM.read_bytes()
+    (bad / "cut.exr").write_bytes(whole[: len(whole) // 2])
+    (bad / "text.exr").write_text("no picture")
+    (bad / "file").write_text("in the way")
+    here = tmp_path
+    for target, words in {
+        "gone.exr": "no such image file",
+        "bad/small.exr": "128x64",
+        "bad/unpainted.exr": "importance 0 everywhere",
+        "bad/negative.exr": "not negative",
+        "bad/nan.exr": "NaN or Inf in every pixel",
+        "bad/cut.exr": "cut off",
+        "bad/text.exr": "is no picture that can be read",
+        "bad": "is a folder",
+    }.items():
+        assert words in refused(here, "solve", basis_file, target)
+        assert words in refused(here, "solve", CORNELL, target)
+    assert "cannot write into bad/file" in refused(
+        here, "solve", basis_file, WARM, "-o", "bad/file"
+    )
+    assert "cannot write" in refused(here, "solve", basis_file, WARM, "-o", "bad/file/deeper")
+    assert "no layers named like" in refused(here, "solve", WARM, WARM)
+    assert "no such scene" in refused(here, "solve", "gone.xml", WARM)
+    assert "not a scene" in refused(here, "lights", "bad/text.exr")
+    assert "is a folder" in refused(here, "lights", "bad")
+    assert "refuses" in refused(here, "lights", "bad/file")
+    assert "nothing to render" in refused(here, "lights", GALLERY, "-D", "width=0")
+    assert "cannot change a saved basis" in refused(here, "solve", basis_file, WARM, "--spp", 9)
+    assert "no sensor 'nobody'" in refused(here, "lights", CORNELL, "-s", "nobody")
+    assert "not key=value" in refused(here, "lights", CORNELL, "-D", "spp")
+    assert "spp" in refused(here, "basis", CORNELL, "--spp", "1")
+    assert "seed" in refused(here, "basis", CORNELL, "--seed", "-1")
+    assert "unpainted" in refused(here, "solve", basis_file, WARM, "--unpainted", "nan")
+    assert "overwrite" in refused(here, "solve", basis_file, WARM, WARM)
+    assert "must end in .exr" in refused(here, "basis", CORNELL, "-o", "basis.png")
+    assert "no such lighting" in refused(here, "relight", CORNELL, "gone.json")
+    assert "not a JSON" in refused(here, "relight", CORNELL, "bad/file")
+    assert "no result folder" in refused(here, "verify", "bad")
+    assert "no variant" in refused(here, "lights", CORNELL, "-m", "llvm_ad_nonsense_rgb")
+    assert "not supported" in refused(here, "lights", CORNELL, "-m", "scalar_spectral")
+
+
+def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
+    pixels = np.empty((2, 2), dtype=object)
+    for index in np.ndindex(2, 2):
+        pixels[index] = np.ones(3, np.float32)
+    header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.deepscanline}
+    OpenEXR.File(header, {"R": pixels, "G": pixels, "B": pixels}).write(str(tmp_path / "deep.exr"))
+    assert "deep" in refused(tmp_path, "solve", CORNELL, "deep.exr")
+
+
+def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
+    [part] = read_parts(WARM)
+    wide = {k: np.repeat(np.repeat(v, 2, 0), 2, 1) for k, v in part.channels.items()}
+    write_parts(tmp_path / "wide.exr", [Part("", wide)])
+    succeed(tmp_path, "solve", basis_file, "wide.exr", "--resize")
+    succeed(tmp_path, "solve", basis_file, WARM)
+    answers = [
+        json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))["lights"]
+        for name in ("wide", "warm")
+    ]
+    for light in answers[0]:
+        # Each pixel stands four times and is averaged again: precision of half and float32.
+        np.testing.assert_allclose(
+            answers[0][light]["emission"], answers[1][light]["emission"], rtol=1e-4, atol=1e-5
+        )
+    succeed(tmp_path, "solve", basis_file, WARM, "-o", "held", "--unpainted", "100")
+    held = json.loads((tmp_path / "held" / "lighting.json").read_text(encoding="utf-8"))["lights"]
+    present = json.loads(succeed(tmp_path, "lights", CORNELL, "--json"))["lights"]
+    now = {light["name"]: light["emission"] for light in present}
+
+    def gap(lights: dict[str, dict[str, list[float]]]) -> float:
+        return sum(float(np.abs(np.subtract(lights[n]["emission"], now[n])).sum()) for n in now)
+
+    assert gap(held) < gap(answers[1])
+
+
+def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    text = room.read_text(encoding="utf-8").replace('<default name="width" value="24"/>', "")
+    room.write_text(text, encoding="utf-8")
+    assert "-D width=VALUE" in refused(tmp_path, "lights", room)
+    assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9")
+
+
+@pytest.mark.parametrize("delay_s", [0, 0.1, 3])
+def test_interrupted_keeps_what_is_done_and_goes_on(tmp_path: Path, delay_s: float) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "lightpaint.cli.parser",
+        "basis",
+        str(CORNELL),
+        "--spp",
+        "4000",
+    ]
+    command += ["--seed", str(int(10 * delay_s))]
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        while not process.stderr.readline().startswith("basis"):
+            pass
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        errors = process.stderr.read()
+        assert process.wait(timeout=60) == 130
+    assert errors.startswith("lightpaint basis: interrupted")
+    assert errors.count("\n") == 1
+    kept = list((tmp_path / "cache").glob("*"))
+    assert len(kept) == ("are kept" in errors)
+    if delay_s == 3:
+        [path] = kept
+        done = read_basis(path).origin.spp
+        assert f"{done} of 4000" in errors
+    assert [p.name for p in tmp_path.iterdir() if p.name != "cache"] == []
+
+
+@pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])
+def test_killed_at_any_moment_leaves_a_readable_basis(tmp_path: Path, delay_s: float) -> None:
+    code = f"""
+import lightpaint.scene.render, lightpaint as lp, sys
+from lightpaint.basis.render.obtain import obtain_basis
+sys.modules["lightpaint.basis.render.budget"].KEEP_EVERY_S = 0
+lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
+scene = lp.load_scene({str(CORNELL)!r})
+print("ready", flush=True)
+obtain_basis(scene, spp=100_000)
+"""
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        while not list(tmp_path.glob("*.basis.exr")):
+            time.sleep(0.01)
+        time.sleep(delay_s)
+        process.kill()
+    [path] = tmp_path.glob("*.basis.exr")
+    basis = read_basis(path)
+    assert basis.origin.spp >= 2
+    # And the next run goes on from there, like one that was never interrupted.
+    more = basis.origin.spp + 32
+    code = code.replace("100_000", str(more))
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True)
+    again = read_basis(path)
+    assert more <= again.origin.spp <= more + 1
+
+
+def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
+    def call(*arguments: object) -> str:
+        done = run(tmp_path, *arguments, LIGHTPAINT_CACHE=str(tmp_path / "cache"))
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    call("basis", CORNELL, "--spp", "2", "--no-cache")
+    assert "scene.xml" not in call("cache")
+    call("basis", CORNELL, "--spp", "2")
+    assert "scene.xml" in call("cache", "list")
+    assert "1 deleted" in call("cache", "clear")
+    assert "scene.xml" not in call("cache")
+
+
+CHECKERS = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
+    <rotate y="1" angle="90"/><translate x="-1" y="1"/></transform><emitter type="area">
+    <texture type="checkerboard" name="radiance"/></emitter></shape>"""
+
+
+def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
+    room = write_room(tmp_path, lights="".join(LIGHTS.values()) + CHECKERS)
+    choice = ("--group", "warm=panel,bulb", "--lights", "warm,s*")
+    done = run(tmp_path, "lights", room, *choice, "--json")
+    assert "left as it is: 'screen' has a textured radiance" in done.stderr
+    listed = {light["name"]: light for light in json.loads(done.stdout)["lights"]}
+    members = {name: [m["name"] for m in light["members"]] for name, light in listed.items()}
+    assert members == {
+        "warm": ["panel", "bulb"],
+        "sun": ["sun"],
+        "sky": ["sky"],
+        "rest": ["beam", "screen"],
+    }
+    assert [name for name, light in listed.items() if light["is_fixed"]] == ["rest"]
+    assert "  beam" in succeed(tmp_path, "lights", room, *choice)
+
+    succeed(tmp_path, "template", room, "-o", "t.exr", "--spp", 16)
+    output = succeed(tmp_path, "solve", room, "t.exr", *choice, "--spp", 64, "-o", "out")
+    assert "agree within noise" in output
+    assert re.search(r"^rest .* kept ", output, re.MULTILINE)
+    assert "agree within noise" in succeed(tmp_path, "verify", "out")
+    succeed(tmp_path, "relight", room, "out/lighting.json", "-o", "again", "--spp", 4)
+    again, relit = (tmp_path / name / "relit.xml" for name in ("again", "out"))
+    assert again.read_bytes() == relit.read_bytes()
+
+    # The same from a basis of its own, which keeps what it was made with.
+    succeed(tmp_path, "basis", room, *choice, "--spp", 64, "-o", "b.basis.exr")
+    succeed(tmp_path, "solve", "b.basis.exr", "t.exr", "-o", "from_basis")
+    answers = [
+        json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))
+        for name in ("out", "from_basis")
+    ]
+    assert answers[0] == answers[1]
+    line = refused(tmp_path, "solve", "b.basis.exr", "t.exr", "--lights", "sky", "-o", "no")
+    assert "--lights cannot change a saved basis" in line
+
+
+def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
+    room = write_room(tmp_path)
+    beside = tmp_path / "room.lights.toml"
+    beside.write_text('lights = ["pair"]\n[groups]\npair = ["sun", "sky"]\n', encoding="utf-8")
+
+    def names(*arguments: object) -> list[str]:
+        text = succeed(tmp_path, "lights", room, "--json", *arguments)
+        return [light["name"] for light in json.loads(text)["lights"]]
+
+    assert names() == ["pair", "rest"]
+    assert "room.lights.toml" in run(tmp_path, "lights", room).stderr
+    # The command line replaces the list, and adds groups or replaces namesakes.
+    assert names("--lights", "pair,b*") == ["bulb", "beam", "pair", "rest"]
+    assert names("--group", "pair=panel,bulb") == ["pair", "rest"]
+    assert names("--group", "two=bulb,beam") == ["two", "pair", "rest"]
+    assert names("--group", "two=bulb,beam", "--lights", "two") == ["two", "rest"]
+    assert len(names("--no-lights-file")) == 5
+    other = tmp_path / "other.toml"
+    other.write_text('[groups]\nall = ["*"]\n', encoding="utf-8")
+    assert names("--lights-file", other) == ["all"]
+
+    beside.write_text("lights = [", encoding="utf-8")
+    line = refused(tmp_path, "basis", room)
+    assert "room.lights.toml is not TOML" in line
+    assert "line 1" in line
+    # What has no use for lights does not read it.
+    succeed(tmp_path, "template", room, "--spp", 2, "-o", "t.exr")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--group", "bulb"), "is not name=a,b,c"),
+        (("--group", "=bulb"), "is not name=a,b,c"),
+        (("--group", "g="), "is not a list of names"),
+        (("--lights", "bulb,,sky"), "is not a list of names"),
+        (("--lights", "blub"), "did you mean 'bulb'"),
+        (("--group", "sun=bulb,sky"), "has the name of a light"),
+        (("--lights-file", "gone.toml"), "no such lights file: gone.toml"),
+    ],
+)
+def test_wrong_choices_are_refused_in_one_line(
+    tmp_path: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    assert words in refused(tmp_path, "lights", write_room(tmp_path), *arguments)
+
+
+def test_solved_small_and_verified_large(tmp_path: Path) -> None:
+    arguments = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64, "--seed", 8)
+    output = succeed(tmp_path, *arguments)
+    assert "agree within noise" in output
+    sizes = {}
+    for name in ("predicted", "verified"):
+        [part] = read_parts(tmp_path / "warm" / f"{name}.exr")
+        sizes[name] = part.size
+    assert sizes == {"predicted": (32, 32), "verified": (128, 128)}
+    assert "agree within noise" in succeed(tmp_path, "verify", "warm")
+    page = (tmp_path / "warm" / "report.html").read_text(encoding="utf-8")
+    assert "32 × 32 pixels, verified at 128 × 128" in page
+    # A saved basis of that size takes the painting of full size as well, and says so.
+    same = ("basis", CORNELL, "--resolution", "32x32", "--spp", 64, "--seed", 8, "-o", "s.exr")
+    assert "kept from an earlier run" in run(tmp_path, *same).stderr
+    done = run(tmp_path, "solve", "s.exr", WARM, "-o", "saved")
+    assert done.returncode == 0, done.stderr
+    assert "128x128 pixels averaged to the basis's 32x32" in done.stderr
+    answers = [
+        json.loads((tmp_path / name / "lighting.json").read_text(encoding="utf-8"))["lights"]
+        for name in ("warm", "saved")
+    ]
+    assert answers[0] == answers[1]
+    # A basis of another resolution is another basis.
+    assert "basis: 2 passes" in run(tmp_path, "basis", CORNELL, "--spp", 2, "--seed", 8).stderr
+    # A template that was made small is painted small.
+    succeed(tmp_path, "template", CORNELL, "--resolution", "1/4", "--spp", 4)
+    small = ("solve", *arguments[1:2], "template/template.exr", "--no-template", *arguments[3:])
+    succeed(tmp_path, *small, "-o", "small")
+
+
+def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) -> None:
+    succeed(tmp_path, "solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64)
+    relit = tmp_path / "warm" / "relit.xml"
+    text = relit.read_text(encoding="utf-8").replace('max_depth" value="6"', 'max_depth" value="3"')
+    relit.write_text(text, encoding="utf-8")
+    done = run(tmp_path, "verify", "warm")
+    assert done.returncode == 1
+    assert "DISAGREE" in done.stdout
+
+
+def test_a_basis_for_a_time(tmp_path: Path) -> None:
+    def spp_of(output: str) -> int:
+        return int(output.split(" lights, ")[1].split()[0])
+
+    arguments = ("basis", CORNELL, "--time", "0.2", "--resolution", "1/4", "--seed", 9)
+    done = run(tmp_path, *arguments)
+    assert done.stderr == "basis: 1 seconds\n"
+    first = spp_of(done.stdout)
+    assert spp_of(succeed(tmp_path, *arguments)) > first
+    # The verification has as many samples as the basis: a sixteenth in each pixel.
+    solved = ("solve", CORNELL, WARM, *arguments[2:], "--quality", "final")
+    assert "agree within noise" in succeed(tmp_path, *solved)
+    [part] = read_parts(tmp_path / "warm" / "predicted.exr")
+    has = spp_of(succeed(tmp_path, "basis", CORNELL, *arguments[4:], "--spp", 2))
+    assert json.loads(part.attributes["lightpaint.view"])["spp"] == max(4, has // 16)
+
+
+def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_path: Path) -> None:
+    refuse = [tmp_path, "basis", CORNELL]
+    assert "not allowed with" in refused(*refuse, "--time", 3, "--spp", 4)
+    assert "not a number of seconds" in refused(*refuse, "--time", 0)
+    assert "invalid choice" in refused(*refuse, "--quality", "good")
+    assert "will do" in refused(*refuse, "--resolution", "1/3")
+    for option in (("--time", 3), ("--quality", "final"), ("--resolution", "1/2")):
+        told = refused(tmp_path, "solve", basis_file, WARM, *option)
+        assert f"{option[0]} cannot change a saved basis" in told

@@ -1,0 +1,107 @@
+"""Ctrl-C and kill -9 in the middle of real processes: nothing lost, nothing mixed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, PATH, SAME_SAMPLES, write_room
+
+from lightpaint.basis.basis import Basis, read_basis
+
+VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
+INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}
+
+#: Samples per pixel: a few seconds of work.
+SPP = {"one pass": 20_000, "separate renders": 2000}
+
+#: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
+MAIN = """
+import os, signal, sys, time
+import lightpaint.basis.render.budget as budget, lightpaint.scene.render as render
+from lightpaint.cli import main
+# What a shell starts in the background ignores Ctrl-C, and so would this.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**17
+if "SLOWLY" in os.environ:
+    # However fast the machine is, there is a middle to be stopped in.
+    keep = budget.Keeper.now_and_then
+    budget.Keeper.now_and_then = lambda *a: (time.sleep(0.1), keep(*a))
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def start(
+    folder: Path, room: Path, spp: int, cache: str, **environment: str
+) -> "subprocess.Popen[str]":
+    arguments = ["basis", room, "--spp", spp, "-o", f"{cache}.exr"]
+    return subprocess.Popen(
+        [sys.executable, "-c", MAIN, *map(str, arguments)],
+        cwd=folder,
+        env={**os.environ, "LIGHTPAINT_CACHE": str(folder / cache), **environment},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def kept(folder: Path, cache: str) -> list[Path]:
+    return list((folder / cache).glob("*.basis.exr"))
+
+
+def samples(basis: Basis) -> int:
+    """Samples per pixel of all lights together."""
+    each = basis.origin.each_light or ((*basis.origin.halves, 0, 0),) * len(basis.lights)
+    return sum(a + b for a, b, _, _ in each)
+
+
+@pytest.mark.parametrize("method", INTEGRATORS)
+@pytest.mark.parametrize("signals", [(signal.SIGINT,), (signal.SIGKILL,), (signal.SIGINT,) * 2])
+def test_stopped_and_gone_on_is_as_if_never_stopped(
+    tmp_path: Path, method: str, signals: tuple[signal.Signals, ...]
+) -> None:
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
+    room, spp = write_room(tmp_path, lights=lights, integrator=INTEGRATORS[method]), SPP[method]
+    done = 0
+    for number in signals:
+        with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
+            assert process.stderr is not None
+            while not process.stderr.readline().startswith("basis"):
+                pass
+            while not kept(tmp_path, "stopped"):
+                time.sleep(0.01)
+            time.sleep(0.7)
+            assert process.poll() is None
+            stopped_s = time.monotonic()
+            process.send_signal(number)
+            said = process.stderr.read()
+            code = process.wait(timeout=60)
+        if number == signal.SIGINT:
+            assert time.monotonic() - stopped_s < 3
+            assert code == 130
+            assert "are kept; the same command goes on" in said
+        [path] = kept(tmp_path, "stopped")
+        part = read_basis(path)
+        assert part.origin.method == method
+        # Nothing of what was kept is lost, and there is more to do.
+        assert done < samples(part) < spp * len(part.lights)
+        done = samples(part)
+    assert not (tmp_path / "stopped.exr").exists()
+
+    # The same command goes on; beside it, one that was never stopped.
+    for cache in ("stopped", "whole"):
+        with start(tmp_path, room, spp, cache) as process:
+            assert process.wait(timeout=120) == 0
+    stopped, whole = (read_basis(tmp_path / f"{name}.exr") for name in ("stopped", "whole"))
+    assert stopped.origin == whole.origin
+    assert stopped.origin.spp == spp
+    # float32 sums of thousands of samples, written and taken apart again at each stop.
+    tolerance = 8 * SAME_SAMPLES * whole.images.max()
+    assert np.abs(stopped.images - whole.images).max() <= tolerance
+    assert np.abs(stopped.half_differences - whole.half_differences).max() <= tolerance
+    np.testing.assert_array_equal(stopped.emitters_seen, whole.emitters_seen)
+    assert len(kept(tmp_path, "stopped")) == 1

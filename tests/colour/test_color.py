@@ -1,0 +1,223 @@
+"""Luminance, CIEDE2000 and colour temperature against published numbers."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.colour.color import (
+    _colour,
+    cct_and_duv,
+    delta_e,
+    hex_to_rgb,
+    kelvin_to_rgb,
+    luminance,
+    rgb_to_hex,
+)
+from lightpaint.errors import ColorError
+
+# Linear Rec.709 from the chromaticities of ITU-R BT.709: columns are the primaries' XYZ.
+_XY = np.array([[0.640, 0.330], [0.300, 0.600], [0.150, 0.060]])
+_PRIMARIES = np.column_stack([[x / y, 1, (1 - x - y) / y] for x, y in _XY])
+_WHITE = np.array([0.3127 / 0.3290, 1, (1 - 0.3127 - 0.3290) / 0.3290])
+RGB_TO_XYZ = _PRIMARIES * np.linalg.solve(_PRIMARIES, _WHITE)
+
+
+def _rgb_of_lab(lab: Any) -> Any:
+    """CIE 15: Lab under D65 to XYZ, then to linear Rec.709."""
+    lightness, a, b = lab
+    f = (lightness + 16) / 116 + np.array([a / 500, 0, -b / 200])
+    xyz = np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29)) * _WHITE
+    return np.linalg.solve(RGB_TO_XYZ, xyz)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        # Sharma, Wu, Dalal 2005, Table 1: the pairs that lie within Rec.709.
+        ((50, 2.5, 0), (73, 25, -18), 27.1492),
+        ((50, 2.5, 0), (61, -5, 29), 22.8977),
+        ((50, 2.5, 0), (56, -27, -3), 31.9030),
+        ((50, 2.5, 0), (58, 24, 15), 19.4535),
+        ((50, 2.5, 0), (50, 3.1736, 0.5854), 1.0000),
+        ((50, 2.5, 0), (50, 3.2972, 0.0000), 1.0000),
+        ((50, 2.5, 0), (50, 1.8634, 0.5757), 1.0000),
+        ((50, 2.5, 0), (50, 3.2592, 0.3350), 1.0000),
+    ],
+)
+def test_ciede2000_against_published_pairs(first: Any, second: Any, expected: float):
+    a, b = _rgb_of_lab(first), _rgb_of_lab(second)
+    assert a.min() >= 0
+    assert b.min() >= 0
+    assert max(a.max(), b.max()) <= 1
+    # Published to four digits; the library rounds the Rec.709 matrix to four as well, which
+    # a neutral colour feels most.
+    assert delta_e(a, b) == pytest.approx(expected, abs=2e-3)
+    assert delta_e(b, a) == pytest.approx(expected, abs=2e-3)
+
+
+def test_equal_images_do_not_differ():
+    image = np.random.default_rng(0).random((4, 5, 3)) * 2 - 0.5
+    difference = delta_e(image, image.copy())
+    assert difference.shape == (4, 5)
+    np.testing.assert_array_equal(difference, 0)
+
+
+def test_what_a_display_cannot_show_does_not_differ():
+    a, b = np.array([[[1.0, 0.0, 0.5]]]), np.array([[[9.0, -3.0, 0.5]]])
+    np.testing.assert_array_equal(delta_e(a, b), 0)
+
+
+def test_black_against_white_is_a_hundred():
+    # ΔL* is 100; S_L at the mean lightness of 50 is 1.
+    assert delta_e(np.zeros(3), np.ones(3)) == pytest.approx(100, abs=1e-3)
+
+
+def test_luminance():
+    assert luminance(np.ones(3)) == pytest.approx(1, abs=1e-15)
+    assert luminance(np.zeros((2, 4, 3))).shape == (2, 4)
+    # The second row of the matrix above, which BT.709 rounds to four digits.
+    np.testing.assert_allclose(luminance(np.eye(3)), RGB_TO_XYZ[1], atol=5e-5)
+
+
+#: Reciprocal megakelvin, in which equal steps look equal, for all that Rec.709 contains.
+MIREDS = st.floats(10, 1e6 / 1902)
+
+
+def _of_chromaticity(x: float, y: float) -> Any:
+    return np.linalg.solve(RGB_TO_XYZ, np.array([x / y, 1, (1 - x - y) / y]))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "kelvin", "duv"),
+    [
+        # CIE 15:2018: chromaticities of the illuminants A, D50, D65 and E, 2° observer.
+        (0.44758, 0.40745, 2856, 0.0),
+        (0.34567, 0.35851, 5003, 0.0032),
+        (0.31272, 0.32903, 6504, 0.0032),
+        (1 / 3, 1 / 3, 5455, -0.0044),
+    ],
+)
+def test_temperature_of_standard_illuminants(x: float, y: float, kelvin: float, duv: float):
+    found = cct_and_duv(_of_chromaticity(x, y))
+    assert found is not None
+    # The daylight phases are tabulated from factors rounded to three digits.
+    assert found[0] == pytest.approx(kelvin, abs=1.5)
+    assert found[1] == pytest.approx(duv, abs=5e-5)
+
+
+def test_white_is_d65():
+    found = cct_and_duv(np.ones(3))
+    assert found is not None
+    assert found[0] == pytest.approx(6504, abs=1)
+    np.testing.assert_allclose(kelvin_to_rgb(*found), 1, atol=1e-9)
+
+
+@given(MIREDS)
+def test_temperature_and_back(mireds: float):
+    rgb = kelvin_to_rgb(1e6 / mireds)
+    assert rgb.min() >= 0
+    assert luminance(rgb) == pytest.approx(1, abs=1e-12)
+    found = cct_and_duv(rgb * 17)
+    assert found is not None
+    assert 1e6 / found[0] == pytest.approx(mireds, rel=1e-9)  # float64
+    assert found[1] == pytest.approx(0, abs=1e-12)
+
+
+@given(st.floats(100, 330), st.floats(-0.01, 0.01))  # all within Rec.709
+def test_temperature_off_the_locus_and_back(mireds: float, duv: float):
+    found = cct_and_duv(kelvin_to_rgb(1e6 / mireds, duv))
+    assert found is not None
+    assert 1e6 / found[0] == pytest.approx(mireds, rel=1e-9)
+    assert found[1] == pytest.approx(duv, abs=1e-12)
+
+
+def test_duv_is_positive_towards_green():
+    green, pink = kelvin_to_rgb(4000, 0.02), kelvin_to_rgb(4000, -0.02)
+    assert green[1] > kelvin_to_rgb(4000)[1] > pink[1]
+
+
+@pytest.mark.parametrize("kelvin", [1000, 1500, 1800])
+def test_candles_are_redder_than_rec709(kelvin: float):
+    rgb = kelvin_to_rgb(kelvin)
+    assert rgb[2] == 0
+    assert luminance(rgb) == pytest.approx(1, abs=1e-12)
+    # What was cut off shows, and little.
+    found = cct_and_duv(rgb)
+    assert found is not None
+    assert kelvin < found[0] < 1.03 * kelvin
+
+
+@pytest.mark.parametrize(
+    "rgb", [(0, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 0, 0), (0.1, 1, 0.2)]
+)
+def test_far_from_the_locus_there_is_no_temperature(rgb: Any):
+    assert cct_and_duv(np.array(rgb, float)) is None
+
+
+@pytest.mark.parametrize(
+    ("kelvin", "duv"), [(999, 0), (100_001, 0), (-1, 0), (np.nan, 0), (3000, 0.06), (3000, np.nan)]
+)
+def test_temperatures_that_there_are_none_of(kelvin: float, duv: float):
+    with pytest.raises(ColorError, match="need"):
+        kelvin_to_rgb(kelvin, duv)
+
+
+@given(st.integers(0, 0xFFFFFF))
+def test_hexadecimal_and_back(number: int):
+    rgb = hex_to_rgb(f"#{number:06x}")
+    assert 0 <= rgb.min() <= rgb.max() <= 1
+    brightest = max(number >> 16, number >> 8 & 255, number & 255)
+    if brightest == 255:
+        assert rgb_to_hex(rgb * 3.7) == f"#{number:06x}"
+
+
+def test_hexadecimal_of_known_colours():
+    np.testing.assert_allclose(hex_to_rgb("#ffffff"), 1, atol=1e-15)
+    # IEC 61966-2-1: ((128/255 + 0.055) / 1.055) ** 2.4.
+    np.testing.assert_allclose(hex_to_rgb(" 800000"), [0.2158605, 0, 0], atol=1e-7)
+    np.testing.assert_array_equal(hex_to_rgb("#FA6"), hex_to_rgb("#ffaa66"))
+    assert rgb_to_hex(np.array([40.0, 40, 0])) == "#ffff00"
+    assert rgb_to_hex(np.zeros(3)) == "#000000"
+    assert rgb_to_hex(np.array([1, -0.1, 0])) == "#ff0000"
+
+
+@pytest.mark.parametrize("text", ["", "#ffaa6", "red", "#ffaa66ff", "##ffaa66", "#-1aa66", "12"])
+def test_what_is_no_hexadecimal_colour(text: str):
+    with pytest.raises(ColorError, match="six hexadecimal digits"):
+        hex_to_rgb(text)
+
+
+@pytest.mark.parametrize("rgb", [(1, 2), (1, 2, np.nan), (np.inf, 0, 0)])
+def test_what_is_no_colour(rgb: Any):
+    with pytest.raises(ColorError, match="three finite"):
+        rgb_to_hex(np.array(rgb))
+    with pytest.raises(ColorError, match="three finite"):
+        cct_and_duv(np.array(rgb))
+
+
+@given(st.floats(25, 1000), st.floats(-0.05, 0.05))
+def test_temperatures_are_those_of_colour_science(mireds: float, duv: float):
+    colour = _colour()
+    uv = colour.temperature.CCT_to_uv_Ohno2013([1e6 / mireds, duv])
+    x, y, z = colour.xy_to_XYZ(colour.UCS_uv_to_xy(uv))
+    expected = np.linalg.solve(RGB_TO_XYZ, np.array([x, y, z]))
+    rgb = kelvin_to_rgb(1e6 / mireds, duv)
+    # The library finds the right angle by a step of 0.01 K, which is good to four digits.
+    clipped = np.maximum(expected, 0)
+    clipped /= luminance(clipped)
+    np.testing.assert_allclose(rgb, clipped, atol=1e-4 * clipped.max())
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D50", "D55", "D65", "D75", "E", "FL1", "FL11"])
+def test_temperature_of_illuminants_of_colour_science(name: str):
+    colour = _colour()
+    x, y = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name]
+    uv = colour.UCS_to_uv(colour.XYZ_to_UCS(colour.xy_to_XYZ([x, y])))
+    expected = colour.temperature.uv_to_CCT_Ohno2013(uv)
+    found = cct_and_duv(_of_chromaticity(x, y))
+    assert found is not None
+    assert found[0] == pytest.approx(expected[0], rel=1e-5)
+    assert found[1] == pytest.approx(expected[1], abs=1e-6)

@@ -1,0 +1,126 @@
+"""Views of OpenColorIO configurations, against OpenColorIO's own processors and our curves."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.colour.display import encode_display
+from lightpaint.colour.view import View
+from lightpaint.errors import ViewError
+
+ocio: Any = pytest.importorskip("PyOpenColorIO")
+
+DISPLAY = "sRGB - Display"
+
+
+@pytest.fixture(autouse=True)
+def _built_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OCIO", raising=False)
+
+
+def _colours(seed: int = 0) -> Any:
+    rng = np.random.default_rng(seed)
+    return (np.exp2(rng.uniform(-6, 0, (50, 1))) * rng.uniform(0.3, 1, (50, 3))).astype(np.float32)
+
+
+def test_the_default_view_by_name():
+    view = View.parse("ocio")
+    assert view.name.startswith(f"ocio:{DISPLAY}/")
+    assert View.parse(view.name) == view
+
+
+def test_encoding_is_the_librarys_own():
+    config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
+    name = config.getDefaultView(DISPLAY)
+    shown = ocio.DisplayViewTransform("Linear Rec.709 (sRGB)", DISPLAY, name)
+    cpu = config.getProcessor(shown).getDefaultCPUProcessor()
+    colours = _colours()
+    expected = [cpu.applyRGB((2 * c).tolist()) for c in colours]
+    got = View(f"ocio:{DISPLAY}/{name}", 1.0).encode(colours)
+    # Pixel by pixel and many at once, the library rounds in another order.
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-5)
+
+
+def test_the_plain_view_of_srgb_is_srgb():
+    view = View(f"ocio:{DISPLAY}/Un-tone-mapped")
+    colours = _colours()
+    # By way of XYZ with matrices of some seven digits.
+    np.testing.assert_allclose(view.encode(colours), encode_display(colours), atol=2e-5)
+    np.testing.assert_allclose(view.decode(view.encode(colours)), colours, rtol=1e-3, atol=1e-6)
+    assert view.white == pytest.approx(1, abs=1e-3)
+    np.testing.assert_allclose(
+        view.jacobian(colours), View().jacobian(colours), rtol=2e-2, atol=2e-2
+    )
+
+
+def test_a_tone_mapped_view_has_a_way_back():
+    view = View.parse("ocio")
+    colours = _colours()
+    # ACES 2.0's inverse is numerical in part.
+    np.testing.assert_allclose(view.decode(view.encode(colours)), colours, rtol=2e-2, atol=1e-4)
+    assert view.white > 10
+
+
+def _own(path: Path, transform: Any) -> None:
+    """A configuration with one view, Film of Screen, made by `transform` from linear Rec.709."""
+    config = ocio.Config()
+    config.setMajorVersion(2)
+    config.addColorSpace(ocio.ColorSpace(name="lin_rec709"))
+    shown = ocio.ColorSpace(name="Shown")
+    shown.setTransform(transform, ocio.COLORSPACE_DIR_FROM_REFERENCE)
+    config.addColorSpace(shown)
+    config.setRole("scene_linear", "lin_rec709")
+    config.setRole("default", "lin_rec709")
+    config.addDisplayView("Screen", "Film/dark", "Shown")
+    path.write_text(config.serialize())
+
+
+def test_a_configuration_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    _own(tmp_path / "own.ocio", ocio.ExponentTransform([2.0, 2.0, 2.0, 1.0]))
+    monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
+    view = View.parse("ocio")
+    assert view.name == "ocio:Screen/Film/dark"
+    # The library's fast powers are good to five digits.
+    np.testing.assert_allclose(view.encode(np.full((1, 3), 0.5)), 0.25, atol=1e-5)
+    np.testing.assert_allclose(view.decode(np.full((1, 3), 0.25)), 0.5, atol=1e-5)
+
+
+def test_a_view_without_a_way_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    flat = ocio.MatrixTransform([0.0] * 16, [0.5, 0.5, 0.5, 1.0])
+    _own(tmp_path / "own.ocio", flat)
+    monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
+    with pytest.raises(ViewError, match=r"ocio:Screen/Film/dark cannot be undone"):
+        View.parse("ocio")
+
+
+def test_a_view_that_forgets_greys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    clipped = ocio.RangeTransform(0.4, 0.6, 0.4, 0.6)
+    _own(tmp_path / "own.ocio", clipped)
+    monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
+    with pytest.raises(ViewError, match=r"cannot be undone: a grey comes back 0\.35 off"):
+        View.parse("ocio")
+
+
+def test_what_is_there_is_named():
+    with pytest.raises(ViewError, match=rf"no view ocio:Cinema/Film: .*{DISPLAY}"):
+        View("ocio:Cinema/Film")
+    with pytest.raises(ViewError, match=r"has no view 'Film': it has .*Un-tone-mapped"):
+        View(f"ocio:{DISPLAY}/Film")
+
+
+@pytest.mark.parametrize("content", [None, "", "ocio_profile_version: 2\nroles: [", "\0\1\2"])
+def test_no_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str | None):
+    if content is not None:
+        (tmp_path / "own.ocio").write_text(content)
+    monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
+    with pytest.raises(ViewError, match=r"own\.ocio is no OpenColorIO configuration"):
+        View.parse("ocio")
+
+
+def test_without_the_extra(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
+    with pytest.raises(ViewError, match=r"pip install 'lightpaint\[ocio\]'"):
+        View.parse("ocio")

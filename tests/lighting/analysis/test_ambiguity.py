@@ -1,0 +1,90 @@
+"""Lights that a painting cannot tell apart, of images made for it."""
+
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.lighting.analysis.ambiguity import ambiguities, indistinguishable
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+NAMES = ["key", "fill", "rim", "sky", "lamp"]
+
+
+def _images(seed: int = 0) -> Any:
+    """(3, 5, 200): five different lights."""
+    return np.random.default_rng(seed).random((3, 5, 200)) ** 3
+
+
+def _gram(images: Any) -> Any:
+    return images @ images.transpose(0, 2, 1)
+
+
+def test_different_lights_are_told_apart():
+    for seed in range(20):
+        assert indistinguishable(_gram(_images(seed)), NAMES) == ()
+
+
+def test_coincident_lights_are_a_group_whatever_their_power():
+    images = _images()
+    images[:, 2] = 7 * images[:, 0]
+    # Another colour is another weight, not another light.
+    images[:, 4] = images[:, 0] * np.array([1, 0.5, 1e-3])[:, None]
+    (found,) = indistinguishable(_gram(images), NAMES)
+    assert found.names == ("key", "rim", "lamp")
+    assert not found.is_mix
+    assert found.left < 1e-12
+    assert "key, rim and lamp light the painted part alike" in found.sentence
+    assert "wider mask" in found.sentence
+
+
+def test_a_light_that_is_a_mix_of_others():
+    images = _images()
+    images[:, 3] = 0.5 * images[:, 0] + 2 * images[:, 1]
+    (found,) = indistinguishable(_gram(images), NAMES)
+    assert found.names == ("key", "fill", "sky")
+    assert found.is_mix
+    assert "mixes of key, fill and sky" in found.sentence
+
+
+def test_fewer_pixels_than_lights():
+    found = indistinguishable(_gram(_images()[:, :, :2]), NAMES)
+    assert found
+    assert all(each.is_mix for each in found)
+
+
+def test_lights_that_reach_nothing_are_not_compared():
+    images = _images()
+    images[:, 1] = images[:, 4] = 0
+    assert indistinguishable(_gram(images), NAMES) == ()
+
+
+def test_one_channel_and_no_lights():
+    images = _images()
+    images[0, 1] = images[0, 0]
+    (found,) = indistinguishable(_gram(images)[0], NAMES)
+    assert found.names == ("key", "fill")
+    # In the other channels they do differ: it is in one that they can trade.
+    (found,) = indistinguishable(_gram(images), NAMES)
+    assert found.names == ("key", "fill")
+    assert found.is_mix
+    assert indistinguishable(np.zeros((3, 0, 0)), []) == ()
+
+
+def test_two_lights_at_one_place_are_named_in_spite_of_noise():
+    rng = np.random.default_rng(0)
+    clean = rng.random((3, 16, 16, 3))
+    clean[2] = clean[0]
+    noise = rng.normal(scale=0.01, size=(2, *clean.shape))
+    images = (clean + noise[0]).astype(np.float32)
+    lights = tuple(
+        BasisLight(name, "area", "radiance", "W/(m² sr)", (1.0, 1.0, 1.0)) for name in "abc"
+    )
+    origin = Origin("s", "", "c", 0, "one pass", (8, 8), (1, 1))
+    seen = np.zeros((16, 16), dtype=bool)
+    basis = Basis(lights, images, noise[1].astype(np.float32), seen, origin)
+    target = Target("t", basis.mix(np.ones((3, 3))), np.ones((16, 16), np.float32), False)
+    [found] = ambiguities(basis, solve(basis, target))
+    assert found.names == ("a", "c")
+    assert not found.is_mix

@@ -1,0 +1,137 @@
+"""The parts of the residual: closed forms, and that they add up."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.lighting.analysis.diagnosis import diagnose
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (12, 18)
+
+
+def _target(image: Any, importance: Any = None) -> Target:
+    importance = np.ones(SIZE) if importance is None else importance
+    return Target(
+        "painted", image.astype(np.float32), importance.astype(np.float32), everything=False
+    )
+
+
+def _halves() -> Any:
+    """Two lights that share no pixel: one on the left, one on the right."""
+    images = np.zeros((2, *SIZE, 3))
+    images[0, :, :9], images[1, :, 9:] = 1, 2
+    return images
+
+
+def _diagnosis(basis: Any, target: Target) -> Any:
+    return diagnose(basis, target, solve(basis, target))
+
+
+def test_a_mix_of_the_lights_misses_nothing(make_basis: Any):
+    images = _halves()
+    found = _diagnosis(make_basis(images=images), _target(0.3 * images[0] + 0.7 * images[1]))
+    assert found.total == pytest.approx(0, abs=1e-9)
+    assert found.bounds == ()
+
+
+def test_darkness_that_only_negative_light_would_make_is_forbidden(make_basis: Any):
+    images = _halves()
+    images[1] = 1  # the second light shines everywhere
+    found = _diagnosis(make_basis(images=images), _target(images[1] - 0.5 * images[0]))
+    # The second light alone: 1 on the right and 0.5 on the left is met best by their mean.
+    pixels = 3 * images[0, ..., 0].sum()
+    assert found.total == pytest.approx(2 * pixels * 0.25**2, rel=1e-5)
+    assert found.forbidden == pytest.approx(found.total, rel=1e-5)
+    [bound] = found.bounds
+    assert (bound.lights, bound.kind, bound.held_by) == (("light 0",), "zero", "zero")
+    # Without that bound the painting is met.
+    assert bound.gain == pytest.approx(found.total, rel=1e-4)
+    # d/dw of the objective at w = 0 of that light: 2 Σ 1 · 0.25 over its pixels, per channel.
+    assert bound.multiplier == pytest.approx([2 * 0.25 * images[0, ..., 0].sum()] * 3, rel=1e-5)
+
+
+def test_what_is_orthogonal_to_all_lights_is_out_of_reach(make_basis: Any):
+    images = _halves()
+    stripes = np.zeros((*SIZE, 3))
+    stripes[::2, :9, 2], stripes[1::2, :9, 2] = 0.5, -0.5  # blue, and on average nothing
+    found = _diagnosis(make_basis(images=images), _target(images[0] + stripes))
+    assert found.unreachable == pytest.approx(0.25 * 12 * 9, rel=1e-5)
+    assert found.forbidden == pytest.approx(0, abs=1e-4)
+    np.testing.assert_allclose(found.unreachable_map, stripes, atol=1e-5)
+
+
+def test_the_place_is_where_light_is_missing(make_basis: Any):
+    images = _halves()
+    images[:, :3, :5] = 0  # no light comes to the top left
+    image = images[0] + images[1]
+    image[:3, :5] = (0.1, 0.2, 0.9)
+    place = _diagnosis(make_basis(images=images), _target(image)).place
+    assert place.region == (0, 0)
+    assert place.share > 0.6
+    assert place.painted == pytest.approx((0.1, 0.2, 0.9), rel=1e-5)
+    assert place.reached == pytest.approx((0, 0, 0), abs=1e-6)
+    top, left, bottom, right = place.box
+    assert 0 <= top < bottom <= 4
+    assert 0 <= left < right <= 6
+
+
+def test_what_does_not_count_is_told_apart(make_basis: Any):
+    images = _halves()
+    importance = np.ones(SIZE)
+    importance[:, 9:] = 0.25
+    image = images[0] + images[1]
+    image[:6, 9:] = 0.1
+    found = _diagnosis(make_basis(images=images), _target(image, importance))
+    # Half of the right is painted 0.1, half of it 2; the light does the mean of both.
+    missed = 3 * 12 * 9 * 0.95**2
+    assert found.total == pytest.approx(0.25 * missed, rel=1e-5)
+    assert found.ignored == pytest.approx(0.75 * missed, rel=1e-5)
+
+
+def test_a_light_that_is_kept_stands_in_the_way(make_basis: Any):
+    from dataclasses import replace
+
+    basis = make_basis(images=_halves(), emission=[[1, 1, 1], [0.5, 0.5, 0.5]])
+    kept = replace(basis.lights[0], is_fixed=True)
+    basis = replace(basis, lights=(kept, basis.lights[1]))
+    found = _diagnosis(basis, _target(0.5 * _halves()[0] + 0.2 * _halves()[1]))
+    [bound] = found.bounds
+    assert (bound.kind, bound.held_by) == ("kept", "kept")
+    assert bound.gain == pytest.approx(found.total, rel=1e-5)
+    # Held as it is, no weights of the others help.
+    assert found.unreachable == pytest.approx(found.total, rel=1e-5)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 6), st.booleans())
+def test_the_parts_add_up(make_basis: Any, seed: int, n: int, is_scalar: bool):
+    from dataclasses import replace
+
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(0, 0.05, (n, *SIZE, 3))
+    basis = make_basis(n, SIZE, seed=seed, half_differences=noise)
+    if is_scalar:
+        basis = replace(basis, lights=(replace(basis.lights[0], is_scalar=True), *basis.lights[1:]))
+    importance = np.clip(rng.normal(0.5, 0.5, SIZE), 0, None)
+    importance[0, 0] = 1
+    target = _target(rng.random((*SIZE, 3)) * rng.random(3), importance)
+    solution = solve(basis, target)
+    found = diagnose(basis, target, solution)
+    parts = (found.unreachable, found.forbidden, found.noise, found.ignored)
+    assert min(parts) >= 0
+    assert sum(parts[:3]) == pytest.approx(found.total, rel=1e-12)
+    # As the solve counts it, and as the pixels do, in float64 over float32.
+    assert found.total == pytest.approx(sum(solution.quality.objective), rel=1e-5)
+    D = importance[..., None]
+    separate = (D * (found.unreachable_map**2 + found.forbidden_map**2)).sum()
+    assert separate == pytest.approx(found.total, rel=1e-5)
+    missed = target.image - combine(basis, solution.lighting).image
+    np.testing.assert_allclose(found.unreachable_map + found.forbidden_map, missed, atol=1e-6)
+    # No bound alone can stand for more than all of them together.
+    for bound in found.bounds:
+        assert bound.gain <= found.forbidden + 1e-6 * found.total

@@ -1,0 +1,366 @@
+"""Error bars against what noise really does, and the steps that take some of it back."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import BasisError, SizeError
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.noise import pseudo_inverse
+from lightpaint.lighting.analysis.refine import refine
+from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars, with_error_bars
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (24, 24)
+SEEDS = 40
+
+
+def _target(image: Any) -> Target:
+    return Target("t", image.astype(np.float32), np.ones(SIZE, np.float32), everything=True)
+
+
+def _pools(n: int = 5) -> Any:
+    """Overlapping pools of light, (n, h, w, 3)."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    places = np.random.default_rng(0).random((n, 2))
+    pools = [np.exp(-((x - a) ** 2 + (y - b) ** 2) / 0.15) for a, b in places]
+    return np.stack(pools)[..., None] * np.ones(3)
+
+
+def _painted(clean: Any) -> Target:
+    """Something no mix of the pools is: half dark, reddish, and lit from below."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1], :1][:2]
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 0, 0.3, 0], clean)
+    image = image * (x > 9) * np.array([1, 0.7, 0.3]) + 0.2 * y / SIZE[0]
+    return _target(image)
+
+
+def _noisy(clean: Any, sigma: float, rng: np.random.Generator) -> tuple[Any, Any]:
+    """Mean and half difference of two halves: skewed noise, the same in all channels."""
+
+    def half() -> Any:
+        error = rng.exponential(1, (*clean.shape[:-1], 1)) - 1
+        return clean * (1 + sigma * np.sqrt(2) * error)
+
+    a, b = half(), half()
+    return (a + b) / 2, (a - b) / 2
+
+
+def _with_scalar(basis: Basis, *dimmed: int) -> Basis:
+    lights = [replace(x, is_scalar=k in dimmed) for k, x in enumerate(basis.lights)]
+    return replace(basis, lights=tuple(lights))
+
+
+@pytest.mark.parametrize(
+    ("sigma", "dimmed"), [(0.05, ()), (0.2, ()), (0.2, (0, 2)), (0.5, (1,)), (0.5, ())]
+)
+def test_intervals_hold_the_answer_without_noise(
+    make_basis: Any, sigma: float, dimmed: tuple[int, ...]
+):
+    """95 % intervals, over seeds: those of lights that are on, and of those that are off."""
+    clean = _pools()
+    target = _painted(clean)
+    quiet = _with_scalar(make_basis(images=clean), *dimmed)
+    truth = solve(quiet, target).lighting.weights_for(quiet)
+    held, missed, told = [], [], []
+    for seed in range(SEEDS):
+        images, halves = _noisy(clean, sigma, np.random.default_rng(seed))
+        basis = _with_scalar(make_basis(images=images, half_differences=halves), *dimmed)
+        found = error_bars(basis, solve(basis, target))
+        low, high = found.interval
+        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        missed.append(np.square(found.weights - truth).mean())
+        told.append(np.square(found.standard_error).mean())
+    assert 0.85 <= np.mean(held) <= 0.99
+    # So is each light by itself, unless half of M is noise and more than that is guessed.
+    if sigma < 0.5:
+        assert np.mean(held, axis=0).min() > 0.8
+    # The errors are as large as they say.
+    assert np.sqrt(np.mean(told) / np.mean(missed)) == pytest.approx(1, abs=0.4)
+
+
+def test_one_light_by_hand(make_basis: Any):
+    """w = b / M of one light: δw = Σ (h r − Φ w h) / M, and the bias N w / M."""
+    rng = np.random.default_rng(1)
+    image = 1 + rng.random((1, *SIZE, 3))
+    half = rng.normal(0, 0.1, image.shape)
+    basis = make_basis(images=image, half_differences=half)
+    painted = rng.random((*SIZE, 3))
+    solution = solve(basis, _target(painted))
+    found = error_bars(basis, solution)
+    M, w = np.square(image[0]).sum((0, 1)), found.weights[0]
+    residual = painted - w * image[0]
+    gradient = half[0] * residual - image[0] * w * half[0]
+    np.testing.assert_allclose(
+        found.scatter[0], np.sqrt(np.square(gradient).sum((0, 1))) / M, rtol=1e-4
+    )
+    power = np.square(half[0]).sum((0, 1))
+    np.testing.assert_allclose(found.bias[0], w * power / (M - power), rtol=1e-4)
+    np.testing.assert_allclose(
+        found.objective_noise, (np.square(w) * np.square(half[0])).sum((0, 1)), rtol=1e-4
+    )
+    # Without all of the noise the answer moves by just that bias.
+    corrected = correct_noise(basis, solution, share=1.0)
+    np.testing.assert_allclose(
+        corrected.lighting.weights_for(basis)[0], w + found.bias[0], rtol=1e-4
+    )
+    np.testing.assert_allclose(error_bars(basis, corrected).bias, 0, atol=1e-5)
+
+
+def test_without_noise_nothing_is_uncertain(make_basis: Any):
+    basis = make_basis(4, SIZE)
+    solution = solve(basis, _painted(_pools()))
+    found = error_bars(basis, solution)
+    assert found.scatter.max() == 0
+    np.testing.assert_allclose(found.bias, 0, atol=1e-5)
+    errors = [x.standard_error for x in with_error_bars(solution, found).lighting.lights]
+    assert None not in errors
+
+
+def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
+    clean = _pools(3)
+    clean[2] = 0
+    images, halves = _noisy(clean, 0.2, np.random.default_rng(0))
+    basis = make_basis(
+        images=images, half_differences=halves, emission=[[1, 1, 1], [1, 0, 0], [2, 2, 2]]
+    )
+    lights = (replace(basis.lights[0], is_fixed=True), *basis.lights[1:])
+    basis = replace(basis, lights=lights)
+    solution = solve(basis, _target(clean[0] + 0.5 * clean[1]))
+    found = error_bars(basis, solution)
+    assert not found.standard_error[[0, 2]].any()
+    assert found.standard_error[1].all()
+    told = with_error_bars(solution, found).lighting
+    assert [x.standard_error is None for x in told.lights] == [True, False, True]
+
+
+@pytest.mark.parametrize("mixed_sigma", [0.05, 0.3, 3.0])
+def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
+    """On average over seeds; a render of the mix that is nothing but noise does no harm."""
+    clean = _pools()
+    target = _painted(clean)
+    quiet = make_basis(images=clean)
+    best = solve(quiet, target)
+    excess: dict[str, list[float]] = {"plain": [], "corrected": [], "refined": []}
+    held, shares = [], []
+    truth = best.lighting.weights_for(quiet)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        images, halves = _noisy(clean, 0.5, rng)
+        basis = make_basis(images=images, half_differences=halves)
+        plain = solve(basis, target)
+        weights = plain.lighting.weights_for(basis)
+        mix = np.einsum("nc,nhwc->hwc", weights, clean)
+        image, half = _noisy(mix, mixed_sigma, rng)
+        mixed = Estimate(image.astype(np.float32), half.astype(np.float32))
+        refined = refine(basis, plain, mixed)
+        assert refined.refinement is not None
+        shares.append(refined.refinement.share)
+        found = {"plain": plain, "corrected": correct_noise(basis, plain), "refined": refined}
+        for name, solution in found.items():
+            w = solution.lighting.weights_for(basis)
+            value = best.equations.objective(w) - best.equations.objective(truth)
+            excess[name].append(float(value.sum()))
+        low, high = error_bars(basis, refined).interval
+        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+    mean = {name: np.mean(values) for name, values in excess.items()}
+    assert mean["corrected"] < 0.9 * mean["plain"]
+    assert mean["refined"] < {0.05: 0.6, 0.3: 0.75, 3.0: 1.1}[mixed_sigma] * mean["plain"]
+    assert np.mean(shares) == pytest.approx({0.05: 1, 0.3: 0.9, 3.0: 0.25}[mixed_sigma], abs=0.15)
+    assert 0.8 <= np.mean(held) <= 1
+
+
+def test_the_render_of_the_mix_has_the_size_of_the_basis(make_basis: Any):
+    basis = make_basis(2, SIZE)
+    solution = solve(basis, _painted(_pools()))
+    small = np.zeros((12, 12, 3), np.float32)
+    with pytest.raises(SizeError, match="render of the mix is 12x12 but the basis is 24x24"):
+        refine(basis, solution, Estimate(small, small))
+
+
+def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
+    """A render beside noise of which nothing is known would be thrown away in silence."""
+    basis = make_basis(2, SIZE)
+    basis = replace(basis, origin=replace(basis.origin, halves=(0, 0)))
+    solution = solve(basis, _painted(_pools()))
+    image = 1.3 * basis.mix(solution.lighting.weights_for(basis))
+    assert error_bars(basis, solution) is None
+    with pytest.raises(BasisError, match="says nothing of its noise"):
+        refine(basis, solution, Estimate(image, 0.05 * image))
+    with pytest.raises(BasisError, match="says nothing of its noise"):
+        correct_noise(basis, solution)
+
+
+def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
+    basis = make_basis(4, SIZE)
+    solution = solve(basis, _painted(_pools()))
+    image = basis.mix(solution.lighting.weights_for(basis))
+    again = refine(basis, solution, Estimate(image, 0 * image))
+    weights = partial(Basis.mix, basis)
+    np.testing.assert_allclose(
+        weights(again.lighting.weights_for(basis)), image, rtol=1e-4, atol=1e-5
+    )
+
+
+def test_pseudo_inverse_leaves_out_what_changes_nothing():
+    M = np.diag([1e8, 1e-8, 0.0])
+    np.testing.assert_allclose(pseudo_inverse(M), np.diag([1e-8, 1e8, 0]), rtol=1e-12)
+
+
+#: What is asked, and of which lights: of "color" one that is on, for one that is off moves nothing.
+ASKED: dict[str, tuple[dict[str, Any], str]] = {
+    "lock": ({"lights": {"a": {"lock": 0.4}}}, "a"),
+    "color": ({"lights": {"a": {"limits": {"max": 2.0}, "color": "3200K"}}}, "a"),
+    "at a limit": ({"lights": {"a": {"limits": {"max": 0.3}}}}, "a"),
+    "tie": ({"tie": [["a", "b", "c", "d", "e"]]}, "abcde"),
+    "two ties": ({"tie": [["a", "b"], ["c", "d", "e"]]}, "abcde"),
+    "sparse": ({"sparse": 3}, "abcde"),
+    "prefer_current": ({"prefer_current": 0.1}, "abcde"),
+}
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
+    """Of each light of which something is asked, against the spread over seeds."""
+    clean = _pools()
+    asked, lights = ASKED[name]
+    others = {key: value for key, value in asked.items() if key != "lights"}
+    constraints = Constraints.of(asked.get("lights", {}), **others)
+    target = _painted(clean)
+    solved, errors = [], []
+    for seed in range(SEEDS):
+        images, halves = _noisy(clean, 0.1, np.random.default_rng(seed))
+        basis = make_basis(
+            images=images, half_differences=halves, names="abcde", emission=np.ones((5, 3))
+        )
+        solution = solve(basis, target, constraints=constraints)
+        solved.append(solution.lighting.weights_for(basis))
+        errors.append(error_bars(basis, solution).scatter)
+    spread, told = np.std(solved, axis=0, ddof=1), np.sqrt(np.mean(np.square(errors), axis=0))
+    held = spread < 1e-9
+    # Round-off of what does not move.
+    assert told[held].max(initial=0) < 1e-6
+    its = ["abcde".index(light) for light in lights]
+    # Lights that go off in some seeds have an error of which a half is cut off.
+    always_on = (np.array(solved) > 0).all(axis=0) & ~held
+    always_on[[k for k in range(5) if k not in its]] = False
+    assert always_on.any() != (name == "lock")
+    ratio = told[always_on] / spread[always_on]
+    # A standard deviation from forty seeds is off by a ninth: three of these.
+    np.testing.assert_allclose(ratio, 1, atol=0.34)
+
+
+#: Of lights a and b, what is asked and the directions of the weights, (2, 3) each, that it leaves.
+SPANNING: dict[str, tuple[dict[str, Any], Any]] = {
+    "color": (
+        {"lights": {"a": {"color": [1, 0.5, 0.2]}, "b": {"lock": 0.2}}},
+        [[[1, 0.5, 0.2], [0, 0, 0]]],
+    ),
+    "tie": ({"tie": [["a", "b"]]}, [[[1, 1, 1], [1, 1, 1]]]),
+    # Those along which the luminance stays at its limit.
+    "limit": (
+        {"lights": {"a": {"limits": {"max": 0.8}}, "b": {"off": True}}},
+        [[[0.7152, -0.2126, 0], [0, 0, 0]], [[0, 0.0722, -0.7152], [0, 0, 0]]],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SPANNING)
+def test_what_one_unknown_moves_in_several_channels_errs_together(make_basis: Any, name: str):
+    """By hand: each pixel's own push on the unknowns, of all channels, and the sum of squares.
+
+    One path carries all three channels, so that the noise of one is that of the others, too.
+    """
+    asked, directions = SPANNING[name]
+    rng = np.random.default_rng(4)
+    images = 1 + rng.random((2, *SIZE, 3))
+    halves = 0.1 * rng.normal(size=(2, *SIZE, 1)) * images
+    basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
+    painted = 1.4 + rng.random((*SIZE, 3))
+    others = {key: value for key, value in asked.items() if key != "lights"}
+    constraints = Constraints.of(asked.get("lights", {}), **others)
+    solution = solve(basis, _target(painted), constraints=constraints)
+    w = solution.lighting.weights_for(basis)
+    assert w[0].all()
+    missed = painted - np.einsum("nhwc,nc->hwc", images, w)
+    noise = np.einsum("nhwc,nc->hwc", halves, w)
+    # (pixels, lights, channels), and M as (lights, channels, lights, channels).
+    push = np.moveaxis(halves * missed - images * noise, 0, 2).reshape(-1, 2, 3)
+    M = np.einsum("ihwc,jhwc,cd->icjd", images, images, np.eye(3))
+    to = np.array(directions)
+    stiffness = np.einsum("kic,icjd,ljd->kl", to, M, to)
+    steps = np.linalg.solve(stiffness, np.einsum("kic,pic->kp", to, push))
+    expected = np.sqrt(np.square(np.einsum("kic,kp->icp", to, steps)).sum(axis=-1))
+    np.testing.assert_allclose(error_bars(basis, solution).scatter, expected, rtol=1e-4, atol=1e-9)
+
+
+#: As `SPANNING`, where the answer moves by more than one unknown's own channel, and where not.
+MOVING: dict[str, tuple[dict[str, Any], Any]] = {
+    "lock": (
+        {"lights": {"b": {"lock": 3.0}}},
+        [[axis, [0, 0, 0]] for axis in np.eye(3)],
+    ),
+    "scalar": ({}, [[[1, 1, 1], [0, 0, 0]], [[0, 0, 0], [1, 1, 1]]]),
+    **SPANNING,
+}
+
+
+@pytest.mark.parametrize("sigma", [0.1, 0.3])
+@pytest.mark.parametrize("name", MOVING)
+def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: str, sigma: float):
+    """By hand: the excess that is expected of shares of the correction and of a render's step."""
+    asked, directions = MOVING[name]
+    rng = np.random.default_rng(5)
+    # Few pixels count, so that neither scatter nor bias is all.
+    importance = np.zeros(SIZE, np.float32)
+    importance[:3, :3] = 1
+    images = 1 + rng.random((2, *SIZE, 3))
+    images[0, :, ::2] *= 0.2
+    images[1, :, 1::2] *= 0.2
+    halves = sigma * rng.normal(size=(2, *SIZE, 1)) * images
+    basis = make_basis(images=images, half_differences=halves, names="ab", emission=np.ones((2, 3)))
+    if name == "scalar":
+        basis = _with_scalar(basis, 0, 1)
+    others = {key: value for key, value in asked.items() if key != "lights"}
+    constraints = Constraints.of(asked.get("lights", {}), **others)
+    there = {"lock": 3, "scalar": 3, "color": 0.2, "tie": 1, "limit": 0}[name]
+    painted = np.einsum("nhwc,n->hwc", images, [1, there]) + 0.2 * rng.random((*SIZE, 3))
+    target = Target("t", painted.astype(np.float32), importance, everything=False)
+    solution = solve(basis, target, constraints=constraints)
+    w = solution.lighting.weights_for(basis)
+    to, counted = np.array(directions), importance > 0
+    assert all(w[its != 0].all() for its in to)
+
+    f, h = images[:, counted], halves[:, counted]
+    missed, noise = painted[counted] - np.einsum("npc,nc->pc", f, w), np.einsum("npc,nc->pc", h, w)
+    M, N = (np.einsum("kic,ipc,jpc,ljc->kl", to, x, x, to) for x in (f, h))
+    push = np.einsum("kic,ipc->kp", to, h * missed - f * noise)
+    lacking = np.einsum("kic,ipc,pc->k", to, h, noise)
+    bias = np.linalg.solve(M - N, lacking)
+    assert np.linalg.eigvals(np.linalg.solve(M, N)).max() < 0.5
+
+    def excess(share: float) -> float:
+        spread = np.linalg.solve(M - share * N, push)
+        return float(
+            (1 - share) ** 2 * bias @ M @ bias + np.einsum("kp,kl,lp->", spread, M, spread)
+        )
+
+    shares = np.linspace(0, 1, 9)
+    chosen = correct_noise(basis, solution).noise_removed
+    assert chosen == shares[np.argmin([excess(s) for s in shares])]
+
+    render = 0.3 * rng.normal(size=(*SIZE, 1)) * painted
+    mixed = Estimate(*(x.astype(np.float32) for x in (basis.mix(w), render)))
+    known, rendered = (
+        np.einsum("kp,kp->", x, np.linalg.solve(M, x))
+        for x in (np.einsum("kic,ipc,pc->kp", to, f, y) for y in (noise, render[counted]))
+    )
+    ours = lacking @ np.linalg.solve(M, lacking) + known
+    refined = refine(basis, solution, mixed)
+    assert refined.refinement.share == pytest.approx(ours / (ours + rendered), rel=1e-4)

@@ -1,0 +1,566 @@
+"""Constraints against scipy on the pixels, against their own definition, and in closed form."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from least_squares import stacked
+from qp import least
+from scipy.optimize import lsq_linear, nnls
+
+from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb
+from lightpaint.errors import ConstraintError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.lighting import read_lighting, write_lighting
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (5, 4)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+#: Objective beside ‖Ψ‖²: float64 of some condition here, the oracles' own tolerance there.
+SAME = 1e-9
+
+#: Random problems for each kind of constraint.
+PROBLEMS = range(60)
+
+
+def _problem(make_basis: Any, seed: int, n: int = 4, *, scalar: tuple[int, ...] = ()) -> Any:
+    rng = np.random.default_rng(seed)
+    basis = make_basis(n, SIZE, seed=seed, names=[f"l{k}" for k in range(n)])
+    lights = []
+    for k, light in enumerate(basis.lights):
+        emission = (1.0, 1.0, 1.0) if k in scalar else tuple(rng.uniform(0.1, 2, 3).tolist())
+        lights.append(replace(light, emission=emission, is_scalar=k in scalar))
+    image = (rng.random((*SIZE, 3)) * rng.uniform(0.3, 4)).astype(np.float32)
+    importance = rng.random(SIZE).astype(np.float32)
+    return replace(basis, lights=tuple(lights)), Target("t", image, importance, everything=False)
+
+
+def _solved(basis: Any, target: Target, **asked: Any) -> tuple[Any, float, Any]:
+    solution = solve(basis, target, constraints=Constraints.of(**asked))
+    assert solution.quality.converged
+    w = solution.lighting.weights_for(basis)
+    A, y = stacked(basis, target)
+    return w, float(((A @ w.ravel() - y) ** 2).sum()), solution
+
+
+def _present(basis: Any) -> Any:
+    return np.array([light.emission for light in basis.lights])
+
+
+def _best(A: Any, y: Any, C: Any, w0: Any, low: Any = 0.0, high: Any = np.inf) -> float:
+    """The least ‖A (C x + w₀) − y‖² between bounds, by scipy."""
+    found = lsq_linear(A @ C, y - A @ w0.ravel(), bounds=(low, high), method="bvls", tol=1e-14)
+    return float(2 * found.cost)
+
+
+def _best_capped(A: Any, y: Any, C: Any, row: Any, least_of: float, most: float) -> float:
+    """The same under least_of ≤ row · x ≤ most, x ≥ 0, by quadprog."""
+    AC = A @ C
+    x = least(AC.T @ AC, AC.T @ y, rows=[row], limits=[(least_of, most)])
+    return float(((AC @ x - y) ** 2).sum())
+
+
+def _columns(n: int, light: int, colours: Any) -> Any:
+    """C (3n, …): all lights free but one, which mixes `colours`."""
+    others = [3 * k + c for k in range(n) for c in range(3) if k != light]
+    C = np.zeros((3 * n, len(others) + len(colours)))
+    C[others, range(len(others))] = 1
+    C[3 * light : 3 * light + 3, len(others) :] = np.transpose(colours)
+    return C
+
+
+def _check_close(mine: float, oracle: float, y: Any, *, tolerance: float = SAME) -> None:
+    assert abs(mine - oracle) <= tolerance * (y @ y)
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
+def test_fixed_colours_ranges_of_white_and_leds(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed)
+    A, y = stacked(basis, target)
+    free = _solved(basis, target, sparse=None, prefer_current=0, light={})[1]
+    ends = [kelvin_to_rgb(2700, 0.002), kelvin_to_rgb(6500, 0.002)]
+    leds = [hex_to_rgb(text) for text in ("#ff2000", "#20ff00", "#3000ff", "#ffb070")]
+    for asked, colours in (
+        ({"color": "3200K"}, [kelvin_to_rgb(3200)]),
+        ({"color": "#ffaa66"}, [hex_to_rgb("#ffaa66")]),
+        ({"color": [0.2, 0, 1]}, [[0.2, 0, 1]]),
+        ({"kelvin": [2700, 6500], "duv": 0.002}, ends),
+        ({"primaries": ["#ff2000", "#20ff00", "#3000ff", "#ffb070"]}, leds),
+    ):
+        w, mine, solution = _solved(basis, target, light={"l1": asked})
+        _check_close(mine, _best(A, y, _columns(4, 1, colours), np.zeros(12)), y)
+        assert mine >= free - SAME * (y @ y)
+        x, distance = nnls(np.transpose(colours).astype(float), w[1])
+        assert distance < 1e-9 * max(1, w[1].max())
+        assert (x >= 0).all()
+        assert solution.lighting.lights[1].constraint
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
+def test_limits_of_emission(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed)
+    A, y = stacked(basis, target)
+    high = np.full((4, 3), np.inf)
+    low = np.zeros((4, 3))
+    high[:, :] = [0.3, 0.4, 0.2]
+    high[2], low[2] = [0.6, 0.6, 2], [0.1, 0.2, 0.3]
+    asked = {
+        "l*": {"limits": {"max": [0.3, 0.4, 0.2]}},
+        "l2": {"limits": {"min": [0.1, 0.2, 0.3], "max": [0.6, 0.6, 2]}},
+    }
+    w, mine, _ = _solved(basis, target, light=asked)
+    assert (w <= high).all()
+    assert (w >= low).all()
+    _check_close(mine, _best(A, y, np.eye(12), np.zeros(12), low.ravel(), high.ravel()), y)
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
+def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed)
+    A, y = stacked(basis, target)
+    present = float(_present(basis)[1] @ LUMINANCE)
+    ends = [kelvin_to_rgb(2700), kelvin_to_rgb(6500)]
+    for limits, lowest, most in (
+        ({"max": 0.2}, 0.0, 0.2),
+        ({"max": "40%"}, 0.0, 0.4 * present),
+        ({"min": 0.5, "max": 0.9}, 0.5, 0.9),
+    ):
+        for extra, colours in (({}, np.eye(3)), ({"kelvin": [2700, 6500]}, ends)):
+            w, mine, _ = _solved(basis, target, light={"l1": {"limits": limits, **extra}})
+            # Round-off of a sum of three.
+            assert lowest - 1e-12 <= w[1] @ LUMINANCE <= most + 1e-12
+            C = _columns(4, 1, colours)
+            row = LUMINANCE @ C[3:6]
+            _check_close(mine, _best_capped(A, y, C, row, lowest, most), y)
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
+def test_ties_locks_and_off(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed)
+    A, y = stacked(basis, target)
+    now = _present(basis)
+    # One dimmer: the columns of both, as they shine now, are one.
+    w, mine, _ = _solved(basis, target, tie=["l0", "l2"])
+    C = np.zeros((12, 7))
+    C[[3, 4, 5, 9, 10, 11], range(6)] = 1
+    C[0:3, 6], C[6:9, 6] = now[0], now[2]
+    _check_close(mine, _best(A, y, C, np.zeros(12)), y)
+    np.testing.assert_allclose(w[0] / now[0], w[2, 0] / now[2, 0], rtol=1e-12)
+    # What is locked moves to the right-hand side.
+    held = np.zeros((4, 3))
+    held[3], held[0] = now[3], [0.5, 0.25, 0.125]
+    C = np.eye(12)[:, 3:9]
+    asked = {"l3": {"lock": True}, "l0": {"lock": [0.5, 0.25, 0.125]}}
+    w, mine, _ = _solved(basis, target, light=asked)
+    np.testing.assert_array_equal(w[[0, 3]], held[[0, 3]])
+    _check_close(mine, _best(A, y, C, held), y)
+    # What is off might as well not be there.
+    w, mine, _ = _solved(basis, target, light={"l0": {"off": True}, "l3": {"off": True}})
+    assert not w[[0, 3]].any()
+    _check_close(mine, _best(A, y, C, np.zeros(12)), y)
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
+def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed, scalar=(2,))
+    A, y = stacked(basis, target)
+    now, strength = _present(basis), 0.05
+    power = np.square(basis.images, dtype=np.float64).sum(axis=(1, 2))
+    root = np.sqrt(strength * power).ravel()
+    rows, aims = np.vstack([A, np.diag(root)]), np.concatenate([y, root * now.ravel()])
+    w, _, _ = _solved(basis, target, prefer_current=strength)
+    mine = float(((rows @ w.ravel() - aims) ** 2).sum())
+    C = _columns(4, 2, np.ones((1, 3)))
+    _check_close(mine, _best(rows, aims, C, np.zeros(12)), aims)
+
+
+def _feasible(rng: Any, basis: Any) -> Any:
+    """A random lighting that keeps to `EVERYTHING`, by its words alone."""
+    now, w = _present(basis), rng.exponential(1, (7, 3))
+    w[0] = now[0]
+    w[1] = rng.exponential() * kelvin_to_rgb(3200)
+    w[1] *= min(1, 0.3 / (w[1] @ LUMINANCE))
+    w[2] = rng.exponential(1, 2) @ np.array([kelvin_to_rgb(2700), kelvin_to_rgb(5000)])
+    w[3:5] = rng.exponential() * now[3:5]
+    w[5] = np.minimum(w[5], 0.5 * w[5] / (w[5] @ LUMINANCE))
+    w[6] = rng.uniform(0, 0.8)
+    return w
+
+
+EVERYTHING: dict[str, Any] = {
+    "light": {
+        "l0": {"lock": True},
+        "l1": {"color": "3200K", "limits": {"max": 0.3}},
+        "l2": {"kelvin": [2700, 5000]},
+        "l5": {"limits": {"max": 0.5}},
+        "l6": {"limits": {"max": 0.8}},
+    },
+    "tie": ["l3", "l4"],
+}
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
+def test_no_feasible_lighting_is_better_than_all_constraints_at_once(
+    make_basis: Any, seed: int
+) -> None:
+    """The variational inequality: no way from the answer to another lighting goes down."""
+    basis, target = _problem(make_basis, seed, 7, scalar=(6,))
+    w, _, _ = _solved(basis, target, **EVERYTHING)
+    A, y = stacked(basis, target)
+    gradient = A.T @ (A @ w.ravel() - y)
+    rng = np.random.default_rng(seed)
+    for _ in range(200):
+        way = (_feasible(rng, basis) - w).ravel()
+        # A KKT residual of 1e-12 and its condition, beside the terms that cancel.
+        assert gradient @ way >= -1e-8 * (y @ y)
+
+
+def test_one_light_of_fixed_colour_in_closed_form(make_basis: Any) -> None:
+    basis, target = _problem(make_basis, 3, 1)
+    w, _, _ = _solved(basis, target, light={"l0": {"color": "3200K"}})
+    A, y = stacked(basis, target)
+    column = A @ kelvin_to_rgb(3200)
+    expected = max(column @ y / (column @ column), 0) * kelvin_to_rgb(3200)
+    np.testing.assert_allclose(w[0], expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("mix", [(1, 0), (0, 1), (0.3, 2), (5, 5)])
+def test_a_bicolour_fixture_makes_every_mix_of_its_ends(make_basis: Any, mix: Any) -> None:
+    basis, target = _problem(make_basis, 1, 2)
+    ends = np.array([kelvin_to_rgb(2700), kelvin_to_rgb(6500)])
+    truth = np.array([mix @ ends, [0.2, 0.3, 0.4]])
+    image = np.einsum("nhwc,nc->hwc", basis.images, truth).astype(np.float32)
+    target = replace(target, image=image)
+    w, _, _ = _solved(basis, target, light={"l0": {"kelvin": [2700, 6500]}})
+    # The picture is float32.
+    np.testing.assert_allclose(w, truth, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_not_active_changes_nothing(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed)
+    plain = solve(basis, target).lighting.weights_for(basis)
+    for limits in ({"max": 1e4}, {"max": [1e3, 1e4, 1e5]}, {"min": 0.0, "max": "1e6%"}):
+        w, _, solution = _solved(basis, target, light={"l*": {"limits": limits}})
+        # A KKT residual of 1e-10 times the condition of the basis.
+        np.testing.assert_allclose(w, plain, atol=1e-8)
+        assert not any(light.is_active for light in solution.lighting.lights)
+    w, _, _ = _solved(basis, target, light={"l1": {"limits": {"max": 0.01}}})
+    assert np.abs(w - plain).max() > 1e-3
+
+
+def test_active_is_what_holds_a_light_back(make_basis: Any) -> None:
+    basis, target = _problem(make_basis, 5)
+    plain = solve(basis, target).lighting.weights_for(basis)
+    tight = {"l0": {"lock": plain[0].tolist()}, "l1": {"limits": {"max": (plain[1] / 2).tolist()}}}
+    # Locked where it would be anyway: nothing holds it, until another light is moved.
+    alone = _solved(basis, target, light={"l0": tight["l0"]})[2]
+    assert [light.is_active for light in alone.lighting.lights] == [False] * 4
+    both = _solved(basis, target, light=tight)[2]
+    assert [light.is_active for light in both.lighting.lights] == [True, True, False, False]
+
+
+def test_a_light_that_reaches_nothing_stays_as_near_as_it_may(make_basis: Any) -> None:
+    images = np.random.default_rng(0).random((3, *SIZE, 3))
+    images[1] = 0
+    images[2, ..., 0] = 0
+    basis = make_basis(images=images, names=["a", "b", "c"], emission=[[1, 2, 3]] * 3)
+    target = Target(
+        "t", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), everything=True
+    )
+    free = _solved(basis, target, light={"a": {"limits": {"max": 9}}})[2]
+    assert free.quality.unreached == ("b",)
+    assert free.lighting.emission["b"] == (1, 2, 3)
+    assert free.lighting.emission["c"][0] == pytest.approx(1, rel=1e-9)
+    w, _, _ = _solved(basis, target, light={"b": {"limits": {"max": "50%"}}})
+    assert w[1] @ LUMINANCE == pytest.approx(0.5 * (np.array([1, 2, 3]) @ LUMINANCE))
+    w, _, solution = _solved(basis, target, tie=["a", "b"])
+    np.testing.assert_allclose(w[0], w[1])
+    assert solution.quality.unreached == ()
+
+
+def test_scalar_and_kept_lights(make_basis: Any) -> None:
+    basis, target = _problem(make_basis, 2, 5, scalar=(1, 2))
+    kept = replace(basis.lights[4], name="rest", emission=(1.0,) * 3, is_fixed=True, members=("x",))
+    basis = replace(basis, lights=(*basis.lights[:4], kept))
+    A, y = stacked(basis, target)
+    asked = {"l1": {"limits": {"max": "20%"}}, "rest": {"lock": True}, "x": {"lock": True}}
+    w, mine, _ = _solved(basis, target, light=asked, tie=["l2", "l3"])
+    assert (w[4] == 1).all()
+    assert w[1, 0] == w[1, 1] == w[1, 2] <= 0.2
+    C = np.zeros((15, 5))
+    C[:3, :3] = np.eye(3)
+    C[3:6, 3] = 1
+    C[6:9, 4], C[9:12, 4] = 1, basis.lights[3].emission
+    w0 = np.zeros(15)
+    w0[12:] = 1
+    _check_close(mine, _best(A, y, C, w0, 0, [np.inf] * 3 + [0.2, np.inf]), y)
+    w, _, _ = _solved(basis, target, light={"l1": {"lock": "30%"}, "l2": {"lock": 0.7}})
+    np.testing.assert_allclose(w[1:3], [[0.3] * 3, [0.7] * 3])
+
+
+@pytest.mark.parametrize(
+    ("lock", "expected"),
+    [
+        ("50%", [0.5, 1, 1.5]),
+        (2 * float(np.array([1, 2, 3]) @ LUMINANCE), [2, 4, 6]),
+        ([3, 2, 1], [3, 2, 1]),
+        ("#ffaa66 3", 3 * hex_to_rgb("#ffaa66") / (hex_to_rgb("#ffaa66") @ LUMINANCE)),
+        ("3200K 3", 3 * kelvin_to_rgb(3200)),
+        ("3200K", kelvin_to_rgb(3200) * (np.array([1, 2, 3]) @ LUMINANCE)),
+    ],
+)
+def test_what_a_light_can_be_locked_at(make_basis: Any, lock: Any, expected: Any) -> None:
+    basis = make_basis(2, SIZE, names=["a", "b"], emission=[[1, 2, 3]] * 2)
+    _, target = _problem(make_basis, 0)
+    w, _, _ = _solved(basis, target, light={"a": {"lock": lock}})
+    np.testing.assert_allclose(w[0], expected, rtol=1e-12)
+
+
+def test_what_stands_later_and_names_go_before(make_basis: Any) -> None:
+    basis, target = _problem(make_basis, 4)
+    below = Constraints.of({"l1": {"color": "3200K"}, "l*": {"off": True}})
+    w = solve(basis, target, constraints=below).lighting.weights_for(basis)
+    assert not w[[0, 2, 3]].any()
+    assert w[1].all()
+    both = below.and_then(Constraints.of({"l*": {"lock": True}}, sparse=2))
+    assert both.sparse == 2
+    w = solve(basis, target, constraints=replace(both, sparse=None)).lighting.weights_for(basis)
+    np.testing.assert_array_equal(w, _present(basis))
+    again = below.and_then(Constraints.of({"l2": {"off": False}}))
+    assert solve(basis, target, constraints=again).lighting.weights_for(basis)[2].any()
+
+
+def test_the_answer_file_says_what_held_a_light(make_basis: Any, tmp_path: Any) -> None:
+    basis, target = _problem(make_basis, 4)
+    _, _, solution = _solved(basis, target, light={"l1": {"limits": {"max": 0.01}}})
+    write_lighting(tmp_path / "lighting.json", solution.lighting)
+    again = read_lighting(tmp_path / "lighting.json")
+    assert again == solution.lighting
+    assert [x.constraint for x in again.lights] == ["", "limits 0 to 0.01", "", ""]
+    assert again.lights[1].is_active
+    assert not again.with_emission("l1", (1, 1, 1)).lights[1].constraint
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"lock": True, "off": True}, "both 'lock' and 'off'"),
+        ({"lock": 1, "limits": {"max": 2}}, "both 'lock' and 'limits'"),
+        ({"off": True, "color": "3200K"}, "both 'off' and 'color'"),
+        ({"kelvin": 3200, "color": "3200K"}, "both 'color' and 'kelvin'"),
+        ({"lock": True, "color": "3200K"}, "lock that holds its colour and 'color'"),
+        ({"lock": 1, "kelvin": [2700, 5000]}, "both lock and 'kelvin'"),
+        ({"lock": "very dim"}, "lock is 'very dim': expected"),
+        ({"lock": "a b c"}, "lock is 'a b c': expected"),
+        ({"lock": -1}, "lock is -1: expected"),
+        ({"lock": "#fff #000"}, "expected .* a colour and a level"),
+        ({"color": "3200"}, "color is '3200': expected a colour like #ffaa66, 3200K"),
+        ({"color": "#xyz"}, "color is '#xyz': expected"),
+        ({"color": [0, 0, 0]}, "black, which is no colour of light: say off"),
+        ({"color": [1, -1, 1]}, "color is .*: expected"),
+        ({"kelvin": [6500, 2700]}, r"kelvin is \[6500, 2700\]: expected"),
+        ({"kelvin": 500}, "kelvin: a colour temperature of 500 K"),
+        ({"kelvin": "warm"}, "kelvin is 'warm': expected"),
+        ({"kelvin": 3000, "duv": "x"}, "duv is 'x': expected a number"),
+        ({"duv": 0.01}, "'duv' without a 'kelvin'"),
+        ({"primaries": []}, "primaries is .*: expected a list of colours"),
+        ({"primaries": ["red"]}, "primaries is 'red': expected a colour"),
+        ({"limits": {}}, "limits is empty"),
+        ({"limits": 3}, "limits is 3: expected keys"),
+        ({"limits": {"maximum": 3}}, "known are min, max"),
+        ({"limits": {"max": "dim"}}, "limits.max is 'dim': expected a luminance"),
+        ({"limits": {"min": 3, "max": 2}}, "min of 3 above its max of 2"),
+        ({"limits": {"min": [0, 1, 0], "max": [1, 0.5, 1]}}, "above its max"),
+        ({"off": 1}, "off is 1: expected true or false"),
+        ({"dim": True}, "has the key 'dim': known are lock, off"),
+        (3, "is 3: expected keys"),
+    ],
+)
+def test_wishes_that_mean_nothing_are_refused_at_birth(asked: Any, words: str) -> None:
+    with pytest.raises(ConstraintError, match=words) as caught:
+        Constraints.of({"key": asked}, where="hall.lights.toml")
+    assert str(caught.value).startswith("hall.lights.toml: light.key")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"light": ["key"]}, "light is .*: expected tables"),
+        ({"tie": "key"}, "tie is 'key': expected lists of names"),
+        ({"tie": [3]}, "tie is .*: expected lists"),
+        ({"tie": [{"lamps": ["a"]}]}, "known are lights, color"),
+        ({"tie": [{"lights": "a"}]}, "expected lists"),
+        ({"tie": [[]]}, "expected names of at least two"),
+        ({"prefer_current": -1}, "prefer is -1: expected a strength"),
+        ({"prefer_current": {"current": "x"}}, "prefer.current is 'x'"),
+        ({"prefer_current": {"past": 1}}, "known are current"),
+        ({"sparse": 0}, "sparse is 0: expected a whole number"),
+        ({"sparse": True}, "sparse is True"),
+    ],
+)
+def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None:
+    with pytest.raises(ConstraintError, match=words):
+        Constraints.of(**asked)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"light": {"lamb_1": {"off": True}}}, "no light 'lamb_1'; did you mean 'lamp_1'"),
+        ({"light": {"w*": {"off": True}}}, r"no light 'w\*'; there are"),
+        ({"light": {"bulb": {"off": True}}}, "'bulb' is part of the light 'group'"),
+        ({"light": {"rest": {"off": True}}}, "'rest' is not among the lights to adjust"),
+        ({"light": {"x": {"color": "3200K"}}}, "'x' is not among the lights to adjust"),
+        ({"light": {"sky": {"color": "3200K"}}}, "'sky' can only be dimmed as a whole"),
+        ({"light": {"sky": {"kelvin": [2700, 5000]}}}, "'sky' can only be dimmed"),
+        ({"light": {"sky": {"lock": [1, 2, 3]}}}, "'sky' can only be dimmed"),
+        ({"light": {"sky": {"lock": "3200K"}}}, "'sky' can only be dimmed"),
+        ({"light": {"sky": {"limits": {"max": [1, 2, 3]}}}}, "'sky' can only be dimmed"),
+        ({"tie": [{"lights": ["sky", "lamp_1"], "color": "3200K"}]}, "'sky' can only be dimmed"),
+        ({"light": {"dark": {"limits": {"max": "40%"}}}}, "'dark' is off at present"),
+        ({"tie": ["dark", "lamp_1"]}, "'dark' is off at present"),
+        ({"tie": ["lamp_1"]}, "is one light: a tie has at least two"),
+        ({"tie": [["lamp_1", "sky"], ["lamp_*"]]}, "'lamp_1' is in two ties"),
+        ({"tie": ["lamp_*"], "light": {"lamp_1": {"lock": True}}}, "is on the dimmer of"),
+        ({"tie": ["lamp_*"], "light": {"lamp_1": {"kelvin": [2700, 5000]}}}, "is on the dimmer"),
+        (
+            {
+                "tie": ["lamp_*"],
+                "light": {
+                    "lamp_1": {"limits": {"max": "20%"}},
+                    "lamp_2": {"limits": {"min": "50%"}},
+                },
+            },
+            "limits of lamp_1, lamp_2 contradict each other",
+        ),
+        (
+            {"light": {"lamp_1": {"limits": {"min": [9, 9, 9], "max": 3}}}},
+            "no emission at all: widen",
+        ),
+        (
+            {"light": {"lamp_1": {"limits": {"min": 9, "max": [1, 1, 1]}}}},
+            "no emission at all: widen",
+        ),
+        (
+            {"light": {"lamp_1": {"color": [1, 0, 0], "limits": {"min": [0, 1, 0]}}}},
+            "no emission at all: widen",
+        ),
+        (
+            {"light": {"lamp_1": {"kelvin": [2700, 5000], "limits": {"max": [1, 1, 1]}}}},
+            "for a light that mixes primaries: give a luminance",
+        ),
+    ],
+)
+def test_wishes_that_do_not_fit_the_lights(make_basis: Any, asked: Any, words: str) -> None:
+    names = ["lamp_1", "lamp_2", "dark", "sky", "group", "rest"]
+    basis = make_basis(6, SIZE, names=names, emission=[[1, 2, 3]] * 6)
+    changes: list[dict[str, Any]] = [{} for _ in names]
+    changes[2] = {"emission": (0.0, 0.0, 0.0)}
+    changes[3] = {"emission": (1.0, 1.0, 1.0), "is_scalar": True}
+    changes[4] = {"members": ("bulb", "tube")}
+    changes[5] = {"emission": (1.0, 1.0, 1.0), "is_fixed": True, "members": ("x", "y")}
+    lights = tuple(replace(x, **change) for x, change in zip(basis.lights, changes, strict=True))
+    _, target = _problem(make_basis, 0)
+    with pytest.raises(ConstraintError, match=words) as caught:
+        solve(replace(basis, lights=lights), target, constraints=Constraints.of(**asked))
+    assert "\n" not in str(caught.value)
+
+
+def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
+    basis, target = _problem(make_basis, 8)
+    now = _present(basis) @ LUMINANCE
+    w, _, _ = _solved(
+        basis,
+        target,
+        tie=[{"lights": ["l0", "l1"], "color": "3200K"}, ["l2", "l3"]],
+        light={"l2": {"color": "#ffaa66"}, "l3": {"limits": {"max": "5%"}}},
+    )
+    np.testing.assert_allclose(w[0] / now[0], w[1] / now[1])
+    np.testing.assert_allclose(w[0] / (w[0] @ LUMINANCE), kelvin_to_rgb(3200))
+    # The limit of one member is that of the dimmer.
+    np.testing.assert_allclose(w[2] @ LUMINANCE, 0.05 * now[2])
+
+
+def test_no_constraints_take_the_plain_way(make_basis: Any, monkeypatch: Any) -> None:
+    def never(*_: Any) -> Callable[..., Any]:
+        raise AssertionError("reduced a problem with nothing asked")
+
+    monkeypatch.setattr(sys.modules["lightpaint.lighting.linear"], "reduce_to", never)
+    basis, target = _problem(make_basis, 0)
+    solve(basis, target, constraints=Constraints())
+    solve(basis, target)
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_the_best_few_lights(make_basis: Any, seed: int) -> None:
+    """Against all choices of two of five by scipy; what is locked shines along."""
+    basis, target = _problem(make_basis, seed, 6)
+    A, y = stacked(basis, target)
+    w0 = np.zeros((6, 3))
+    w0[5] = _present(basis)[5]
+    w, mine, solution = _solved(basis, target, sparse=2, light={"l5": {"lock": True}})
+    on = np.flatnonzero(w[:5].any(axis=1))
+    assert len(on) <= 2
+
+    def of(lights: Any) -> float:
+        C = np.eye(18)[:, [3 * k + c for k in lights for c in range(3)]]
+        return _best(A, y, C, w0)
+
+    # The best of these that are on, and, where exchanging found it, of all.
+    _check_close(mine, of(on), y)
+    values = [of(lights) for lights in combinations(range(5), 2)]
+    assert mine <= np.quantile(values, 0.2) + SAME * (y @ y)
+    counts, missed = zip(*solution.quality.curve, strict=True)
+    assert counts == (1, 2, 3, 4)
+    # The roots of float64 sums.
+    assert (np.diff(missed) < 1e-12).all()
+    assert missed[1] == pytest.approx(np.sqrt(mine / (y @ y)))
+    left = [light.name for light in solution.lighting.lights if "left out" in light.constraint]
+    assert len(left) == 3
+
+
+def test_few_lights_among_ties_and_lower_limits(make_basis: Any) -> None:
+    basis, target = _problem(make_basis, 1, 5)
+    limits = {"l4": {"limits": {"min": 0.01}}}
+    w, _, _ = _solved(basis, target, sparse=2, tie=["l0", "l1", "l2"], light=limits)
+    assert w[4] @ LUMINANCE >= 0.01 - 1e-12
+    assert w[0].any() == w[1].any() == w[2].any()
+    with pytest.raises(ConstraintError, match="sparse is 1, but 2 lights have a lower limit"):
+        _solved(basis, target, sparse=1, light={"l[34]": limits["l4"]})
+    # More than there are is no constraint.
+    all_of_them = _solved(basis, target, sparse=9)[0]
+    np.testing.assert_allclose(all_of_them, solve(basis, target).lighting.weights_for(basis))
+
+
+@pytest.mark.parametrize("kind", ["color", "share", "luminance of mixed", "luminance of free"])
+def test_limits_may_leave_one_emission(make_basis: Any, kind: str):
+    """Round-off may part two ends that are the same; that is no contradiction."""
+    rng = np.random.default_rng(1)
+    for color in rng.uniform(0.1, 1, (100, 3)):
+        level = 0.37 * color
+        bright = float(LUMINANCE @ level)
+        basis = make_basis(2, SIZE, names="ab", emission=[level, [1, 1, 1]])
+        target = Target("t", basis.images[0], np.ones(SIZE, np.float32), everything=False)
+        # Of the first, level / color of one channel and another differ.
+        asked: dict[str, Any] = {
+            "color": {"color": color.tolist(), "limits": [level.tolist(), level.tolist()]},
+            "share": {"color": color.tolist(), "limits": ["100%", bright * (1 - 2e-13)]},
+            "luminance of mixed": {"limits": ["100%", bright * (1 - 2e-13)]},
+            "luminance of free": {"limits": [level.tolist(), bright * (1 - 2e-13)]},
+        }[kind]
+        asked["limits"] = dict(zip(("min", "max"), asked["limits"], strict=True))
+        solution = solve(basis, target, constraints=Constraints.of({"a": asked}))
+        w = solution.lighting.weights_for(basis)[0]
+        # What is taken for round-off, 1e-12, of a channel with a tenth of the luminance.
+        if kind == "luminance of mixed":
+            assert LUMINANCE @ w == pytest.approx(bright, rel=1e-11)
+        else:
+            np.testing.assert_allclose(w, level, rtol=1e-10)

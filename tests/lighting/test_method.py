@@ -1,0 +1,85 @@
+"""The paper's iteration alone: the same answer where it comes to it, and honest where not."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.lighting.analysis.uncertainty import correct_noise
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.solve import solve
+from lightpaint.lighting.views import solve_views
+from lightpaint.target.target import Target
+
+SIZE = (12, 10)
+
+#: What may be asked for, so that each path of the solver is gone.
+ASKED: list[dict[str, Any]] = [
+    {},
+    {"light": {"light 0": {"color": "3200K"}, "light 1": {"limits": {"max": [0.1, 0.2, 0.3]}}}},
+    {"light": {"light 0": {"limits": {"max": 0.1}}, "light 1": {"kelvin": [2700, 6500]}}},
+    {"light": {"light 2": {"off": True}}, "tie": ["light 0", "light 1"]},
+    {"sparse": 2},
+    {"prefer_current": 0.02},
+]
+
+
+def _target(image: Any) -> Target:
+    return Target("t", image.astype(np.float32), np.ones(SIZE, np.float32), everything=False)
+
+
+@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.parametrize("seed", range(10))
+def test_both_methods_come_to_one_answer(make_basis: Any, seed: int, asked: Any) -> None:
+    basis = make_basis(4, SIZE, seed=seed)
+    if seed % 2:
+        lights = (*basis.lights[:3], replace(basis.lights[3], is_scalar=True))
+        basis = replace(basis, lights=lights)
+    target = _target(np.random.default_rng(seed).random((*SIZE, 3)))
+    constraints = Constraints.of(**asked)
+    polished, swept = (
+        solve(basis, target, constraints=constraints, method=method)
+        for method in ("polished", "gauss-seidel")
+    )
+    assert swept.method == "gauss-seidel"
+    assert polished.quality.converged
+    assert swept.quality.converged
+    assert min(swept.quality.sweeps) > 0
+    # Both residuals are 1e-12 of b at most; M⁻¹ makes errors of weights of that.
+    M, b = swept.equations.M, swept.equations.b
+    slack = max(np.linalg.norm(np.linalg.inv(M[c]), 2) for c in range(3))
+    atol = 2e-12 * slack * np.abs(b).max() * 2 * np.sqrt(3 * 4)
+    a, b = (x.lighting.weights_for(basis) for x in (polished, swept))
+    np.testing.assert_allclose(a, b, rtol=0, atol=atol)
+
+
+def _alike(make_basis: Any) -> Any:
+    """Two lights that do nearly the same: sweeps go along a long narrow valley."""
+    rng = np.random.default_rng(0)
+    images = rng.random((3, *SIZE, 3))
+    images[1] = images[0] + 1e-4 * rng.random((*SIZE, 3))
+    noise = rng.normal(0, 1e-6, images.shape)
+    basis = make_basis(images=images, half_differences=noise)
+    truth = np.einsum("nhwc,nc->hwc", images, [[0.2] * 3, [0.9] * 3, [0.5] * 3])
+    return basis, _target(truth)
+
+
+def test_running_out_of_sweeps_is_said(make_basis: Any) -> None:
+    basis, target = _alike(make_basis)
+    assert solve(basis, target).quality.converged
+    for constraints in (None, Constraints.of({"light 2": {"limits": {"max": [9, 9, 9]}}})):
+        swept = solve(basis, target, constraints=constraints, method="gauss-seidel")
+        assert not swept.quality.converged
+        assert max(swept.quality.sweeps) == 20_000
+        assert max(swept.quality.kkt_residual) > 1e-12
+
+
+def test_the_method_stays_where_the_answer_is_improved(make_basis: Any) -> None:
+    basis, target = _alike(make_basis)
+    better = correct_noise(basis, solve(basis, target, method="gauss-seidel"))
+    assert better.method == "gauss-seidel"
+    assert max(better.quality.sweeps) > 0
+    views = solve_views([(basis, target), (basis, target)], method="gauss-seidel")
+    assert [view.method for view in views] == ["gauss-seidel"] * 2
+    assert not views[0].quality.converged

@@ -1,0 +1,490 @@
+"""Losses that are not one square per channel: "at least this bright", and what a display shows."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize, nnls
+
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.view import View
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting import reweighted
+from lightpaint.lighting.analysis.diagnosis import diagnose
+from lightpaint.lighting.analysis.refine import refine
+from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.loss import Loss
+from lightpaint.lighting.normal_equations import inner_products
+from lightpaint.lighting.reweighted import predicted
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import problem_of, solution_of, solve
+from lightpaint.lighting.views import joint_basis, joint_problem, parted, solve_views
+from lightpaint.target.target import Target
+
+SIZE = (8, 9)
+SRGB = View("srgb")
+
+
+def _target(image: Any, importance: Any = None, *, top: float | None = None) -> Target:
+    """top: where the file ends: brighter paint is that, and stands for anything above."""
+    image = np.asarray(image, np.float32)
+    importance = np.ones(image.shape[:2]) if importance is None else importance
+    at_least = None if top is None else image >= top
+    image = image if top is None else np.minimum(image, np.float32(top))
+    return Target("t", image, importance.astype(np.float32), everything=False, at_least=at_least)
+
+
+def _random(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Any, Any]:
+    """A basis with contrast, a picture that no mix of it is, and importances, some of them 0."""
+    rng = np.random.default_rng(seed)
+    basis = make_basis(images=rng.random((n, *SIZE, 3)) ** 3, emission=rng.random((n, 3)))
+    image = rng.random((*SIZE, 3)) ** 2 * rng.choice([0.5, 1, 2])
+    return basis, image, np.clip(rng.normal(0.5, 0.5, SIZE), 0, 1)
+
+
+def _pictures(basis: Basis, w: Any) -> Any:
+    return np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), w.reshape(-1, 3))
+
+
+def _hinge(basis: Basis, target: Target, unpainted: float) -> Any:
+    """The objective by hand: squares, of which those of saturated paint only pull upwards."""
+    a = target.importance[..., None].astype(np.float64)
+    current = basis.mix(basis.present_weights)
+
+    def value(w: Any) -> float:
+        x = _pictures(basis, w)
+        missed = target.image - x
+        missed = np.where(target.at_least, np.maximum(missed, 0), missed)
+        return float((a * missed**2 + unpainted * (1 - a) * (current - x) ** 2).sum())
+
+    return value
+
+
+def _displayed(basis: Basis, target: Target, view: View, unpainted: float) -> Any:
+    a = target.importance[..., None].astype(np.float64)
+    painted = view.encode(target.image.astype(np.float64))
+    current = view.encode(basis.mix(basis.present_weights).astype(np.float64))
+
+    def value(w: Any) -> float:
+        x = view.encode(_pictures(basis, w))
+        return float((a * (painted - x) ** 2 + unpainted * (1 - a) * (current - x) ** 2).sum())
+
+    return value
+
+
+def _best(value: Any, starts: list[Any]) -> float:
+    """The least that scipy's quasi-Newton method finds from these weights."""
+    options = {"maxiter": 2000, "maxfun": 10**6, "ftol": 1e-16, "gtol": 1e-11}
+    found = [
+        minimize(value, w.ravel(), method="L-BFGS-B", bounds=[(0, None)] * w.size, options=options)
+        for w in starts
+    ]
+    return min(float(each.fun) for each in found)
+
+
+def _projected_gradient(value: Any, w: Any) -> Any:
+    """By central differences; of a weight at zero, only what would have it rise."""
+    gradient = np.empty(w.size)
+    for k in range(w.size):
+        step = np.zeros(w.size)
+        step[k] = 1e-6
+        gradient[k] = (value(w.ravel() + step) - value(w.ravel() - step)) / 2e-6
+    return np.where(w.ravel() > 0, gradient, np.minimum(gradient, 0))
+
+
+@pytest.mark.parametrize("unpainted", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(10))
+def test_at_least_is_the_optimum_of_the_hinge(make_basis: Any, seed: int, unpainted: float):
+    basis, image, importance = _random(make_basis, seed)
+    target = _target(image, importance, top=0.3)
+    solution = solve(basis, target, unpainted=unpainted)
+    w = solution.lighting.weights_for(basis)
+    value = _hinge(basis, target, unpainted)
+    # It is convex, and the quasi-Newton method's finite differences are good to some 1e-8.
+    best = _best(value, [np.ones_like(w), w])
+    assert value(w) <= best * (1 + 1e-9)
+    assert solution.quality.converged
+    # Certified as any linear solve is: the last problem is exact around its own optimum.
+    assert max(solution.quality.kkt_residual) <= 1e-12
+    assert np.abs(_projected_gradient(value, w)).max() < 1e-5 * value(0 * w)
+    # What is said of it is the hinge, without what the painting and the look cost each other.
+    if not unpainted:
+        assert sum(solution.quality.objective) == pytest.approx(value(w), rel=1e-9)
+        assert solution.norm2.sum() == pytest.approx(value(0 * w), rel=1e-9)
+    assert sum(solution.quality.objective) <= value(w) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("view", [None, SRGB, View("agx", 1.0), View("filmic", -1.0)])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_objective_never_rises(
+    make_basis: Any, seed: int, view: View | None, monkeypatch: pytest.MonkeyPatch
+):
+    basis, image, importance = _random(make_basis, seed)
+    target = _target(image, importance, top=0.3 if view is None else None)
+    problem = solve(basis, target, view=view)
+    plain = solve(basis, replace(target, at_least=None))
+    values = [problem.loss.objective(predicted(basis, plain.lighting.weights_for(basis))).sum()]
+    for rounds in range(1, 12):
+        monkeypatch.setattr(reweighted, "ROUNDS", rounds)
+        solution = solve(basis, target, view=view)
+        values.append(sum(solution.quality.objective))
+        assert solution.quality.converged or view is not None or rounds < 6
+    assert (np.diff(values) <= 1e-12 * values[0]).all()
+
+
+@pytest.mark.parametrize("seed", [2, 9, 11])
+def test_running_out_of_rounds_keeps_what_was_won(
+    make_basis: Any, seed: int, monkeypatch: pytest.MonkeyPatch
+):
+    """Whole steps would be for the worse here, parts of them are not; labels stay as well."""
+    basis, image, importance = _random(make_basis, seed)
+    target, view = _target(image, importance), View("srgb", 2.0)
+    asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
+    problem = solve(basis, target, constraints=asked)
+    monkeypatch.setattr(reweighted, "ROUNDS", 1)
+    solution = solve(basis, target, constraints=asked, view=view)
+    assert not solution.quality.converged
+    begin = predicted(basis, problem.lighting.weights_for(basis))
+    assert sum(solution.quality.objective) < (1 - 1e-4) * solution.loss.objective(begin).sum()
+    labels = [light.constraint for light in solution.lighting.lights]
+    assert labels == [light.constraint for light in problem.lighting.lights]
+    assert solution.lighting.emission["light 1"] == basis.lights[1].emission
+    assert solution.lighting.lights[1].is_active
+
+
+def test_saturated_paint_does_not_dim_the_lights(make_basis: Any):
+    """An 8-bit painting that ends at white; the light that made it was twice as bright."""
+    rng = np.random.default_rng(5)
+    basis = make_basis(images=rng.random((3, 20, 20, 3)) ** 2)
+    truth = np.array([[2.0, 1.5, 1.0], [0.5, 0.7, 1.6], [0.1, 0, 0.3]])
+    codes = np.round(255 * SRGB.encode(combine(basis, Lighting.of_weights(basis, truth)).image))
+    painted = SRGB.decode(codes / 255)
+    target = Target("t", painted.astype(np.float32), np.ones((20, 20), np.float32), False)
+    assert 0.1 < (codes == 255).mean() < 0.6
+    linear = solve(basis, target).lighting.weights_for(basis)
+    assert (linear.sum(axis=0) < 0.85 * truth.sum(axis=0)).all()
+    # Half of the last code is light that is read as white too.
+    found = solve(basis, replace(target, at_least=codes == 255)).lighting.weights_for(basis)
+    # Rounding to codes: uniform errors of up to half of one, over 400 pixels, of slope 1/2.3.
+    half = 0.5 / 255 * 2.3
+    np.testing.assert_allclose(found, truth, atol=3 * half / np.sqrt(3 * 400) / 0.2)
+
+
+def test_only_a_lower_end_is_black(make_basis: Any):
+    """All paint at the top: anything above will do, and the answer meets it."""
+    basis = make_basis(3, SIZE)
+    target = _target(np.full((*SIZE, 3), 5.0), top=0.4)
+    solution = solve(basis, target)
+    # Round-off of float64, squared.
+    assert sum(solution.quality.objective) < 1e-28
+    assert (combine(basis, solution.lighting).image >= 0.4 * (1 - 1e-6)).all()
+    assert solution.quality.converged
+
+
+VIEWS = [SRGB, View("srgb", 2.0), View("filmic"), View("linear", 0.5), View("agx", 1.0)]
+
+
+@pytest.mark.parametrize("view", VIEWS, ids=lambda v: v.spoken)
+@pytest.mark.parametrize("unpainted", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_display_fit_is_stationary_and_no_worse(
+    make_basis: Any, seed: int, view: View, unpainted: float
+):
+    basis, image, importance = _random(make_basis, seed)
+    target = _target(image, importance)
+    value = _displayed(basis, target, view, unpainted)
+    linear = solve(basis, target, unpainted=unpainted).lighting.weights_for(basis)
+    solution = solve(basis, target, unpainted=unpainted, view=view)
+    w = solution.lighting.weights_for(basis)
+    assert value(w) <= value(linear) * (1 + 1e-12)
+    if not unpainted:
+        assert sum(solution.quality.objective) == pytest.approx(value(w), rel=1e-9)
+    # The last linear problem is solved as any is.
+    assert max(solution.quality.kkt_residual) <= 1e-12
+    # A round changes no light by more than 1e-6 beside the brightest.
+    assert solution.quality.converged
+    assert np.abs(_projected_gradient(value, w)).max() < 1e-6 * value(0 * w)
+
+
+def test_most_display_fits_are_the_best_there_are(make_basis: Any):
+    """The loss is not convex. Random starts seldom find better, or much better."""
+    worse = []
+    for seed in range(12):
+        basis, image, importance = _random(make_basis, seed)
+        target = _target(image, importance)
+        value = _displayed(basis, target, SRGB, 0.0)
+        w = solve(basis, target, view=SRGB).lighting.weights_for(basis)
+        rng = np.random.default_rng(seed)
+        best = _best(value, [3 * rng.random(w.shape) for _ in range(4)] + [w])
+        worse.append(value(w) / best - 1)
+    assert np.median(worse) < 1e-6
+    assert np.max(worse) < 0.1
+
+
+def test_what_is_clipped_comes_back(make_basis: Any):
+    """From lights so bright that all is white, where no slope says which way to go."""
+    rng = np.random.default_rng(0)
+    basis = make_basis(images=0.2 + rng.random((2, *SIZE, 3)))
+    truth = np.array([[0.2, 0.1, 0.3], [0.1, 0.2, 0.1]])
+    loss = Loss(
+        painted=_pictures(basis, truth),
+        importance=np.ones(SIZE),
+        share=np.zeros(SIZE),
+        current=np.zeros((*SIZE, 3)),
+        view=SRGB,
+    )
+    problem = solve(basis, _target(_pictures(basis, truth)), view=SRGB)
+
+    def linear(equations: Any, begin: Any) -> Any:
+        one = replace(problem, loss=None, equations=equations, solved=equations)
+        return solution_of(basis, one, start=begin).lighting.weights_for(basis)
+
+    found = reweighted.descend(basis, loss, np.full((2, 3), 50.0), linear)
+    np.testing.assert_allclose(found.weights, truth, rtol=1e-5)
+
+
+@pytest.mark.parametrize("view", [None, *VIEWS], ids=str)
+def test_squares_have_the_gradient_of_the_loss(make_basis: Any, view: View | None):
+    """At pictures where nothing clips, by differences of each pixel's own loss."""
+    rng = np.random.default_rng(2)
+    top = 0.5 / 2.0 ** (view.stops if view else 0)
+    image, current, x = rng.uniform(0.1, 1, (3, *SIZE, 3)) * top
+    loss = Loss(image, rng.random(SIZE), rng.random(SIZE), current, image > 0.6 * top, view)
+    squares = loss.squares(x)
+    gradient = -2 * loss.importance[..., None] * squares.factor * (squares.image - x)
+    step = 1e-6 * top
+    for y, k, c in [(0, 0, 0), (3, 4, 1), (7, 8, 2), (5, 1, 0), (2, 2, 1), (6, 3, 2)]:
+        aside = np.zeros_like(x)
+        aside[y, k, c] = step
+        rise = loss.objective(x + aside).sum() - loss.objective(x - aside).sum()
+        assert rise / (2 * step) == pytest.approx(gradient[y, k, c], rel=1e-4, abs=1e-6)
+
+
+def test_importance_per_channel(make_basis: Any):
+    basis, image, _ = _random(make_basis, 3)
+    weight = np.clip(np.random.default_rng(0).normal(0.3, 0.5, (*SIZE, 3)), 0, None)
+    M, b, norm2 = inner_products(basis.images, image, weight)
+    for c in range(3):
+        rows = basis.images[..., c].reshape(4, -1).astype(np.float64)
+        D, painted = weight[..., c].ravel(), image[..., c].ravel()
+        np.testing.assert_allclose(M[c], (rows * D) @ rows.T, rtol=1e-12)
+        np.testing.assert_allclose(b[c], (rows * D) @ painted, rtol=1e-12)
+        np.testing.assert_allclose(norm2[c], (D * painted) @ painted, rtol=1e-12)
+
+
+ASKED: list[dict[str, Any]] = [
+    {"lights": {"light 0": {"lock": True}, "light 1": {"limits": {"max": 0.3}}}},
+    {"lights": {"light 2": {"color": "3200K"}}, "tie": [["light 0", "light 1"]]},
+    {"prefer_current": 0.1},
+    {"sparse": 2},
+]
+
+
+@pytest.mark.parametrize("view", [None, SRGB])
+@pytest.mark.parametrize("asked", ASKED, ids=lambda a: next(iter(a)))
+def test_constraints_hold_and_nothing_near_is_better(
+    make_basis: Any, asked: dict[str, Any], view: View | None
+):
+    basis, image, importance = _random(make_basis, 7)
+    target = _target(image, importance, top=0.3)
+    asked = dict(asked)
+    constraints = Constraints.of(asked.pop("lights", {}), **asked)
+    solution = solve(basis, target, constraints=constraints, view=view)
+    assert solution.quality.converged
+    w = solution.lighting.weights_for(basis)
+    plain = solve(basis, target, constraints=constraints).lighting.weights_for(basis)
+    pull = constraints.prefer_current * np.square(basis.images, dtype=np.float64).sum((1, 2))
+
+    def value(w: Any) -> float:
+        missed = float(solution.loss.objective(_pictures(basis, w)).sum())
+        return missed + float((pull * np.square(w - basis.present_weights)).sum())
+
+    assert value(w) <= value(plain) * (1 + 1e-9)
+    if constraints.sparse:
+        assert (w.any(axis=1)).sum() <= 2
+        assert solution.quality.curve
+        assert dict(solution.quality.curve)[2] == pytest.approx(
+            np.sqrt(value(w) / solution.norm2.sum()), rel=0.05
+        )
+    # Any mix of two lightings that constraints allow is allowed, too.
+    if not constraints.sparse:
+        for seed in range(5):
+            other = _random(make_basis, seed + 20)[1]
+            free = solve(basis, _target(other, importance), constraints=constraints)
+            there = free.lighting.weights_for(basis)
+            assert value(w + 1e-3 * (there - w)) >= value(w) * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("view", [None, SRGB])
+def test_views_together_are_one_picture(make_basis: Any, view: View | None):
+    """Two views, of which one alone has saturated paint, against one view of both pictures."""
+    basis, image, importance = _random(make_basis, 1)
+    present = [light.emission for light in basis.lights]
+    first, second = (
+        make_basis(images=basis.images[:, rows], emission=present)
+        for rows in (slice(0, 5), slice(5, None))
+    )
+    at_least = image > 0.4
+    at_least[5:] = False
+    whole = replace(_target(image, importance), at_least=at_least)
+    parts = [
+        (first, replace(_target(image[:5], importance[:5]), at_least=at_least[:5])),
+        (second, _target(image[5:], importance[5:])),
+    ]
+    expected = solve(basis, whole, unpainted=0.2, view=view)
+    found = solve_views(parts, unpainted=0.2, view=view)
+    w = expected.lighting.weights_for(basis)
+    # As exactly as rounds end.
+    np.testing.assert_allclose(found[0].lighting.weights_for(first), w, atol=1e-5)
+    together = sum(sum(s.quality.objective) for s in found)
+    assert together == pytest.approx(sum(expected.quality.objective), rel=1e-9)
+    M = found[0].equations.M + found[1].equations.M
+    np.testing.assert_allclose(M, expected.equations.M, rtol=1e-4)
+
+
+def _least(solution: Solution, basis: Basis, solve_channel: Any) -> float:
+    """The least of the last linear problem, by another solver, of dense rows."""
+    total = 0.0
+    for c in range(3):
+        root = np.sqrt(
+            solution.weight[..., c % solution.weight.shape[2]].ravel().astype(np.float64)
+        )
+        rows = basis.images[..., c].reshape(len(basis.images), -1).astype(np.float64)
+        A, y = (rows * root).T, solution.image[..., c].ravel() * root
+        total += float(np.square(A @ solve_channel(A, y) - y).sum())
+    return total
+
+
+def _of_any_sign(A: Any, y: Any) -> Any:
+    return np.linalg.lstsq(A, y, rcond=None)[0]
+
+
+@pytest.mark.parametrize("view", [None, SRGB, View("agx", 1.0)], ids=str)
+@pytest.mark.parametrize("seed", range(4))
+def test_what_each_of_several_views_misses_is_split_on_one_scale(
+    make_basis: Any, seed: int, view: View | None
+):
+    """Each part from its own optimum, of the view's own squares: nnls, and lstsq for any sign."""
+    bases, targets = [], []
+    for k in range(2):
+        basis, image, importance = _random(make_basis, seed + 50 * k)
+        bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
+        targets.append(_target(image, importance + 0.01, top=None if view else 0.6))
+    whole, parts = joint_basis(bases)
+    problems = [problem_of(b, t, view=view) for b, t in zip(parts, targets, strict=True)]
+    joint = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
+    told, energies = [], []
+    for b, t, its in zip(parts, targets, parted(joint, problems, parts), strict=True):
+        found = diagnose(b, t, its, whole=(whole, joint))
+        free, alone = (_least(its, b, f) for f in (_of_any_sign, lambda A, y: nnls(A, y)[0]))
+        energy = _least(its, b, partial(_as_solved, joint, iter(range(3))))
+        # Pixels in float32, sums of 72 of them.
+        close = partial(pytest.approx, abs=1e-5 * energy)
+        assert found.total == close(energy)
+        assert found.unreachable == close(free)
+        assert found.forbidden == close(alone - free)
+        assert found.compromise == close(energy - alone)
+        assert found.missed == pytest.approx(
+            np.sqrt(sum(its.quality.objective) / its.norm2.sum()), rel=1e-5
+        )
+        told.append(found)
+        energies.append(energy)
+    assert min(max(x.forbidden, x.compromise) for x in told) > 0.01 * min(energies)
+    # What holds a light does so in all views, and its gain is beside what all of them miss.
+    for found in told:
+        assert found.lighting_total == pytest.approx(sum(energies), rel=1e-5)
+
+
+def _as_solved(joint: Solution, channels: Any, A: Any, y: Any) -> Any:
+    c = next(channels)
+    return np.array([light.weight[c] for light in joint.lighting.lights])
+
+
+@pytest.mark.parametrize("view", [SRGB, View("agx", 1.0)], ids=str)
+def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, view: View):
+    basis, image, importance = _random(make_basis, 2)
+    target = _target(image, importance)
+    solution = solve(basis, target, view=view)
+    found = diagnose(basis, target, solution)
+    # As pixels have it in float32, and normal equations in float64.
+    assert solution.energy == pytest.approx(found.total, rel=1e-5)
+    assert found.lighting_total == pytest.approx(found.total, rel=1e-5)
+
+
+def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any):
+    basis, image, importance = _random(make_basis, 4)
+    target = _target(image, importance)
+    nowhere = replace(target, at_least=np.repeat((importance == 0)[..., None], 3, axis=-1))
+    assert nowhere.at_least.any()
+    a, b = solve(basis, target), solve(basis, nowhere)
+    assert b.loss is None
+    assert a.lighting == b.lighting
+
+
+@pytest.mark.parametrize("view", [None, SRGB])
+def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | None):
+    """95 % intervals over seeds, taken from the last linear problem; and less bias, corrected."""
+    size, sigma = (24, 24), 0.15
+    y, x = np.mgrid[: size[0], : size[1]] / size[0]
+    places = np.random.default_rng(0).random((4, 2))
+    clean = np.stack([np.exp(-((x - a) ** 2 + (y - b) ** 2) / 0.15) for a, b in places])
+    clean = clean[..., None] * np.ones(3)
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 0.1, 0.3], clean) * [1, 0.7, 0.3] + 0.1 * y[..., None]
+    target = _target(image, top=0.8)
+    quiet = make_basis(images=clean)
+    truth = solve(quiet, target, view=view).lighting.weights_for(quiet)
+    held, off, corrected_off = [], [], []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        a, b = (
+            clean * (1 + sigma * np.sqrt(2) * (rng.exponential(1, (*clean.shape[:-1], 1)) - 1))
+            for _ in range(2)
+        )
+        basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2)
+        solution = solve(basis, target, view=view)
+        low, high = error_bars(basis, solution).interval
+        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        off.append(solution.lighting.weights_for(basis) - truth)
+        corrected = correct_noise(basis, solution)
+        corrected_off.append(corrected.lighting.weights_for(basis) - truth)
+    assert 0.8 <= np.mean(held) <= 1
+    assert np.square(corrected_off).mean() < np.square(off).mean()
+
+
+@pytest.mark.parametrize("view", [None, SRGB])
+@pytest.mark.parametrize("seed", range(12))
+def test_lights_once_chosen_stay_chosen(make_basis: Any, seed: int, view: View | None):
+    """With `sparse` the choice is taken as given by all that improves an answer.
+
+    The squares of the last linear problem hold near the answer only: other lights would be
+    chosen on them, which the loss does not want.
+    """
+    rng = np.random.default_rng(seed)
+    images = rng.random((6, *SIZE, 3)) ** 3
+    halves = 1e-4 * rng.normal(size=images.shape)
+    basis = make_basis(images=images, half_differences=halves, emission=rng.random((6, 3)))
+    image = rng.random((*SIZE, 3)) ** 2 * rng.choice([0.5, 1, 2])
+    target = _target(image, top=None if view else 0.3)
+    asked = Constraints.of({}, sparse=2)
+    solution = solve(basis, target, constraints=asked, view=view)
+    w = solution.lighting.weights_for(basis)
+    mix = combine(basis, solution.lighting)
+    refined = refine(basis, solution, Estimate(mix.image, 0.5 * mix.half_difference))
+    again = solution_of(basis, solution, start=w)
+    for found in (again, correct_noise(basis, solution), refined):
+        v = found.lighting.weights_for(basis)
+        assert v.any(axis=1).tolist() == w.any(axis=1).tolist()
+        # Noise of 1e-4 moves nothing further, squares that end where the loss does neither.
+        np.testing.assert_allclose(v, w, atol=2e-3)
+        assert sum(found.quality.objective) == pytest.approx(
+            sum(solution.quality.objective), rel=1e-4
+        )
+        assert [count for count, _ in found.tried] == [1, 2, 3, 4]
+        assert found.quality.curve == solution.quality.curve
+        assert [x.constraint for x in found.lighting.lights] == [
+            x.constraint for x in solution.lighting.lights
+        ]

@@ -1,0 +1,247 @@
+"""Suggested lights: a hidden one is found, and where none is missing none is named."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.render import render_basis
+from lightpaint.colour.view import View
+from lightpaint.errors import SceneError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.solve import Solution, solve
+from lightpaint.placement.suggest import (
+    Suggestion,
+    check_suggestible,
+    emitter_xml,
+    suggest_lights,
+)
+from lightpaint.report.suggestion import spoken_suggestions, suggestion_section
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.target.target import Target
+
+#: A light that the scene to solve does not have.
+HIDDEN = (0.4, 1.2, 0.6)
+INTENSITY = (0.9, 0.6, 0.3)
+EXTRA = emitter_xml("extra", HIDDEN, INTENSITY)
+
+#: How near positions lie that are tried first: 64 of them in some 20 cubic units.
+SPACING = 0.7
+
+#: Samples of basis and target, whose noise is then a few per cent of a pixel.
+SPP = 256
+
+
+def _target(image: Any) -> Target:
+    ones = np.ones(image.shape[:2], np.float32)
+    return Target("painted", image.astype(np.float32), ones, everything=True)
+
+
+def _present(path: Path, *, seed: int = 1) -> Any:
+    basis = render_basis(load_scene(path), spp=SPP, seed=seed)
+    return basis.mix(basis.present_weights)
+
+
+def _solved(
+    path: Path, target: Target, constraints: Constraints | None = None
+) -> tuple[Scene, Basis, Solution]:
+    scene = load_scene(path)
+    basis = render_basis(scene, spp=SPP)
+    return scene, basis, solve(basis, target, constraints=constraints)
+
+
+@pytest.mark.parametrize("hidden", [HIDDEN, (-0.9, 1.0, 2.5)])
+def test_a_light_that_is_missing_is_found(tmp_path: Path, hidden: Any):
+    """The painting is a render of the room with one light more; the room is solved without it.
+
+    The second is beside the camera, out of the picture.
+    """
+    lights = LIGHTS["panel"] + LIGHTS["sky"]
+    extra = emitter_xml("extra", hidden, INTENSITY)
+    target = _target(_present(write_room(tmp_path, lights=lights + extra, name="extra.xml")))
+    path = write_room(tmp_path, lights=lights)
+    scene, basis, solution = _solved(path, target)
+    found = suggest_lights(scene, basis, solution)
+    first = found[0]
+    assert np.linalg.norm(np.subtract(first.position, hidden)) < SPACING
+    assert (first.seen_at is None) == (hidden != HIDDEN)
+    assert first.gain_share > 0.7
+    # Of the same colour; how bright depends on how near it is to what it lights.
+    colour, wanted = (np.array(rgb) / sum(rgb) for rgb in (first.emission, INTENSITY))
+    np.testing.assert_allclose(colour, wanted, rtol=0.05)
+    for k, one in enumerate(found):
+        assert one.gain_share >= 0.01
+        assert one.missed_share == pytest.approx(1 - sum(x.gain_share for x in found[: k + 1]))
+
+    # What is promised holds where the light is put into the scene and all is solved anew.
+    pasted = path.read_text(encoding="utf-8").replace("</scene>", f"{first.xml}</scene>")
+    with_it = tmp_path / "pasted.xml"
+    with_it.write_text(pasted, encoding="utf-8")
+    _, _, again = _solved(with_it, target)
+    left = sum(again.quality.objective) / sum(solution.quality.objective)
+    assert left == pytest.approx(first.missed_share, abs=0.05)
+    np.testing.assert_allclose(again.lighting.emission[first.name], first.emission, rtol=0.15)
+    # The same again for the same seed.
+    assert suggest_lights(scene, basis, solution)[0].position == first.position
+
+
+def test_the_ring_is_where_the_light_is_seen(tmp_path: Path):
+    """A small bright ball at the place of the light is brightest at that pixel."""
+    lights = LIGHTS["panel"] + LIGHTS["sky"]
+    target = _target(_present(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
+    first = suggest_lights(*_solved(write_room(tmp_path, lights=lights), target), count=1)[0]
+    x, y, z = first.position
+    ball = f"""<shape type="sphere"><point name="center" x="{x}" y="{y}" z="{z}"/>
+        <float name="radius" value="0.03"/><emitter type="area"><rgb name="radiance"
+        value="1000 1000 1000"/></emitter></shape>"""
+    image = _present(write_room(tmp_path, lights=ball, name="ball.xml"))
+    row, column = np.unravel_index(int(image.sum(axis=-1).argmax()), image.shape[:2])
+    assert first.seen_at is not None
+    # Within the pixel beside it.
+    assert abs(first.seen_at[0] * image.shape[1] - (column + 0.5)) < 1.5
+    assert abs(first.seen_at[1] * image.shape[0] - (row + 0.5)) < 1.5
+
+
+def test_where_the_lights_can_do_it_none_is_named(tmp_path: Path):
+    path = write_room(tmp_path)
+    basis = render_basis(load_scene(path), spp=64)
+    exact = _target(basis.mix(0.5 * basis.present_weights))
+    assert suggest_lights(load_scene(path), basis, solve(basis, exact)) == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_is_not_taken_for_a_lack_of_light(tmp_path: Path, seed: int):
+    """Few samples, of basis and painting: much is missed, and no light would help."""
+    path = write_room(tmp_path)
+    scene = load_scene(path)
+    basis = render_basis(scene, spp=4)
+    painted = render_basis(scene, spp=4, seed=seed)
+    solution = solve(basis, _target(painted.mix(painted.present_weights)))
+    missed = sum(solution.quality.objective) / solution.equations.target_norm2.sum()
+    assert missed > 0.01**2  # else it would not look at all
+    assert suggest_lights(scene, basis, solution) == ()
+
+
+def test_constraints_hold_beside_a_suggestion(tmp_path: Path):
+    lights = LIGHTS["panel"] + LIGHTS["sky"]
+    target = _target(_present(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
+    asked = Constraints.of({"*": {"lock": True}})
+    scene, basis, solution = _solved(write_room(tmp_path, lights=lights), target, asked)
+    [first] = suggest_lights(scene, basis, solution, count=1)
+    assert np.linalg.norm(np.subtract(first.position, HIDDEN)) < SPACING
+    assert first.gain_share > 0.7
+
+
+@pytest.mark.parametrize("sensor", ["orthographic", "thinlens"])
+def test_other_cameras(tmp_path: Path, sensor: str):
+    camera = f"""<sensor type="{sensor}" id="other">
+        {
+        '<float name="aperture_radius" value="0.01"/><float name="focus_distance" value="3"/>'
+        if sensor == "thinlens"
+        else ""
+    }
+        <transform name="to_world"><scale x="1.2" y="1.2"/><lookat origin="0 1 3.5"
+        target="0 0.8 0" up="0 1 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="20"/>
+        </film></sensor>"""
+    if sensor == "thinlens":
+        camera = camera.replace('<scale x="1.2" y="1.2"/>', "")
+    path = write_room(tmp_path, lights=LIGHTS["sky"], sensors=camera)
+    extra = write_room(tmp_path, lights=LIGHTS["sky"] + EXTRA, sensors=camera, name="extra.xml")
+    painted = render_basis(load_scene(extra, sensor="other"), spp=64, seed=1)
+    scene = load_scene(path, sensor="other")
+    basis = render_basis(scene, spp=64)
+    solution = solve(basis, _target(painted.mix(painted.present_weights)))
+    found = suggest_lights(scene, basis, solution, count=1)
+    assert found[0].gain_share > 0.5
+    assert (found[0].seen_at is None) == (sensor == "orthographic")
+
+
+def test_a_camera_that_sees_nothing_but_the_sky(tmp_path: Path):
+    away = """<sensor type="perspective" id="away"><transform name="to_world">
+        <lookat origin="0 3 0" target="0 9 0" up="0 0 1"/></transform>
+        <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="20"/>
+        </film></sensor>"""
+    scene = load_scene(
+        write_room(tmp_path, lights=LIGHTS["sky"] + LIGHTS["bulb"], sensors=away), sensor="away"
+    )
+    basis = render_basis(scene, spp=4)
+    everything = Target(
+        "t", np.random.default_rng(0).random((20, 24, 3)), np.ones((20, 24)), everything=False
+    )
+    assert suggest_lights(scene, basis, solve(basis, everything)) == ()
+
+
+def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
+    lights = LIGHTS["sky"]
+    target = _target(_present(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    basis = render_basis(scene.reduced("1/2"), spp=SPP)
+    solution = solve(basis, target)
+    [first] = suggest_lights(scene, basis, solution, count=1)
+    assert first.with_it.shape == (10, 12, 3)
+    assert first.gain_share > 0.5
+    other = replace(
+        basis,
+        images=basis.images[:, :7],
+        half_differences=basis.half_differences[:, :7],
+        emitters_seen=basis.emitters_seen[:7],
+    )
+    with pytest.raises(SceneError, match="no whole part of the film"):
+        suggest_lights(scene, other, solution, count=1)
+
+
+def test_names_that_are_taken_are_not_given(tmp_path: Path):
+    taken = LIGHTS["sky"].replace('"sky"', '"suggested_1"')
+    taken += LIGHTS["bulb"].replace('"bulb"', '"candidate_1"')
+    target = _target(_present(write_room(tmp_path, lights=taken + EXTRA, name="extra.xml")))
+    [first] = suggest_lights(*_solved(write_room(tmp_path, lights=taken), target), count=1)
+    assert first.name == "suggested_2"
+    assert ElementTree.fromstring(first.xml).attrib == {"type": "point", "id": "suggested_2"}
+
+
+def test_what_one_pass_cannot_do_is_refused(tmp_path: Path):
+    scene = load_scene(write_room(tmp_path, integrator='<integrator type="ptracer"/>'))
+    with pytest.raises(SceneError, match=r"--suggest .* the integrator is 'ptracer'"):
+        check_suggestible(scene)
+    basis = render_basis(load_scene(write_room(tmp_path)), spp=2)
+    solution = solve(basis, _target(np.ones((20, 24, 3))))
+    with pytest.raises(SceneError, match="the integrator is 'ptracer'"):
+        suggest_lights(scene, basis, solution)
+    with pytest.raises(SceneError, match="--suggest 0: ask for one light or more"):
+        suggest_lights(load_scene(write_room(tmp_path)), basis, solution, count=0)
+
+
+def _made(name: str, gain: float, missed: float, at: Any = (0.25, 0.5)) -> Suggestion:
+    image = np.full((4, 6, 3), 0.5, np.float32)
+    xml = emitter_xml(name, (1, 2, 3), (0.5, 0.25, 0))
+    return Suggestion(name, (1, 2, 3), (0.5, 0.25, 0), gain, missed, xml, at, image, image)
+
+
+def test_the_section_says_what_was_found():
+    assert suggestion_section(None, view=View()) == ""
+    assert "No point light would surely" in suggestion_section((), view=View())
+    two = (_made("a", 0.4, 0.6), _made("b & c", 0.2, 0.4, None))
+    page = suggestion_section(two, view=View(), cd_per_unit=100)
+    assert "would take away 40 % of what is missed" in page
+    assert "together, 60 %" in page
+    assert page.count("<img") == 4
+    assert page.count("left:25.00%;top:50.00%") == 1
+    assert "b &amp; c" in page
+    assert "b & c" not in page
+    assert "&lt;emitter type=&quot;point&quot;" in page
+    assert " cd, " in page
+    assert " lm" in page
+    assert "together" not in spoken_suggestions(two[:1])
+    ElementTree.fromstring(_closed(page))
+
+
+def _closed(page: str) -> str:
+    """With the tags closed that HTML leaves open, so that the rest can be checked to be."""
+    return re.sub(r"<img([^>]*)>", r"<img\1/>", page)

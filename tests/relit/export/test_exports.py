@@ -1,0 +1,371 @@
+"""The answer in other programs' hands: each form is read back as that program would read it."""
+
+import ast
+import csv
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+from light_groups import channels, interleaved, multi_part, pictures, write
+
+import lightpaint as lp
+from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
+from lightpaint.colour.primaries import to_rec709
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.relit.export.exports import EXPORTS, blender_script, lights_table, write_exports
+from lightpaint.relit.export.nuke import nuke_layer, nuke_script
+
+#: Names that break careless quoting, in the order of an EXR's channels.
+NASTY = sorted(['Key "Area"', "it's", "a\\n$HOME [exit] {", '"""', "grün, }"])
+
+WEIGHTS = np.array([[2, 0.5, 0], [0.1, 1, 3], [1, 1, 1], [0, 0, 0], [1.25, 1.25, 0.3]])
+
+#: float32 pixels, a few of which are added.
+FLOAT32 = 1e-5
+
+
+def _groups(
+    folder: Path, *, lacks: float = 0.0, names: Any = NASTY, alpha: bool = True, **options: Any
+) -> LightGroups:
+    images = pictures(6)
+    beauty = images[:5].sum(axis=0) + lacks * images[5]
+    layers = {"ViewLayer.Combined": beauty}
+    layers |= {f"ViewLayer.Combined_{n}": x for n, x in zip(names, images, strict=False)}
+    folder.mkdir(exist_ok=True, parents=True)
+    path = interleaved(folder / "groups.exr", layers, **options)
+    if alpha:
+        part = OpenEXR.File(str(path), separate_channels=True).parts[0]
+        held = {name: c.pixels for name, c in part.channels.items()}
+        a = np.linspace(0, 1, beauty[..., 0].size, dtype=np.float32).reshape(beauty.shape[:2])
+        held["ViewLayer.Combined.A"] = a.astype(options.get("kind", np.float32))
+        header = {"chromaticities": x} if (x := part.header.get("chromaticities")) else {}
+        write(path, ("", held), **header)
+    return read_light_groups(path)
+
+
+def _lighting(groups: LightGroups) -> Lighting:
+    weights = np.ones((len(groups.basis.lights), 3))
+    weights[: len(groups.layers)] = WEIGHTS[: len(groups.layers)]
+    return Lighting.of_weights(groups.basis, weights, target='a "painting"')
+
+
+def _sum(groups: LightGroups, lighting: Lighting) -> Any:
+    weights = lighting.weights_for(groups.basis)
+    return np.einsum("nhwc,nc->hwc", groups.basis.images.astype(np.float64), weights)
+
+
+@pytest.mark.parametrize("lacks", [0.0, 0.5])
+def test_relit_is_the_sum(tmp_path: Path, lacks: float):
+    groups = _groups(tmp_path, lacks=lacks)
+    lighting = _lighting(groups)
+    files = write_exports(tmp_path / "out", groups, lighting)
+    assert [file.name for file in files] == list(EXPORTS)
+    assert all(file.is_file() for file in files)
+    [part] = OpenEXR.File(str(tmp_path / "out" / "relit.exr")).parts
+    pixels = part.channels["RGBA"].pixels
+    np.testing.assert_allclose(pixels[..., :3], _sum(groups, lighting), rtol=FLOAT32, atol=FLOAT32)
+    assert groups.beauty is not None
+    np.testing.assert_array_equal(pixels[..., 3], groups.beauty.alpha)
+
+
+def test_relit_is_as_precise_as_the_file_and_never_infinite(tmp_path: Path):
+    groups = _groups(tmp_path, kind=np.float16)
+    lighting = _lighting(groups).with_emission(NASTY[0], (1e9, 1.0, 1.0))
+    write_exports(tmp_path, groups, lighting)
+    pixels = OpenEXR.File(str(tmp_path / "relit.exr")).parts[0].channels["RGBA"].pixels
+    assert pixels.dtype == np.float16
+    assert np.isfinite(pixels).all()
+
+
+def test_the_table_has_every_light(tmp_path: Path):
+    groups = _groups(tmp_path, lacks=1)
+    rows = list(csv.DictReader(io.StringIO(lights_table(groups, _lighting(groups)))))
+    assert [row["light"] for row in rows] == [*NASTY, "rest"]
+    assert rows[0]["layer"] == f"ViewLayer.Combined_{NASTY[0]}"
+    numbers = [[float(row[c]) for c in ("red", "green", "blue")] for row in rows]
+    np.testing.assert_allclose(numbers[:5], WEIGHTS, rtol=1e-8)
+    assert [row["stops"] for row in rows[2:4]] == ["+0.000", "off"]
+    assert [row["kept"] for row in rows] == ["no"] * 5 + ["yes"]
+
+
+def test_the_blender_script_holds_the_multipliers(tmp_path: Path):
+    groups = _groups(tmp_path, lacks=1)
+    script = blender_script(groups, replace(_lighting(groups), target='x"""; raise\\'))
+    tree = ast.parse(script)
+    held = {
+        node.targets[0].id: ast.literal_eval(node.value)  # type: ignore[attr-defined]
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }
+    assert list(held["MULTIPLIERS"]) == NASTY  # what is kept is not in it
+    np.testing.assert_allclose(list(held["MULTIPLIERS"].values()), WEIGHTS, rtol=1e-8)
+    assert held["RENDER"] == groups.basis.origin.scene_identity
+    assert "raise" in (ast.get_docstring(tree) or "")
+
+
+def test_only_what_may_be_of_blender_gets_its_script(tmp_path: Path):
+    layers = {f"RGBA_{name}": x for name, x in zip("ab", pictures(2), strict=True)}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    files = [file.name for file in write_exports(tmp_path, groups, _lighting(groups))]
+    assert files == ["lights.csv", "relit.nk", "relit.exr"]
+
+
+class Nuke:
+    """The few nodes that the script uses, over Tcl's own parser: what a pixel comes to."""
+
+    def __init__(self) -> None:
+        tkinter = pytest.importorskip("tkinter")
+        self.tcl = tkinter.Tcl()
+        self.stack: list[Any] = []
+        self.layers = {"rgba"}
+        self.read: list[str] = []
+        self.kept: dict[str, Any] = {}
+        for name in ("Read", "Shuffle", "Multiply", "Merge2", "Copy", "ColorMatrix", "StickyNote"):
+            self.tcl.createcommand(name, lambda body, name=name: self._node(name, body))
+        self.tcl.createcommand("version", lambda *_: "")
+        self.tcl.createcommand("add_layer", self._add_layer)
+        self.tcl.createcommand("stack", self._keep)
+        self.tcl.createcommand("push", lambda key: self.stack.append(self.kept[key]))
+
+    def run(self, script: str) -> Any:
+        self.tcl.eval(script)
+        [*_, result] = self.stack
+        return result
+
+    def _keep(self, depth: str) -> str:
+        assert depth == "0"
+        self.kept[key := f"node{len(self.kept)}"] = self.stack[-1]
+        return key
+
+    def _add_layer(self, body: str) -> None:
+        layer, *held = self.tcl.splitlist(body)
+        assert held == [f"{layer}.{c}" for c in ("red", "green", "blue", "alpha")]
+        self.layers.add(layer)
+
+    def _node(self, kind: str, body: str) -> None:
+        words = self.tcl.splitlist(body)
+        knobs = dict(zip(words[::2], words[1::2], strict=True))
+        # The top of the stack is input 0, which Merge2 and Copy call B.
+        inputs = [self.stack.pop() for _ in range(int(knobs.get("inputs", 1)))]
+        self.stack.append(getattr(self, f"_{kind.lower()}")(knobs, *inputs))
+
+    def _stickynote(self, _knobs: Any) -> Any:
+        return None
+
+    def _read(self, knobs: Any) -> Any:
+        assert knobs["raw"] == "true"
+        self.read.append(knobs["file"])
+        layers = {}
+        parts = OpenEXR.File(knobs["file"], separate_channels=True).parts
+        for part in parts:
+            for name, channel in part.channels.items():
+                prefix, _, last = name.rpartition(".")
+                layer = prefix or (part.name() if len(parts) > 1 else "")
+                layer = "".join(c if c.isascii() and c.isalnum() else "_" for c in layer) or "rgba"
+                layers.setdefault(layer, {})[last] = channel.pixels.astype(np.float64)
+        return layers
+
+    def _shuffle(self, knobs: Any, read: Any) -> Any:
+        assert knobs["in"] in self.layers
+        held = read[knobs["in"]]
+        return np.stack([held.get(c, 0 * held["R"]) for c in "RGBA"], axis=-1)
+
+    def _multiply(self, knobs: Any, a: Any) -> Any:
+        assert knobs["channels"] == "rgb"
+        return a * [*map(float, self.tcl.splitlist(knobs["value"])[:3]), 1]
+
+    def _merge2(self, knobs: Any, b: Any, a: Any) -> Any:
+        return {"plus": a + b, "minus": a - b}[knobs["operation"]]
+
+    def _copy(self, knobs: Any, b: Any, a: Any) -> Any:
+        assert (knobs["from0"], knobs["to0"]) == ("rgba.alpha", "rgba.alpha")
+        return np.concatenate([b[..., :3], a[..., 3:]], axis=-1)
+
+    def _colormatrix(self, knobs: Any, a: Any) -> Any:
+        rows = [self.tcl.splitlist(row) for row in self.tcl.splitlist(knobs["matrix"])]
+        matrix = np.array(rows, dtype=float)
+        return np.concatenate([a[..., :3] @ matrix.T, a[..., 3:]], axis=-1)
+
+
+@pytest.mark.parametrize("lacks", [0.0, 0.5])
+@pytest.mark.parametrize("alpha", [True, False])
+def test_the_nuke_script_comes_to_the_same(tmp_path: Path, lacks: float, alpha: bool):
+    folder = tmp_path / 'in "$a [b] {c'  # unbalanced, too
+    groups = _groups(folder, lacks=lacks, alpha=alpha)
+    lighting = _lighting(groups)
+    nuke = Nuke()
+    result = nuke.run(nuke_script(groups, lighting))
+    assert nuke.read == [str(groups.path)]
+    np.testing.assert_allclose(result[..., :3], _sum(groups, lighting), rtol=FLOAT32, atol=FLOAT32)
+    if alpha:
+        assert groups.beauty is not None
+        np.testing.assert_array_equal(result[..., 3], groups.beauty.alpha)
+
+
+ACESCG = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+
+
+def test_the_nuke_script_keeps_the_primaries_of_the_file(tmp_path: Path):
+    groups = _groups(tmp_path, lacks=0.5, header={"chromaticities": ACESCG})
+    lighting = _lighting(groups)
+    result = Nuke().run(nuke_script(groups, lighting))
+    expected = _sum(groups, lighting) @ np.linalg.inv(to_rec709(ACESCG)).T
+    np.testing.assert_allclose(result[..., :3], expected, rtol=FLOAT32, atol=FLOAT32)
+
+
+def test_the_nuke_script_reads_a_folder(tmp_path: Path):
+    images = pictures(3)
+    for name, image in zip(["key", "fill"], images, strict=False):
+        write(tmp_path / f"{name}.exr", ("rgb", channels("", image)))
+    write(tmp_path / "beauty.exr", ("rgb", channels("", images.sum(axis=0))))
+    groups = read_light_groups(tmp_path)
+    assert groups.has_rest
+    lighting = _lighting(groups)
+    nuke = Nuke()
+    result = nuke.run(nuke_script(groups, lighting))
+    assert len(nuke.read) == 3
+    np.testing.assert_allclose(result[..., :3], _sum(groups, lighting), rtol=FLOAT32, atol=FLOAT32)
+
+
+@pytest.mark.parametrize(
+    ("layer", "is_part", "called"),
+    [
+        ("ViewLayer.Combined_Key Area", False, "ViewLayer_Combined_Key_Area"),
+        ("2shot.3Combined_é", False, "shot_Combined__"),
+        ("Ci", False, "rgba"),
+        ("", False, "rgba"),
+        ("LightSelect_a", True, "LightSelect_a"),
+    ],
+)
+def test_what_nuke_calls_a_layer(tmp_path: Path, layer: str, is_part: bool, called: str):
+    written = {layer: pictures()[0], "other": pictures()[1]}
+    make = multi_part if is_part else interleaved
+    options = {"is_plain": True} if is_part else {}
+    pattern = "{name}"
+    groups = read_light_groups(make(tmp_path / "a.exr", written, **options), pattern=pattern)
+    layers = [*groups.layers, *([groups.beauty] if groups.beauty else [])]
+    assert called in {nuke_layer(x) for x in layers}
+
+
+def test_a_solve_from_a_file_writes_it_all(tmp_path: Path):
+    """The whole way: groups, a painting, and the multipliers in lighting.json."""
+    groups = _groups(tmp_path, lacks=0.5)
+    wanted = _lighting(groups)
+    painting = _sum(groups, wanted).astype(np.float32)
+    write(tmp_path / "painting.exr", ("rgb", channels("", painting)))
+    look = lp.paint_with_light(
+        None, tmp_path / "painting.exr", tmp_path / "out", basis=groups.basis
+    )
+    write_exports(tmp_path / "out", groups, look.lighting)
+    held = json.loads((tmp_path / "out" / "lighting.json").read_text())["lights"]
+    found = [held[name]["weight"] for name in NASTY]
+    np.testing.assert_allclose(found, WEIGHTS, atol=FLOAT32)
+    assert "standard_error" not in held[NASTY[0]]
+    assert look.uncertainty is None
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "says nothing of its samples and noise" in page
+    assert "How sure" not in page
+
+
+def test_no_renderer_is_imported(tmp_path: Path):
+    groups = _groups(tmp_path)
+    write(tmp_path / "painting.exr", ("rgb", channels("", groups.basis.images[0])))
+    code = (
+        "import sys, lightpaint as lp\n"
+        "from pathlib import Path\n"
+        "from lightpaint.cli.sources import *\n"
+        "from lightpaint.basis.lightgroups.read import read_light_groups\n"
+        "from lightpaint.relit.export.exports import write_exports\n"
+        "here = Path(sys.argv[1])\n"
+        "groups = read_light_groups(here / 'groups.exr')\n"
+        "look = lp.paint_with_light(None, here / 'painting.exr', here / 'o', basis=groups.basis)\n"
+        "write_exports(here / 'o', groups, look.lighting)\n"
+        "print([m for m in ('mitsuba', 'drjit') if m in sys.modules])\n"
+    )
+    run = [sys.executable, "-c", code, str(tmp_path)]
+    done = subprocess.run(run, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+# ------------------------------------------------------------------------------- in Blender
+
+
+@pytest.fixture(scope="module")
+def blender() -> Iterator[list[str]]:
+    """How to run Python in Blender: $LIGHTPAINT_BPY, a Python that has its module, or Blender."""
+    if python := os.environ.get("LIGHTPAINT_BPY"):
+        yield [python]
+    elif found := shutil.which("blender"):
+        yield [found, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
+    else:
+        pytest.skip("no Blender: set LIGHTPAINT_BPY to a Python with the module bpy")
+
+
+def _in_blender(blender: list[str], script: Path, *arguments: object) -> str:
+    dashes = ["--"] if len(blender) > 1 else []
+    run = [*blender, str(script), *dashes, *map(str, arguments)]
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    done = subprocess.run(run, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[str]):
+    """Cycles' own groups, solved on, set by the script and rendered again."""
+    scene = Path(__file__).parent / "blender_scene.py"
+    _in_blender(blender, scene, "render", tmp_path)
+    groups = read_light_groups(tmp_path / "first.exr")
+    assert groups.basis.names == ('Key "Area"', "fill", "glow", "world", "rest")
+    assert groups.exceeding is not None
+    assert groups.exceeding < 1e-6  # float32
+    weights = np.ones((5, 3))
+    weights[:4] = [[1.5, 0.8, 0.4], [0, 0.5, 2], [2, 1, 0.5], [0.2, 1.5, 1]]
+    painting = groups.basis.mix(weights)
+    write(tmp_path / "p.exr", ("rgb", channels("", painting)))
+    look = lp.paint_with_light(None, tmp_path / "p.exr", tmp_path / "o", basis=groups.basis)
+    found = look.lighting.weights_for(groups.basis)
+    np.testing.assert_allclose(found, weights, atol=FLOAT32)
+
+    write_exports(tmp_path, groups, look.lighting)
+    _in_blender(blender, scene, "again", tmp_path)
+    relit = OpenEXR.File(str(tmp_path / "relit.exr")).parts[0].channels["RGBA"].pixels[..., :3]
+    once, thrice, other_seed = (
+        read_light_groups(tmp_path / f"{name}.exr").beauty for name in ("once", "thrice", "seed")
+    )
+    assert once is not None
+    assert thrice is not None
+    assert other_seed is not None
+    # Run again, saved and loaded between, it multiplies nothing again.
+    np.testing.assert_array_equal(once.image, thrice.image)
+    noise = np.sqrt(np.square(once.image - other_seed.image).mean() / 2)
+    off = np.sqrt(np.square(once.image - relit).mean())
+    # Two renders differ by √2 of the noise of one, and fireflies make noise vary from seed to seed.
+    assert off < 1.6 * np.sqrt(2) * noise
+    # A light that went wrong would be far beyond: so far is the scene as it was.
+    assert groups.beauty is not None
+    assert np.sqrt(np.square(once.image - groups.beauty.image).mean()) > 5 * noise
+    assert relit.mean(axis=(0, 1)) == pytest.approx(once.image.mean(axis=(0, 1)), rel=0.01)
+    again = read_light_groups(tmp_path / "once.exr")
+    # Each group by itself, and what is in none, comes out as it was solved.
+    for name in groups.basis.names:
+        mean = groups.basis.image(name).mean(axis=(0, 1)) * look.lighting.emission[name]
+        assert again.basis.image(name).mean(axis=(0, 1)) == pytest.approx(mean, rel=0.02, abs=1e-4)
+
+
+def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, blender: list[str]):
+    groups = _groups(tmp_path, names=["a", "b", "gone", "linked", "world"])
+    write_exports(tmp_path, groups, _lighting(groups))
+    told = _in_blender(blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
+    assert "all as expected" in told
+    assert "no light is in the group gone" in told
+    assert "inside the node group hidden, set it by hand" in told

@@ -1,0 +1,217 @@
+"""Every kind of light that is not one colour: its plane, its weight, and its way back to XML."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
+
+from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.separate import WHITE
+from lightpaint.errors import SceneError
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.solve import solve
+from lightpaint.relit.relight import relight
+from lightpaint.relit.verify import verify
+from lightpaint.scene.emitters import MULTIPLE, Scaling
+from lightpaint.scene.scene import load_scene
+from lightpaint.target.target import Target
+
+PLACE = """<transform name="to_world"><lookat origin="0.5 1.8 1.5" target="0 0.3 0" up="0 1 0"/>
+    </transform>"""
+PANE = """<transform name="to_world"><scale value="0.4"/><rotate y="1" angle="90"/>
+    <translate x="-1" y="1"/></transform>"""
+BITMAP = '<texture type="bitmap" name="{}"><string name="filename" value="{}"/></texture>'
+
+#: name → (XML, how it is scaled)
+KINDS = {
+    "environment": (
+        """<emitter type="envmap" id="it"><string name="filename" value="map.exr"/>
+        <float name="scale" value="0.5"/></emitter>""",
+        Scaling.IMAGE,
+    ),
+    "screen": (
+        f"""<shape type="rectangle" id="it">{PANE}
+        <emitter type="area">{BITMAP.format("radiance", "picture.png")}</emitter></shape>""",
+        Scaling.IMAGE,
+    ),
+    "projector": (
+        f"""<emitter type="projector" id="it">{BITMAP.format("irradiance", "map.exr")}
+        <float name="scale" value="3"/>{PLACE}</emitter>""",
+        Scaling.IMAGE,
+    ),
+    "textured spot": (
+        f"""<emitter type="spot" id="it">{BITMAP.format("texture", "picture.png")}{PLACE}
+        <rgb name="intensity" value="3 4 5"/></emitter>""",
+        Scaling.COLOUR,
+    ),
+    "sun and sky": (
+        """<emitter type="sunsky" id="it"><float name="sun_scale" value="0.01"/>
+        <float name="sky_scale" value="0.02"/>
+        <vector name="sun_direction" x="0.3" y="0.8" z="0.6"/></emitter>""",
+        Scaling.FACTORS,
+    ),
+    "painted mesh": (
+        """<shape type="ply" id="it"><string name="filename" value="painted.ply"/>
+        <emitter type="area"><texture type="mesh_attribute" name="radiance">
+        <string name="name" value="vertex_color"/><float name="scale" value="2"/></texture>
+        </emitter></shape>""",
+        Scaling.FACTORS,
+    ),
+}
+
+
+@pytest.fixture
+def assets(tmp_path: Path) -> Path:
+    """A folder with the images and the mesh that the lights above emit."""
+    from PIL import Image
+
+    rng = np.random.default_rng(0)
+    write_rgb(tmp_path / "map.exr", rng.random((8, 16, 3)).astype(np.float32))
+    Image.fromarray(rng.integers(0, 255, (8, 16, 3), np.uint8)).save(tmp_path / "picture.png")
+    corners = [
+        (-1, 0.5, 0, 1, 0, 0, 0, 0),
+        (-1, 1.5, 0, 0, 1, 0, 1, 0),
+        (-1, 1, 1, 0, 0, 1, 0, 1),
+    ]
+    lines = "\n".join(" ".join(map(str, corner)) for corner in corners)
+    properties = "".join(f"property float {p}\n" for p in "xyzrgbuv")
+    (tmp_path / "painted.ply").write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
+        f"property list uchar int vertex_indices\nend_header\n{lines}\n3 0 1 2\n",
+        encoding="ascii",
+    )
+    return tmp_path
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def test_unit_is_what_the_scene_has(assets: Path, kind: str) -> None:
+    xml, scaling = KINDS[kind]
+    scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
+    light = scene.light("it")
+    kind_found = light.members[0].kind
+    assert kind_found is not None
+    assert kind_found.scaling is scaling
+    if scaling is not Scaling.COLOUR:
+        assert light.emission == (1, 1, 1)
+        assert light.unit == MULTIPLE
+    planes = one_pass(scene, seed=3, spp=16)
+    unit = {x.name: WHITE for x in scene.lights}
+    rendered = mitsuba_render(scene, unit, seed=3, spp=16)
+    assert planes[0].max() > 0
+    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.25])
+def test_grey_multiples_are_the_relit_render_at_the_same_seed(
+    assets: Path, kind: str, factor: float
+) -> None:
+    xml, scaling = KINDS[kind]
+    scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
+    basis = render_basis(scene, spp=2)
+    light = scene.light("it")
+    emission = (factor * light.emission[0],) * 3
+    lighting = Lighting.present(basis).with_emission("it", emission)
+    relit = relight(scene, lighting, assets / "out" / "relit.xml")
+    planes = one_pass(scene, seed=4, spp=16)
+    mixed = np.einsum("nhwc,nc->hwc", planes, lighting.weights_for(basis))
+    rendered = mitsuba_render(relit, seed=4, spp=16)
+    # float32 throughout; images chosen by brightness may fall on the other side of a step.
+    tolerance = 1e-5 if scaling is not Scaling.IMAGE else 1e-4
+    assert np.abs(mixed - rendered).max() <= tolerance * rendered.max()
+
+
+def test_predicted_is_the_relit_render(assets: Path, kind: str) -> None:
+    xml, scaling = KINDS[kind]
+    scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
+    basis = render_basis(scene, spp=256)
+    lighting = Lighting.present(basis)
+    for emission in ((0.5, 1.5, 2.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)):
+        asked = (emission[0],) * 3 if scaling is Scaling.FACTORS else emission
+        changed = lighting.with_emission("it", asked).with_emission("bulb", (0.3, 0.2, 0.1))
+        relit = relight(scene, changed, assets / "out" / "relit.xml")
+        found = verify(combine(basis, changed), relit, spp=256)
+        assert found.agrees, (emission, found.difference)
+
+
+def test_known_multiples_come_back(assets: Path, kind: str) -> None:
+    xml, scaling = KINDS[kind]
+    scene = load_scene(write_room(assets, lights=xml + LIGHTS["bulb"]))
+    basis = render_basis(scene, spp=32)
+    asked = (1.7,) * 3 if scaling is Scaling.FACTORS else (0.5, 0.0, 2.0)
+    lighting = Lighting.present(basis).with_emission("it", asked)
+    target = Target("t", combine(basis, lighting).image, np.ones(basis.size, np.float32), False)
+    solution = solve(basis, target)
+    # The target is float32.
+    for name, emission in solution.lighting.emission.items():
+        np.testing.assert_allclose(emission, lighting.emission[name], rtol=1e-5, atol=1e-5)
+
+
+def test_a_light_with_one_weight_keeps_its_colour(assets: Path) -> None:
+    scene = load_scene(write_room(assets, lights=KINDS["sun and sky"][0] + LIGHTS["bulb"]))
+    basis = render_basis(scene, spp=32)
+    red = np.zeros((*basis.size, 3), np.float32)
+    red[..., 0] = basis.image("it")[..., 0]
+    solution = solve(basis, Target("t", red, np.ones(basis.size, np.float32), everything=False))
+    r, g, b = solution.lighting.emission["it"]
+    assert r == g == b
+    assert 0 < r < 1
+    assert solution.quality.converged
+
+
+CHECKERS = """<shape type="rectangle" id="it"><emitter type="area">
+    <texture type="checkerboard" name="radiance"/></emitter></shape>"""
+CANNOT = {
+    "is a timed_sunsky emitter": ('<emitter type="timed_sunsky" id="it"/>', "path"),
+    "Not implemented for non-spectral": (
+        """<emitter type="point" id="it"><spectrum type="blackbody" name="intensity">
+        <float name="temperature" value="3000"/></spectrum></emitter>""",
+        "path",
+    ),
+    # Fine for a path tracer, which never starts at a light.
+    "by ptracer .*not implemented": (CHECKERS, "ptracer"),
+}
+
+
+@pytest.mark.parametrize("words", CANNOT)
+def test_what_mitsuba_cannot_render_is_named(tmp_path: Path, words: str) -> None:
+    light, integrator = CANNOT[words]
+    integrator = f'<integrator type="{integrator}"/>'
+    path = write_room(tmp_path, lights=light + LIGHTS["bulb"], integrator=integrator)
+    with pytest.raises(SceneError, match=f"light 'it' .*{words}") as caught:
+        load_scene(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_shared_texture_is_left_alone(assets: Path) -> None:
+    lights = f"""{BITMAP.format("radiance", "picture.png").replace("<texture", '<texture id="t"')}
+        <shape type="rectangle" id="it">{PANE}<emitter type="area">
+        <ref name="radiance" id="t"/></emitter></shape>"""
+    lights = lights.replace('name="radiance"><string', "><string")
+    scene = load_scene(write_room(assets, lights=lights + LIGHTS["bulb"]))
+    lighting = Lighting.present(render_basis(scene, spp=2))
+    relight(scene, lighting.with_emission("it", (0, 0, 0)), assets / "out" / "relit.xml")
+    with pytest.raises(SceneError, match="by reference"):
+        relight(scene, lighting.with_emission("it", (1, 2, 3)), assets / "x" / "relit.xml")
+    assert not (assets / "x").exists()
+
+
+def test_images_of_lights_with_nearly_the_same_name_stay_apart(assets: Path) -> None:
+    screens = "".join(
+        KINDS["screen"][0].replace('id="it"', f'id="{name}"') for name in ("key 1", "key/1")
+    )
+    scene = load_scene(write_room(assets, lights=screens))
+    basis = render_basis(scene, spp=64)
+    lighting = Lighting.present(basis).with_emission("key 1", (1, 2, 3))
+    lighting = lighting.with_emission("key/1", (3, 1, 0.5))
+    relit = relight(scene, lighting, assets / "out" / "a.xml")
+    predicted = combine(basis, lighting)
+    other = Lighting.present(basis).with_emission("key 1", (9, 1, 1))
+    relight(scene, other, assets / "out" / "b.xml")
+    assert len(list((assets / "out").glob("*.exr"))) == 3
+    assert verify(predicted, relit, spp=64).agrees

@@ -1,0 +1,222 @@
+"""comparison.png and the pictures in it: what is shown where, and at which exposure."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lightpaint.colour.color import luminance
+from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
+from lightpaint.colour.view import View
+from lightpaint.errors import SizeError
+from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.solve import solve
+from lightpaint.report.comparison import SURROUND, comparison_image, write_comparison
+from lightpaint.report.pictures import (
+    DIVERGING,
+    coverage,
+    diverging,
+    importance_picture,
+    residual_limit,
+    residual_picture,
+    round_up,
+    target_picture,
+    unpainted_look,
+)
+from lightpaint.target.target import Target
+
+SIZE = (24, 32)
+
+
+def _look(make_basis: Any, *, scale: float = 1.0, name: str = "dusk") -> dict[str, Any]:
+    """A painting of random colours over the left half, its answer, and a noisy second render."""
+    rng = np.random.default_rng(7)
+    basis = make_basis(3, SIZE, emission=[[0.3, 0.2, 0.1]] * 3)
+    basis = make_basis(images=scale * basis.images, emission=basis.present_weights)
+    importance = np.zeros(SIZE, np.float32)
+    importance[:, :16] = 1
+    image = (scale * rng.random((*SIZE, 3))).astype(np.float32)
+    target = Target(name, image, importance, everything=False)
+    solution = solve(basis, target)
+    predicted = combine(basis, solution.lighting).image
+    verified = predicted * rng.uniform(0.9, 1.1, predicted.shape).astype(np.float32)
+    return {
+        "basis": basis,
+        "target": target,
+        "solution": solution,
+        "predicted": predicted,
+        "verified": verified,
+    }
+
+
+def _tiles(sheet: Any) -> list[Any]:
+    """The pictures of a sheet at their own size, found by the surround between them."""
+    top = int(np.argmax((sheet != SURROUND).any(axis=(1, 2))))
+    # The first line of pixels tells left from right: no caption reaches it.
+    inside = np.concatenate([[False], (sheet[top] != SURROUND).any(axis=-1), [False]])
+    edges = np.flatnonzero(inside[1:] != inside[:-1])
+    zoom = (edges[1] - edges[0]) // SIZE[1]
+    bottom = top + SIZE[0] * zoom
+    return [
+        sheet[top:bottom:zoom, left:right:zoom]
+        for left, right in zip(edges[::2], edges[1::2], strict=True)
+    ]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])
+def test_four_pictures_at_one_exposure(make_basis: Any, scale: float):
+    look = _look(make_basis, scale=scale)
+    sheet = comparison_image(**look)
+    assert sheet.dtype == np.uint8
+    target, predicted, verified, residual = _tiles(sheet)
+    stops = choose_exposure(look["verified"])
+    assert (stops == 0) == (scale == 1)
+    for tile, image in ((predicted, look["predicted"]), (verified, look["verified"])):
+        np.testing.assert_array_equal(tile, to_8_bit(encode_display(image, stops=stops)))
+    # Painted with full importance, a pixel is what the display makes of it, and nothing else.
+    painted = to_8_bit(encode_display(look["target"].image, stops=stops))
+    np.testing.assert_array_equal(target[:, :16], painted[:, :16])
+    assert residual.shape == (*SIZE, 3)
+
+
+def test_three_pictures_without_a_verification(make_basis: Any):
+    look = _look(make_basis)
+    with_render = _tiles(comparison_image(**look))
+    without = _tiles(comparison_image(**{**look, "verified": None}))
+    assert len(without) == 3
+    for a, b in zip(without, [*with_render[:2], with_render[3]], strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_long_name_stays_below_its_own_picture(make_basis: Any):
+    short = comparison_image(**_look(make_basis))
+    long = comparison_image(**_look(make_basis, name="dusk over the old harbour " * 9))
+    pictures = (short[12] != SURROUND).any(axis=-1)
+    second = int(np.flatnonzero(pictures[1:] & ~pictures[:-1])[1])
+    np.testing.assert_array_equal(short[:, second:], long[:, second:])
+    assert (short[:, :second] != long[:, :second]).any()
+
+
+def test_the_exposure_stands_in_the_caption(make_basis: Any):
+    """Same pictures, other exposure: the captions must differ."""
+    dark = comparison_image(**_look(make_basis, scale=2.0**-8))
+    darker = comparison_image(**_look(make_basis, scale=2.0**-9))
+    for a, b in zip(_tiles(dark)[1:3], _tiles(darker)[1:3], strict=True):
+        np.testing.assert_array_equal(a, b)
+    captions = slice(-48, None)
+    assert (dark[captions] != darker[captions]).any()
+
+
+def test_the_file_holds_the_image(make_basis: Any, tmp_path: Path):
+    look = _look(make_basis)
+    write_comparison(tmp_path / "comparison.png", **look)
+    data = (tmp_path / "comparison.png").read_bytes()
+    with Image.open(io.BytesIO(data)) as file:
+        np.testing.assert_array_equal(np.asarray(file), comparison_image(**look))
+
+
+def test_a_larger_verification_is_shown_whole_beside_enlarged_pixels(make_basis: Any):
+    look = _look(make_basis)
+    same = {**look, "verified": look["predicted"]}
+    larger = {**look, "verified": np.kron(look["predicted"], np.ones((16, 16, 1), np.float32))}
+    # 32 pixels are shown 256 wide either way, and here the verification is 512.
+    assert comparison_image(**same).shape[1] < comparison_image(**larger).shape[1]
+    half = {**look, "verified": np.kron(look["predicted"], np.ones((8, 8, 1), np.float32))}
+    np.testing.assert_array_equal(comparison_image(**same), comparison_image(**half))
+
+
+def test_another_size_is_refused(make_basis: Any):
+    look = _look(make_basis)
+    other = make_basis(3, (12, 17))
+    with pytest.raises(SizeError, match="32x24 but the basis is 17x12"):
+        comparison_image(**{**look, "basis": other})
+
+
+def test_what_is_not_painted_is_grey_and_not_the_paintings(make_basis: Any):
+    look = _look(make_basis)
+    target, solution = look["target"], look["solution"]
+    current = combine(look["basis"], Lighting.present(look["basis"])).image
+    picture = target_picture(target, solution, current, view=View())
+    right = picture[:, 16:]
+    assert np.ptp(right, axis=-1).max() == 0
+    np.testing.assert_array_equal(right, unpainted_look(current, view=View())[:, 16:])
+    # The lines across it: neighbours of an even look differ.
+    even = unpainted_look(np.full((*SIZE, 3), 0.2), view=View())
+    assert len(np.unique(even)) == 2
+
+
+def test_half_importance_is_half_shown(make_basis: Any):
+    look = _look(make_basis)
+    importance = np.full(SIZE, 0.5, np.float32)
+    importance[0] = 1
+    target = Target("half", look["target"].image, importance, everything=False)
+    current = np.zeros((*SIZE, 3))
+    picture = target_picture(target, solve(look["basis"], target), current, view=View())
+    mean = (encode_display(target.image) + unpainted_look(current, view=View())) / 2
+    np.testing.assert_allclose(picture[1:], mean[1:], rtol=1e-6)  # the image is float32
+
+
+def test_emitters_nobody_painted_are_not_shown_as_target(make_basis: Any):
+    seen = np.zeros(SIZE, bool)
+    seen[4:8, 4:8] = True
+    basis = make_basis(3, SIZE, seen=seen)
+    image = np.full((*SIZE, 3), 0.5, np.float32)
+    target = Target("all", image, np.ones(SIZE, np.float32), everything=True)
+    picture = target_picture(target, solve(basis, target), np.zeros(image.shape), view=View())
+    shown = np.isclose(picture, encode_display(image)).all(axis=-1)
+    np.testing.assert_array_equal(shown, ~seen)
+
+
+@pytest.mark.parametrize(
+    ("importance", "expected"),
+    [([0, 0.5, 1], [0, 0.5, 1]), ([0, 0.1, 0.2], [0, 0.5, 1]), ([0, 0.5, 10], [0, 0.5, 1])],
+)
+def test_coverage_is_alpha(importance: list[float], expected: list[float]):
+    np.testing.assert_allclose(coverage(np.array([importance])), [expected], rtol=1e-12)
+
+
+def test_importance_is_brighter_where_it_counts(make_basis: Any):
+    ramp = np.tile(np.linspace(0, 1, SIZE[1]), (SIZE[0], 1))
+    picture = importance_picture(ramp, np.full((*SIZE, 3), 0.3), view=View())
+    # By whole columns: the lines cross all of them alike.
+    assert (np.diff(luminance(picture).mean(axis=0)) > 0).all()
+
+
+def test_the_sign_of_a_residual_shows_without_colour():
+    values = np.linspace(-1, 1, 41)
+    assert (np.diff(luminance(diverging(values))) > 0).all()
+    np.testing.assert_allclose(diverging(np.array([-5.0, 0, 5])), DIVERGING[[0, 2, 4]])
+
+
+def test_residual_is_prediction_minus_target(make_basis: Any):
+    look = _look(make_basis)
+    solution, current = look["solution"], np.zeros((*SIZE, 3))
+    offset = np.zeros((*SIZE, 3))
+    offset[:12], offset[12:] = 0.2, -0.2
+    predicted = solution.image + offset
+    assert residual_limit(solution, predicted, view=View()) == pytest.approx(0.2)
+    picture = residual_picture(solution, predicted, current, view=View(), limit=0.4)
+    above, below = diverging(np.array([0.5, -0.5]))
+    # The prediction is float64 here; sums of the luminance weights round in the last digits.
+    np.testing.assert_allclose(picture[:12, :16], np.broadcast_to(above, (12, 16, 3)), rtol=1e-9)
+    np.testing.assert_allclose(picture[12:, :16], np.broadcast_to(below, (12, 16, 3)), rtol=1e-9)
+    np.testing.assert_array_equal(picture[:, 16:], unpainted_look(current, view=View())[:, 16:])
+
+
+def test_residual_scale_is_never_finer_than_sight(make_basis: Any):
+    solution = _look(make_basis)["solution"]
+    almost = solution.image + 1e-7
+    assert residual_limit(solution, almost, view=View()) == 0.01
+    # Three stops brighter on the display, an eighth of it can be seen: 0.00125, rounded up.
+    assert residual_limit(solution, almost, view=View("srgb", 3)) == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(0.011, 0.02), (0.02, 0.02), (0.2, 0.2), (0.3, 0.5), (0.51, 1), (1, 1), (700, 1000)],
+)
+def test_round_up(value: float, expected: float):
+    assert round_up(value) == pytest.approx(expected, rel=1e-12)

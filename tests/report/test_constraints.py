@@ -1,0 +1,82 @@
+"""What the report shows of the cost of constraints."""
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.colour.view import View
+from lightpaint.lighting.analysis.uncertainty import correct_noise
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.solve import solve
+from lightpaint.lighting.views import solve_views
+from lightpaint.report.constraints import constraints_section
+from lightpaint.target.target import Target
+
+SIZE = (10, 12)
+
+
+def _solved(make_basis: Any, constraints: Constraints | None, n: int = 5) -> Any:
+    basis = make_basis(n, SIZE, half_differences=np.full((n, *SIZE, 3), 1e-4))
+    image = np.random.default_rng(1).random((*SIZE, 3)).astype(np.float32)
+    target = Target("t", image, np.ones(SIZE, np.float32), everything=False)
+    return basis, target, solve(basis, target, constraints=constraints)
+
+
+def _missed(solution: Any) -> float:
+    quality = solution.quality
+    return float(np.sqrt(sum(quality.objective) / solution.equations.target_norm2.sum()))
+
+
+def _section(basis: Any, target: Target, solution: Any) -> str:
+    return constraints_section(basis, solution, view=View())
+
+
+def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:
+    constraints = Constraints.of({"light 1": {"off": True}, "light 2": {"color": "#00f"}})
+    basis, target, solution = _solved(make_basis, constraints)
+    page = _section(basis, target, solution)
+    free = _missed(solve(basis, target))
+    captions = re.findall(r"<strong>(.*?)\.</strong> (\d+) % missed", page)
+    expected = [("Without constraints", free), ("As asked", _missed(solution))]
+    assert captions == [(name, f"{100 * missed:.0f}") for name, missed in expected]
+    assert captions[0][1] != captions[1][1]
+    assert page.count("<img") == 2
+    pictures = re.findall(r'src="(data:[^"]*)"', page)
+    assert pictures[0] != pictures[1]
+    # Of an answer with the noise taken out it is asked of the same equations.
+    assert "Without constraints" in _section(basis, target, correct_noise(basis, solution))
+
+
+def test_without_constraints_there_is_nothing_to_show(make_basis: Any) -> None:
+    basis, target, solution = _solved(make_basis, None)
+    assert _section(basis, target, solution) == ""
+    assert _section(basis, target, replace(solution, constraints=Constraints())) == ""
+    constraints = Constraints.of({"light 1": {"off": True}})
+    one, _ = solve_views([(basis, target), (basis, target)], constraints=constraints)
+    assert _section(basis, target, one) == ""
+
+
+@pytest.mark.parametrize(("sparse", "around"), [(1, [2, 3]), (3, [1, 2, 4, 5]), (5, [3, 4])])
+def test_what_fewer_and_more_lights_would_miss(
+    make_basis: Any, sparse: int, around: list[int]
+) -> None:
+    basis, target, solution = _solved(make_basis, Constraints.of(sparse=sparse))
+    page = _section(basis, target, solution)
+    shown = [int(count) for count in re.findall(r"<strong>With (\d) lights?", page)]
+    assert shown == around
+    assert f"{sparse} light{'' if sparse == 1 else 's'}, as asked" in page
+    assert page.count("<tr>") == 1 + len(solution.quality.curve) + 1
+    for count, missed in solution.quality.curve:
+        assert f"{count} light" in page
+        assert f"{100 * missed:.0f} %" in page
+
+
+def test_large_pictures_are_reduced(make_basis: Any) -> None:
+    basis = make_basis(2, (9, 1001))
+    target = Target("t", basis.images[0], np.ones((9, 1001), np.float32), everything=False)
+    constraints = Constraints.of({"light 1": {"off": True}})
+    page = _section(basis, target, solve(basis, target, constraints=constraints))
+    assert re.findall(r'<img width="(\d+)" height="(\d+)"', page) == [("333", "3")] * 2

@@ -1,0 +1,418 @@
+"""report.html: whole in itself, safe against names, and loud when it must be."""
+
+import base64
+import io
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lightpaint.colour.display import encode_display, to_8_bit
+from lightpaint.errors import SizeError
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.solve import solve
+from lightpaint.relit.verify import compare
+from lightpaint.report.figures import data_uri, thumbnail
+from lightpaint.report.page import report_page
+from lightpaint.report.tables import hex_color
+from lightpaint.report.verdict import (
+    energy_shares,
+    noise_residual,
+    relative_residual,
+    share_met,
+    verdict,
+)
+from lightpaint.target.target import Target
+
+SIZE = (24, 32)
+VOID = {"meta", "link", "img", "input", "br"}
+
+
+class Page(HTMLParser):
+    """A page taken apart: elements with their attributes, and the text inside them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[tuple[tuple[str, ...], str]] = []
+        self._open: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {**dict(attrs), "inside": " ".join(self._open)}))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append((tuple(self._open), data))
+
+    def all(self, tag: str) -> list[dict[str, Any]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+    def text(self, inside: str) -> str:
+        return "".join(text for open_tags, text in self.texts if inside in open_tags)
+
+
+def _result(
+    make_basis: Any,
+    *,
+    names: tuple[str, ...] = ("key", "fill", "back"),
+    target: str = "dusk",
+    bias: float = 1.0,
+) -> dict[str, Any]:
+    """Two lights that overlap on the painted left, one that shines on the right alone."""
+    rng = np.random.default_rng(3)
+    x = np.linspace(0, 1, SIZE[1])[None, :, None]
+    images = np.empty((3, *SIZE, 3))
+    images[0], images[1], images[2] = 1 - 0.8 * x, 0.2 + 0.5 * x, np.where(x > 0.6, 1, 0)
+    sigma = 0.01
+    basis = make_basis(
+        images=images + np.where(images > 0, rng.normal(0, sigma, images.shape), 0),
+        half_differences=np.where(images > 0, rng.normal(0, sigma, images.shape), 0),
+        names=names,
+        emission=[[0.5, 0.5, 0.5], [0.4, 0.4, 0.4], [0.2, 0.3, 0.4]],
+    )
+    importance = np.zeros(SIZE, np.float32)
+    importance[:, :16] = 1
+    # The key light alone, twice as bright as now, and orange: the fill must go off.
+    image = (np.array([1.0, 0.75, 0.5]) * images[0] - 0.05 * images[1]).astype(np.float32)
+    painting = Target(target, image, importance, everything=False, not_finite=5)
+    solution = solve(basis, painting)
+    predicted = combine(basis, solution.lighting)
+    truth = np.einsum("nhwc,nc->hwc", images, solution.lighting.weights_for(basis))
+    noise = rng.normal(0, sigma, (2, *truth.shape))
+    verified = Estimate((bias * truth + noise[0]).astype(np.float32), noise[1].astype(np.float32))
+    return {
+        "basis": basis,
+        "target": painting,
+        "solution": solution,
+        "predicted": predicted,
+        "verification": compare(predicted, verified),
+        "command": "lightpaint solve scene.xml dusk.exr",
+    }
+
+
+def _decoded(uri: str) -> Any:
+    head, data = uri.split(",", 1)
+    assert head in ("data:image/png;base64", "data:image/jpeg;base64")
+    with Image.open(io.BytesIO(base64.b64decode(data, validate=True))) as image:
+        return np.asarray(image)
+
+
+def _looks(page: Page) -> dict[str, Any]:
+    """The pictures under the wipe by name."""
+    figures = [i for i in page.all("img") if "is-" in i.get("class", "") or i.get("class") == ""]
+    return {i["alt"].split(":")[0]: _decoded(i["src"]) for i in figures}
+
+
+def test_nothing_is_loaded_from_anywhere(make_basis: Any):
+    text = report_page(**_result(make_basis))
+    page = Page(text)
+    plain = re.sub(r"base64,[A-Za-z0-9+/=]+", "base64,", text)
+    assert len(plain) < 30_000
+    assert not re.search(r"https?:|//\w|@import|url\(|srcset|\bfetch\b", plain, re.IGNORECASE)
+    for _, attributes in page.elements:
+        for key in ("src", "href", "action", "data", "poster"):
+            assert (attributes.get(key) or "data:").startswith("data:")
+    [policy] = [m["content"] for m in page.all("meta") if "http-equiv" in m]
+    assert policy.startswith("default-src 'none'; img-src data:;")
+    # Every placeholder of the template is filled.
+    assert "$" not in plain
+
+
+def test_pictures_are_the_display_encoded_images(make_basis: Any):
+    result = _result(make_basis)
+    looks = _looks(Page(report_page(**result)))
+    current = combine(result["basis"], Lighting.present(result["basis"])).image
+    assert list(looks) == ["current look", "target", "predicted", "verified"]
+    for name, image in (
+        ("current look", current),
+        ("predicted", result["predicted"].image),
+        ("verified", result["verification"].verified.image),
+    ):
+        np.testing.assert_array_equal(looks[name], to_8_bit(encode_display(image)))
+    painted = to_8_bit(encode_display(result["target"].image))[:, :16]
+    np.testing.assert_array_equal(looks["target"][:, :16], painted)
+
+
+def test_every_picture_has_its_size_and_words(make_basis: Any):
+    images = Page(report_page(**_result(make_basis))).all("img")
+    # Four looks, three maps, three lights.
+    assert len(images) == 10
+    for image in images:
+        height, width, _ = _decoded(image["src"]).shape
+        assert (int(image["height"]), int(image["width"])) == (height, width) == SIZE
+        assert len(image["alt"]) > 10
+
+
+def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):
+    text = report_page(**_result(make_basis))
+    page = Page(text)
+    controls = [*page.all("select"), *page.all("input")]
+    assert len(controls) == 3
+    assert all("label" in control["inside"].split() for control in controls)
+    assert len(page.all("option")) == 8
+    chosen = re.findall(r"selected>([^<]+)<", text)
+    assert chosen == ["target", "predicted"]
+
+
+def test_names_are_text_whatever_they_are(make_basis: Any):
+    evil = ("<script>alert(1)</script>", '"><img src=x onerror=y>', "a & b $title ${x}")
+    result = _result(make_basis, names=evil, target="</title><b>'dusk'</b>")
+    result["command"] = "lightpaint solve '<b>.xml' && echo $HOME ${title} \"&amp;\""
+    page = Page(report_page(**result))
+    assert len(page.all("script")) == 1
+    assert not page.all("b")
+    assert len(page.all("img")) == 10
+    for name in evil:
+        assert name in page.text("tbody")
+    assert page.text("h1") == "</title><b>'dusk'</b>"
+    assert page.text("title").startswith("</title><b>'dusk'</b>")
+    assert page.text("pre") == result["command"]
+
+
+def test_agreement_is_said_calmly(make_basis: Any):
+    result = _result(make_basis)
+    assert result["verification"].agrees
+    text = report_page(**result)
+    assert "agree within noise" in Page(text).text("header")
+    assert 'role="alert"' not in text
+
+
+@pytest.mark.parametrize("bias", [0.9, 1.1])
+def test_a_disagreement_is_loud(make_basis: Any, bias: float):
+    result = _result(make_basis, bias=bias)
+    page = Page(report_page(**result))
+    [warning] = [d for d in page.all("div") if d.get("role") == "alert"]
+    assert warning["class"] == "warning"
+    assert "header" in warning["inside"].split()
+    assert "do not trust the prediction" in page.text("header")
+    assert "DISAGREE" in page.text("header")
+
+
+def test_without_a_verification(make_basis: Any):
+    result = _result(make_basis)
+    page = Page(report_page(**{**result, "verification": None}))
+    assert list(_looks(page)) == ["current look", "target", "predicted"]
+    assert len(page.all("option")) == 6
+    assert "Not verified" in page.text("header")
+    assert "is not verified by a render" in page.text("header")
+    # Neither a warning nor a map of what was not rendered.
+    assert not [d for d in page.all("div") if d.get("role") == "alert"]
+    assert len(page.all("img")) == 8
+
+
+def test_how_to_paint_again(make_basis: Any):
+    result = _result(make_basis)
+    painting = result["target"]
+    cases = (
+        (painting, "give the command again. The basis is kept; only the verification"),
+        (replace(painting, content="abc"), "differs from the template"),
+        (replace(painting, everything=True), "lightpaint template scene.xml renders"),
+    )
+    for target, words in cases:
+        page = Page(report_page(**{**result, "target": target}))
+        assert words in page.text("details")
+        assert page.text("summary") == "Paint again"
+        assert page.all("details")[0].get("open") is None
+
+
+def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
+    result = _result(make_basis)
+    page = Page(report_page(**result))
+    body = "".join(t for open_tags, t in page.texts if "region" not in open_tags)
+    rows = re.split("key|fill|back", page.text("tbody").split("red")[0])[1:]
+    assert len(rows) == 3
+    key, fill, back = rows
+    assert result["solution"].lighting.lights[1].emission == (0, 0, 0)
+    assert "×1.5" in key
+    assert "off" in fill
+    assert "0.0 %" in fill
+    assert result["solution"].quality.unreached == ("back",)
+    assert "unchanged: reaches nothing painted" in back
+    assert "back (kept as they are)" in body
+
+
+def test_the_numbers_are_there(make_basis: Any):
+    result = _result(make_basis)
+    quality, checked = result["solution"].quality, result["verification"]
+    text = Page(report_page(**result)).text("main")
+    for number in (
+        *(f"{value:.3g}" for value in quality.relative_objective),
+        *(f"{value:.1e}" for value in quality.kkt_residual),
+        f"{checked.rmse:.3g}; noise alone gives {checked.noise_rmse:.3g}",
+        f"{checked.z_rms:.3f}; about 1 is noise",
+        f"mean {checked.delta_e_mean:.2f}; 95 % of pixels below {checked.delta_e_95:.2f}",
+        "synthetic, 64 samples per pixel, seed 0",
+        "32 × 24 pixels",
+        "5 pixels, not counted",
+        "in 0 pixels",
+    ):
+        assert number in text
+
+
+def test_a_page_of_usual_size_can_be_mailed(make_basis: Any):
+    basis = make_basis(8, (360, 640))
+    rng = np.random.default_rng(0)
+    image = rng.random((360, 640, 3), dtype=np.float32)
+    target = Target("noise", image, np.ones((360, 640), np.float32), everything=True)
+    solution = solve(basis, target)
+    predicted = combine(basis, solution.lighting)
+    page = report_page(
+        basis=basis,
+        target=target,
+        solution=solution,
+        predicted=predicted,
+        verification=compare(predicted, predicted),
+        command="",
+    )
+    # Independent noise in every pixel is the worst there is to compress.
+    assert len(page) < 4_000_000
+    assert _looks(Page(page))["verified"].shape == (360, 640, 3)
+
+
+def test_another_size_is_refused(make_basis: Any):
+    result = _result(make_basis)
+    with pytest.raises(SizeError, match="32x24 but the basis is 10x12"):
+        report_page(**{**result, "basis": make_basis(3)})
+
+
+def test_a_large_picture_becomes_a_good_jpeg():
+    y, x = np.mgrid[:200, :300] / 300
+    picture = to_8_bit(np.stack([x, y, 0.5 + 0.5 * np.sin(9 * x * y)], axis=-1))
+    lossless, lossy = data_uri(picture), data_uri(picture, largest_png=0)
+    np.testing.assert_array_equal(_decoded(lossless), picture)
+    assert lossy.startswith("data:image/jpeg")
+    # Quality 91 leaves a smooth picture within a few steps of 255.
+    assert np.abs(_decoded(lossy).astype(int) - picture).max() <= 6
+
+
+@pytest.mark.parametrize("level", [1e-4, 0.2, 3e4])
+def test_a_thumbnail_shows_something_however_dim(level: float):
+    image = np.full((20, 400, 3), level, np.float32)
+    image[:10, :40] = 1e6 * level
+    seen = np.zeros((20, 400), bool)
+    seen[:10, :40] = True
+    picture, stops = thumbnail(image, seen)
+    assert picture.shape == (7, 144, 3)
+    assert stops == pytest.approx(-np.log2(level), abs=0.06)  # rounded to tenths
+    assert np.median(picture) > 0.95
+
+
+def test_a_thumbnail_of_a_light_that_reaches_nothing():
+    picture, stops = thumbnail(np.zeros((4, 5, 3), np.float32), np.zeros((4, 5), bool))
+    assert stops == 0
+    assert not picture.any()
+
+
+@pytest.mark.parametrize(
+    ("emission", "expected"),
+    [((2.0, 2, 2), "#ffffff"), ((8, 0, 0), "#ff0000"), ((0, 0, 0), None), ((1, 0.5, 0), "#ffbc00")],
+)
+def test_swatches_are_chromaticity_alone(emission: Any, expected: str | None):
+    # 0.5 encodes to 0.735 by IEC 61966-2-1, 188 of 255.
+    assert hex_color(emission) == expected
+
+
+def test_energy_shares_in_closed_form(make_basis: Any):
+    images = np.empty((2, 4, 5, 3))
+    images[0], images[1] = 1, 0.5
+    basis = make_basis(images=images)
+    # Luminance 1 · 20 pixels and 0.7152 · 3 · 0.5 · 20 pixels.
+    lighting = Lighting.of_weights(basis, np.array([[1.0, 1, 1], [0, 3, 0]]))
+    expected = np.array([1, 0.7152 * 1.5])
+    np.testing.assert_allclose(
+        energy_shares(basis, lighting), expected / expected.sum(), rtol=1e-12
+    )
+
+
+def test_energy_shares_equal_the_plain_sum(make_basis: Any):
+    """In float32 a sum of 40 000 pixels of 1000, one of which is 1 more, would not notice it."""
+    images = np.full((3, 200, 203, 3), 1000, np.float32)
+    images[1, 7, 9] += 1
+    images[2] = np.random.default_rng(4).random((200, 203, 3))
+    basis = make_basis(images=images)
+    lighting = Lighting.of_weights(basis, np.array([[1.0, 1, 1], [1, 1, 1], [9, 0, 500]]))
+    flux = images.astype(np.float64).sum(axis=(1, 2))
+    energy = (flux * lighting.weights_for(basis)) @ [0.2126, 0.7152, 0.0722]
+    shares = energy_shares(basis, lighting)
+    np.testing.assert_allclose(shares, energy / energy.sum(), rtol=1e-12)
+    assert shares[1] > shares[0]
+
+
+def test_energy_shares_sum_to_one(make_basis: Any):
+    basis = make_basis(7)
+    shares = energy_shares(basis, Lighting.present(basis))
+    assert shares.dtype == np.float64
+    assert shares.shape == (7,)
+    assert shares.sum() == pytest.approx(1, rel=1e-12)
+    dark = Lighting.of_weights(basis, np.zeros((7, 3)))
+    np.testing.assert_array_equal(energy_shares(basis, dark), np.zeros(7))
+
+
+def test_how_well_a_painting_is_met_in_closed_form(make_basis: Any):
+    """One even light, half the pixels painted white: it settles at 1/2 and misses √(1/2)."""
+    basis = make_basis(images=np.ones((1, 4, 6, 3)))
+    image = np.zeros((4, 6, 3), np.float32)
+    image[:, :3] = 1
+    target = Target("half", image, np.full((4, 6), 0.3, np.float32), everything=False)
+    solution = solve(basis, target)
+    # The objective is a difference of float64 sums.
+    assert relative_residual(solution) == pytest.approx(np.sqrt(0.5), rel=1e-9)
+    silent = Estimate(image, np.zeros_like(image))
+    assert share_met(solution, silent) == pytest.approx(1 - np.sqrt(0.5), rel=1e-9)
+    assert verdict(solution, silent, None) == (
+        "The lighting meets 29 % of the painting (RMS; whatever noise the layers have included); "
+        "the prediction is not verified by a render."
+    )
+    # Noise of half the painting's RMS: a quarter of its power is no fault of the lighting.
+    noisy = Estimate(image, np.full_like(image, 0.5 * np.sqrt(0.5)))
+    assert noise_residual(solution, noisy) == pytest.approx(0.5, rel=1e-6)
+    assert share_met(solution, noisy) == pytest.approx(1 - 0.5, rel=1e-6)
+
+
+def test_a_painting_of_darkness_is_met_by_darkness(make_basis: Any):
+    basis = make_basis(2, (4, 6))
+    black = Target(
+        "night", np.zeros((4, 6, 3), np.float32), np.ones((4, 6), np.float32), everything=True
+    )
+    solution = solve(basis, black)
+    predicted = combine(basis, solution.lighting)
+    assert verdict(solution, predicted, None).startswith("The lighting meets 100 % ")
+
+
+def test_the_verdict_tells_of_the_verification(make_basis: Any):
+    good, bad = _result(make_basis), _result(make_basis, bias=1.2)
+    z = good["verification"]
+    assert verdict(good["solution"], good["predicted"], z).endswith(
+        "; prediction and verification agree within noise "
+        f"({z.difference:.1f} standard errors apart, limit 5)."
+    )
+    assert "DISAGREE" in verdict(bad["solution"], bad["predicted"], bad["verification"])
+
+
+@pytest.mark.parametrize(
+    ("scale", "shown"), [(None, ["flux(relative)", "6504 K"]), (100.0, ["200 cd/m²", "600 lm"])]
+)
+def test_colour_and_flux_of_a_light(make_basis: Any, scale: float | None, shown: list[str]):
+    result = _result(make_basis)
+    solution = result["solution"]
+    light = replace(
+        solution.lighting.lights[0], emission=(2, 2, 2), weight=(2, 2, 2), unit_flux=(3, 3, 3)
+    )
+    lights = (light, *solution.lighting.lights[1:])
+    lighting = replace(solution.lighting, lights=lights, cd_per_unit=scale)
+    text = report_page(**result | {"solution": replace(solution, lighting=lighting)})
+    plain = text.replace("<br>", "")
+    assert all(words in plain for words in [*shown, "#ffffff"])
+    assert (" lm" in plain) == (scale is not None)

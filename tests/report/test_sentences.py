@@ -1,0 +1,178 @@
+"""What is said in words about noise and about what is missed."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.colour.view import View
+from lightpaint.lighting.analysis.diagnosis import Place, diagnose
+from lightpaint.lighting.analysis.uncertainty import error_bars
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.solve import solve
+from lightpaint.report.diagnosis import missed_section, sure_section
+from lightpaint.report.sentences import (
+    halving_spp,
+    how_sure,
+    spoken_bound,
+    spoken_difference,
+    spoken_hold,
+    spoken_percent,
+    spoken_place,
+    what_is_missed,
+)
+from lightpaint.target.target import Target
+
+SIZE = (12, 12)
+
+
+def _solved(make_basis: Any, **options: Any) -> Any:
+    noise = np.random.default_rng(5).normal(0, 0.05, (3, *SIZE, 3))
+    basis = make_basis(3, SIZE, half_differences=noise, **options)
+    image = np.random.default_rng(1).random((*SIZE, 3)).astype(np.float32)
+    target = Target("t", image, np.ones(SIZE, np.float32), everything=False)
+    solution = solve(basis, target)
+    return basis, solution, error_bars(basis, solution), diagnose(basis, target, solution)
+
+
+@pytest.mark.parametrize(
+    ("painted", "reached", "words"),
+    [
+        ((2, 2, 2), (1, 1, 1), "brighter"),
+        ((1, 1, 1), (2, 2, 2), "darker"),
+        ((0.5, 0.5, 1.5), (0.5, 0.5, 0.5), "bluer"),
+        ((1, 1, 0.2), (1, 1, 1), "yellower"),
+        ((0.2, 0.1, 0.1), (0.01, 0.02, 0.02), "brighter and redder"),
+        ((1, 1, 1), (0, 0, 0), "brighter"),
+        ((0, 0, 0), (1, 1, 1), "darker"),
+        ((1.01, 1, 1), (1, 1, 1), "a little brighter"),
+    ],
+)
+def test_difference_of_colours(painted: Any, reached: Any, words: str):
+    assert spoken_difference(painted, reached) == words
+
+
+@pytest.mark.parametrize(
+    ("region", "where"),
+    [
+        ((0, 0), "is top left"),
+        ((0, 1), "is at the top"),
+        ((1, 1), "is in the middle"),
+        ((1, 2), "is on the right"),
+        ((2, 2), "is bottom right"),
+    ],
+)
+def test_places(region: tuple[int, int], where: str):
+    place = Place(region, 0.38, (0, 0, 1, 1), (1, 1, 4), (1, 1, 1))
+    assert where in spoken_place(place)
+    assert "(38 %): painted brighter and bluer than any mix of the lights" in spoken_place(place)
+
+
+def _bound(kind: Any, *lights: str, gain: float = 1.0, multiplier: Any = (1, 1, 1)) -> Bound:
+    held_by = {"zero": "zero", "kept": "kept", "left out": "left out"}.get(kind, "as asked")
+    per: Any = "emission" if len(multiplier) == 3 else "luminance"
+    return Bound(lights, kind, held_by, gain, multiplier, per)
+
+
+def test_bounds_and_percents():
+    assert spoken_hold(_bound("zero", "a", multiplier=(1, 2, 3))) == "off"
+    assert spoken_hold(_bound("zero", "a", multiplier=(0, 0, 3))) == "off in blue"
+    assert spoken_hold(_bound("zero", "a", multiplier=(4,))) == "off"
+    assert spoken_hold(_bound("limits", "a")) == "as asked"
+    assert [spoken_percent(x) for x in (0, 0.004, 0.07, 0.62)] == ["0 %", "0.4 %", "7 %", "62 %"]
+
+
+def test_scatter_takes_four_times_the_samples_and_bias_twice(make_basis: Any):
+    basis, _, found, _ = _solved(make_basis)
+    scatter = replace(found, bias=np.zeros((3, 3)))
+    bias = replace(found, scatter=np.zeros((3, 3)), bias=np.ones((3, 3)))
+    assert halving_spp(basis, scatter, 0) == 4 * basis.origin.spp
+    assert halving_spp(basis, bias, 0) == 2 * basis.origin.spp
+    assert 128 <= halving_spp(basis, found, 0) <= 256
+
+
+def test_the_light_that_matters_is_named(make_basis: Any):
+    basis, solution, found, _ = _solved(make_basis)
+    text = how_sure(basis, solution, found)
+    assert "More samples would change light" in text
+    assert "halves that" in text
+    quiet = replace(found, scatter=0 * found.scatter, bias=0 * found.bias)
+    assert "change no light" in how_sure(basis, solution, quiet)
+
+
+def test_the_most_useful_comes_first(make_basis: Any):
+    *_, found = _solved(make_basis)
+    first, *rest = what_is_missed(found)
+    assert first.startswith("Of what is missed (in energy), ")
+    assert "no mix of the lights can reach" in first
+    assert len(rest) <= 3
+    met = replace(found, missed=0.009)
+    assert what_is_missed(met) == ["The lights can do what is painted."]
+    half = 0.5 * found.total
+    held = replace(found, bounds=(_bound("zero", "key", gain=half, multiplier=(0, 1, 1)),))
+    assert "Light key is off in green and blue and still too much" in what_is_missed(held)[-1]
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"),
+    [
+        (_bound("kept", "rest"), "Light rest is kept as it is; adjusting it too would take away"),
+        (_bound("lock", "a"), "Light a is locked (as asked); adjusting it would"),
+        (_bound("off", "a"), "Light a is switched off, as asked; switching it on would"),
+        (_bound("left out", "a"), "Light a is left out, as only so many may be on; switching it"),
+        (_bound("left out", "a", "b"), "Lights a, b are left out, as only so many may be on"),
+        (_bound("tie", "a", "b"), "Lights a, b are on one dimmer; adjusting each by itself would"),
+        (_bound("limits", "a"), "Light a is at a limit (as asked); letting go of that would"),
+        (_bound("colour", "a"), "Light a is held to a colour (as asked); any other would"),
+    ],
+)
+def test_what_holds_a_light_is_said(bound: Bound, words: str):
+    sentence = spoken_bound(bound, 0.38)
+    assert words in sentence
+    assert sentence.endswith("would take away 38 % of the miss.")
+
+
+def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):
+    *_, found = _solved(make_basis)
+    shares = {"tie": 0.5, "off": 0.3, "left out": 0.2, "zero": 0.1}
+    bounds = [_bound(kind, kind, gain=share * found.total) for kind, share in shares.items()]
+    *_, first, second = what_is_missed(replace(found, bounds=tuple(bounds)))
+    assert "on one dimmer" in first
+    assert second == spoken_bound(bounds[1], 0.3)
+    assert "30 %" in second
+    # If it is what helps most of all, once is enough.
+    alone = what_is_missed(replace(found, bounds=tuple(bounds[1:])))
+    assert alone[-1] == second
+    assert sum("switched off" in sentence for sentence in alone) == 1
+    # It is spoken of where others that would help as little are not.
+    little = [replace(bound, gain=0.03 * found.total) for bound in bounds]
+    assert "switched off" in what_is_missed(replace(found, bounds=tuple(little)))[-1]
+    assert "dimmer" not in " ".join(what_is_missed(replace(found, bounds=tuple(little))))
+    # What hardly helps is not spoken of.
+    faint = replace(bounds[1], gain=0.009 * found.total)
+    assert "switched off" not in " ".join(what_is_missed(replace(found, bounds=(faint,))))
+
+
+def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
+    basis, solution, _, found = _solved(make_basis)
+    bound = _bound("limits", "a", gain=0.5 * found.total, multiplier=(-2.5,))
+    current = basis.mix(basis.present_weights)
+    page = missed_section(solution, replace(found, bounds=(bound,)), current, view=View())
+    assert "−2.5<small>per unit of luminance" in page
+    assert "not looked into" not in page
+    found = replace(found, bounds=(bound,), bounds_left_out=7)
+    page = missed_section(solution, found, current, view=View())
+    assert "7 more seem to matter less, and were not looked into" in page
+
+
+def test_names_are_escaped(make_basis: Any):
+    names = ["<b>1", "<b>2", "<b>3"]
+    basis, solution, found, diagnosis = _solved(make_basis, names=names)
+    bound = _bound("zero", "<b>2", gain=0.5 * diagnosis.total)
+    diagnosis = replace(diagnosis, bounds=(bound,))
+    current = basis.mix(basis.present_weights)
+    page = sure_section(basis, solution, found)
+    page += missed_section(solution, diagnosis, current, view=View())
+    assert "<b>" not in page
+    assert "&lt;b&gt;2" in page

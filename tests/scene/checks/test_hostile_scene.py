@@ -1,0 +1,214 @@
+"""Scenes that are damaged, or made to crash, hang or fill the memory: each ends in one line.
+
+All are loaded in a process of their own, which may take 2 GB.
+"""
+
+import os
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from damage import damaged
+from damaged_files import Case, outcomes, wrong
+from renderer import LIGHTS, PATH, ROOM, write_room
+
+from lightpaint.errors import SceneError
+from lightpaint.images.exr import write_rgb
+from lightpaint.scene.scene import load_scene
+
+ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", lights=LIGHTS["bulb"])
+DEVICES = ("/dev/zero", "/dev/random", "/dev/stdin", "/proc/self/mem", "/", "pipe", "gone")
+
+
+def _with(more: str) -> str:
+    return ROOM_TEXT.replace("</scene>", more + "</scene>")
+
+
+def _entities() -> str:
+    levels = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 10))
+    return f'<!DOCTYPE scene [<!ENTITY e0 "lol">{levels}]>' + _with('<emitter type="&e9;"/>')
+
+
+def _hostile() -> dict[str, str]:
+    """XML by what is wrong with it; none may be read."""
+    deep = "<bsdf type='twosided'>"
+    chain = "".join(
+        f'<bsdf type="mask" id="m{k}"><ref id="m{k - 1}"/></bsdf>' for k in range(1, 9000)
+    )
+    doubling = "".join(f'<default name="a{k}" value="{f"$a{k - 1}" * 10}"/>' for k in range(1, 10))
+    made = {
+        "entities": _entities(),
+        "outside": '<!DOCTYPE s [<!ENTITY e SYSTEM "file:///dev/zero">]>'
+        + ROOM_TEXT.replace('"bulb"', '"&e;"'),
+        "itself": _with('<include filename="itself.xml"/>'),
+        "to_and": _with('<include filename="fro.xml"/>'),
+        "fro": '<scene version="3.0.0"><include filename="to_and.xml"/></scene>',
+        "wide": _with('<include filename="wide_0.xml"/>'),
+        "deep": _with(deep * 100_000 + "</bsdf>" * 100_000),
+        "open": _with(deep * 100_000),
+        "chain": _with('<bsdf type="diffuse" id="m0"/>' + chain),
+        "circle": _with('<bsdf type="twosided" id="m"><ref id="m"/></bsdf>'),
+        "doubling": _with('<default name="a0" value="xxxxxxxxxx"/>' + doubling),
+        "many": _with('<shape type="sphere"/>' * 200_000),
+        "parameters": _with("".join(f'<default name="p{k}" value=""/>' for k in range(2000))),
+        "plugin": ROOM_TEXT.replace('type="sphere"', 'type="nope"'),
+        "typo": ROOM_TEXT.replace('name="radius"', 'name="radios"'),
+        "long_name": ROOM_TEXT.replace('id="bulb"', f'id="{"x" * 10**6}"'),
+        "empty": "",
+        "no_scene": "<bsdf version='3.0.0' type='diffuse'/>",
+    }
+    for size in ("0", "-5", "1000000000", "1000000000000", "nan", "1e9", "9" * 400):
+        made[f"width_{size[:14]}"] = ROOM_TEXT.replace(
+            '"width" value="24"', f'"width" value="{size}"'
+        )
+    for spp in ("-5", "1000000000", "1000000000000", "many"):
+        made[f"spp_{spp}"] = ROOM_TEXT.replace('"spp" value="16"', f'"spp" value="{spp}"')
+    for number in ("nan", "inf", "-inf", "1e39", "1e999"):
+        made[f"emission_{number}"] = ROOM_TEXT.replace("0.5 0.6 0.7", f"1 {number} 1")
+        made[f"place_{number}"] = ROOM_TEXT.replace('x="-0.5"', f'x="{number}"')
+        made[f"fov_{number}"] = ROOM_TEXT.replace('"fov" value="50"', f'"fov" value="{number}"')
+        made[f"move_{number}"] = ROOM_TEXT.replace('y="1" z="-1"', f'y="{number}"')
+    made["emission_negative"] = ROOM_TEXT.replace("0.5 0.6 0.7", "1 -2 1")
+    for device in DEVICES:
+        name = device.replace("/", "_")
+        file = f'<string name="filename" value="{device}"/>'
+        made[f"include{name}"] = _with(f'<include filename="{device}"/>')
+        made[f"spectrum{name}"] = _with(
+            f'<bsdf type="diffuse"><spectrum name="reflectance" filename="{device}"/></bsdf>'
+        )
+        made[f"bitmap{name}"] = _with(f'<texture type="bitmap">{file}</texture>')
+        made[f"envmap{name}"] = _with(f'<emitter type="envmap">{file}</emitter>')
+        for plugin in ("ply", "obj", "serialized"):
+            made[f"{plugin}{name}"] = _with(f'<shape type="{plugin}">{file}</shape>')
+    made["by_path"] = _with('<path value="/dev"/><include filename="zero"/>')
+    made["by_parameter"] = _with('<default name="d" value="/dev"/><include filename="$d/zero"/>')
+    return made
+
+
+def test_hostile_scenes(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for k in range(8):
+        inner = f'<include filename="wide_{k + 1}.xml"/>' * 10
+        (tmp_path / f"wide_{k}.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
+    (tmp_path / "wide_8.xml").write_text('<scene version="3.0.0"/>')
+    cases = [Case(f"{name}.xml", name, text.encode()) for name, text in _hostile().items()]
+    (tmp_path / "fro.xml").write_text(_hostile()["fro"])
+    cases += [Case(device, "as a scene") for device in DEVICES if device != "/dev/stdin"]
+    results = outcomes("scene", None, cases, tmp_path)
+    assert wrong(results, ("refused",)) == []
+
+
+def test_damage_of_the_text(tmp_path: Path) -> None:
+    whole = write_room(tmp_path)
+    content = whole.read_bytes()
+    cases = [
+        Case("bent.xml", f"{done} at {at}", bent)
+        for done, at, bent in damaged(content, 1, 150, 60)
+        if done != "cut" or at % 2
+    ]
+    bent = content.replace(b'id="bulb"', b'id="\xff\xfe"')
+    cases += [
+        Case("bent.xml", "no UTF-8", bent),
+        Case("bent.xml", "NUL", content.replace(b"bulb", b"bu\0b")),
+        Case("bent.xml", "UTF-16", content.decode().encode("utf-16")),
+        Case("bent.xml", "mark", b"\xef\xbb\xbf" + content),
+    ]
+    results = outcomes("scene", whole, cases, tmp_path)
+    assert wrong(results) == []
+    cut = [case.done for case, said in results if case.done[:3] == "cut" and said != "refused"]
+    assert set(cut) <= {f"cut at {len(content) - 1}"}
+
+
+def _ply(vertices: int, index: int, *, ascii: bool = False) -> bytes:
+    head = (
+        f"ply\nformat {'ascii' if ascii else 'binary_little_endian'} 1.0\n"
+        f"element vertex {vertices}\n"
+        "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    ).encode()
+    if ascii:
+        return head + b"0 0 0\n1 0 0\n0 1 0\n" + f"3 0 1 {index}\n".encode()
+    return head + struct.pack("<9fB3i", 0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, index)
+
+
+def _serialized(vertices: int, faces: int, index: int) -> bytes:
+    mesh = struct.pack("<I2s2Q9f3I", 0x1000, b"x\0", vertices, faces, *range(9), 0, 1, index)
+    return struct.pack("<HH", 0x041C, 4) + zlib.compress(mesh) + struct.pack("<QI", 0, 1)
+
+
+def _assets(folder: Path) -> list[tuple[str, bytes]]:
+    """Endings of files, and what no plugin should be given, beside what it may be given."""
+    write_rgb(folder / "t.exr", np.random.default_rng(0).random((8, 8, 3)).astype(np.float32))
+    exr = (folder / "t.exr").read_bytes()
+    wide = struct.pack(">HBHHB", 11, 8, 65500, 65500, 1) + b"\1\x11\0"
+    return [
+        *(("exr", bent) for _, _, bent in damaged(exr, 1, 60, 60)),
+        *(("ply", _ply(3, index)) for index in (-1, 3, 2_000_000, -2_000_000)),
+        *(("ply", _ply(3, index, ascii=True)) for index in (3, 2_000_000)),
+        *(("ply", bent) for _, _, bent in damaged(_ply(3, 2), 2, 40, 40)),
+        ("ply", _ply(4_000_000_000, 2)),
+        ("serialized", _serialized(3, 1, 2_000_000)),
+        ("serialized", _serialized(3, 2**30, 2)),
+        ("serialized", _serialized(2**40, 1, 2)),
+        ("jpg", b"\xff\xd8\xff\xc0" + wide),
+        (
+            "png",
+            b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">II", 60_000, 60_000) + b"\x08\2" * 9,
+        ),
+    ]
+
+
+def test_hostile_files_of_a_scene(tmp_path: Path) -> None:
+    cases = []
+    for k, (ending, content) in enumerate(_assets(tmp_path)):
+        file = f"asset_{k}.{ending}"
+        (tmp_path / file).write_bytes(content)
+        name = f'<string name="filename" value="{file}"/>'
+        kind = ending if ending in ("ply", "serialized") else "bitmap"
+        text = _with(
+            f'<shape type="{kind}">{name}</shape>'
+            if kind != "bitmap"
+            else f'<emitter type="envmap">{name}</emitter>'
+        )
+        cases.append(Case(f"asset_{k}.xml", f"{ending} {k}", text.encode()))
+    results = outcomes("scene", None, cases, tmp_path)
+    assert wrong(results) == []
+    assert sum(said == "refused" for _, said in results) > 100
+
+
+def test_good_files_are_still_read(tmp_path: Path) -> None:
+    _assets(tmp_path)
+    (tmp_path / "a.ply").write_bytes(_ply(3, 2))
+    (tmp_path / "b.ply").write_bytes(_ply(3, 2, ascii=True))
+    (tmp_path / "c.serialized").write_bytes(_serialized(3, 1, 2))
+    shapes = "".join(
+        f'<shape type="{name[2:]}"><string name="filename" value="{name}"/></shape>'
+        for name in ("a.ply", "b.ply", "c.serialized")
+    )
+    image = '<emitter type="envmap" id="sky"><string name="filename" value="t.exr"/></emitter>'
+    path = tmp_path / "good.xml"
+    path.write_text("<!DOCTYPE scene>" + _with(shapes + image), encoding="utf-8")
+    assert [light.name for light in load_scene(path).lights] == ["bulb", "sky"]
+    path.write_text(_with('<bsdf type="diffuse"><float name="odd" value="1"/></bsdf>'))
+    with pytest.raises(SceneError, match="unreferenced"):
+        load_scene(path)
+
+
+@pytest.mark.parametrize("name", ["entities", "deep", "include_dev_zero", "width_1000000000"])
+def test_the_command_says_it_in_one_line(tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"{name}.xml"
+    path.write_text(_hostile()[name], encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "lightpaint", "lights", str(path)],
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    assert path.name in done.stderr
