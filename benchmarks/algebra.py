@@ -2,9 +2,10 @@
 
     python benchmarks/algebra.py [--repeats N]
 
-Four tables: forming M and b against a plain float64 BLAS product of the same shape; the solve,
-M given, of one channel against scipy's nnls on the Cholesky factor of M, and of three; a stroke of
-a 64-pixel brush, update and solve of three channels; and many looks from one basis.
+Five tables: forming M and b against a plain float64 BLAS product of the same shape; the solve,
+M given, of one channel against scipy's nnls on the Cholesky factor of M, and of three; the solve
+under constraints; a stroke of a 64-pixel brush, update and solve of three channels; and many looks
+from one basis.
 """
 
 import argparse
@@ -16,13 +17,29 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
+from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduced_problem import solve_reduced
+from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
-from lightpaint.lighting.solver import solve_normal_equations
-from lightpaint.lighting.tiles import TiledEquations
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solve import solution_of
+from lightpaint.target.target import Target
 
 HEIGHT, WIDTH, BRUSH = 360, 640, 64
+
+#: What is asked of the lights, as `Constraints.of` takes it.
+ASKED: dict[str, dict[str, Any]] = {
+    "nothing": {},
+    "a lock": {"light": {"light 0": {"lock": True}}},
+    "a limit": {"light": {"light 1": {"limits": {"max": "40%"}}}},
+    "limits on all": {"light": {"*": {"limits": {"max": "40%"}}}},
+    "kelvin on all": {"light": {"*": {"kelvin": [2700, 6500]}}},
+    "two ties": {"tie": [["light 1", "light 2"], ["light 4", "light 5"]]},
+    "prefer": {"prefer_current": 0.01},
+}
 
 
 def main() -> None:
@@ -32,6 +49,7 @@ def main() -> None:
     repeats = parser.parse_args().repeats
     gram(repeats)
     solves(repeats)
+    constrained(repeats)
     strokes(4 * repeats)
     looks()
 
@@ -77,11 +95,12 @@ def solves(repeats: int) -> None:
             nnls(L.T, np.linalg.solve(L, b), maxiter=100 * len(b))
 
         one = partial(minimise, M, b[0], start=np.ones(n))
+        anything = reduce_to(Constraints(), lights(n))
         three = partial(
-            solve_normal_equations, NormalEquations(all_M, b, np.ones(3)), np.ones((n, 3))
+            solve_reduced, NormalEquations(all_M, b, np.ones(3)), anything, np.ones((n, 3))
         )
         again = partial(
-            solve_normal_equations, NormalEquations(all_M, other, np.ones(3)), three().weights
+            solve_reduced, NormalEquations(all_M, other, np.ones(3)), anything, three().weights
         )
         found = one()
         print(
@@ -92,24 +111,41 @@ def solves(repeats: int) -> None:
         )
 
 
+def constrained(repeats: int) -> None:
+    """What it costs to ask something of the lights: three channels, M given, from the present."""
+    print("\nsolve with something asked, M given, ms (least / median of the runs)")
+    print(f"{'lights':>8s}" + "".join(f"{name:>18s}" for name in ASKED))
+    for n in (12, 64):
+        basis, target = scene(n)
+        cells = []
+        for asked in ASKED.values():
+            problem = Problem.of(basis, target, constraints=Constraints.of(**asked))
+            equations, start = problem.pulled(problem.equations), problem.start
+            solve = partial(solve_reduced, equations, problem.reduction, start)
+            cells.append(f"{pair(timed(solve, 4 * repeats)):>18s}")
+        print(f"{n:8d}{''.join(cells)}")
+
+
 def strokes(count: int) -> None:
     """A square of new colour, and of new importance, anywhere; then the solve from the last."""
     print(f"\nstroke of {BRUSH}x{BRUSH} pixels in {WIDTH}x{HEIGHT}, ms (least / median)")
     print(f"{'lights':>8s}{'painted':>12s}{'update':>16s}{'solve':>16s}{'together':>16s}")
+    whole = slice(0, 1), slice(0, 1)
     for n in (12, 64):
-        tiled = TiledEquations(*picture(n))
+        # The first stroke builds the tiles.
+        problem = Problem.of(*scene(n)).painted(whole, [0, 0, 0])
         rng = np.random.default_rng(1)
-        weights = solve_normal_equations(tiled.equations, np.ones((n, 3))).weights
-        for kind in ("target", "importance"):
+        solution = solution_of(problem)
+        for kind in ("image", "importance"):
             updates, solves = [], []
             for _ in range(count):
                 top, left = rng.integers(0, HEIGHT - BRUSH), rng.integers(0, WIDTH - BRUSH)
                 region = slice(top, top + BRUSH), slice(left, left + BRUSH)
-                painted = rng.random(3) if kind == "target" else rng.random()
+                stroke = {kind: rng.random(3) if kind == "image" else rng.random()}
                 start = time.perf_counter()
-                tiled.update(region, **{kind: painted})
+                problem = solution.problem.painted(region, **stroke)
                 between = time.perf_counter()
-                weights = solve_normal_equations(tiled.equations, weights).weights
+                solution = solution_of(problem, start=solution.weights)
                 updates.append(between - start)
                 solves.append(time.perf_counter() - between)
             together = [sum(both) for both in zip(updates, solves, strict=True)]
@@ -123,14 +159,33 @@ def looks() -> None:
     for n in (12, 64):
         images, target, importance = picture(n)
         M, b, norm2 = inner_products(images, target, importance)
-        rng = np.random.default_rng(2)
+        rng, anything = np.random.default_rng(2), reduce_to(Constraints(), lights(n))
         weights, done = np.ones((n, 3)), 0
         start = time.perf_counter()
         while time.perf_counter() - start < 2:
             other = b * rng.uniform(0.5, 1.5, b.shape)
-            weights = solve_normal_equations(NormalEquations(M, other, norm2), weights).weights
+            weights = solve_reduced(NormalEquations(M, other, norm2), anything, weights).weights
             done += 1
         print(f"{n:8d}{done / (time.perf_counter() - start):10.0f}")
+
+
+def lights(n: int) -> tuple[BasisLight, ...]:
+    """Lights of some present emission."""
+    present = 0.2 + np.random.default_rng(n).random((n, 3))
+    return tuple(
+        BasisLight(f"light {k}", "area", "radiance", "W/(m² sr)", tuple(map(float, rgb)))
+        for k, rgb in enumerate(present)
+    )
+
+
+def scene(n: int) -> tuple[Basis, Target]:
+    """A basis of random pictures, without noise, and something painted over all of it."""
+    images, image, importance = picture(n)
+    origin = Origin("random", "0f" * 8, "sensor", 0, "made up", (1, 1), (1, 1))
+    seen = np.zeros((HEIGHT, WIDTH), bool)
+    # Its noise is asked for by nothing here.
+    basis = Basis(lights(n), images, np.broadcast_to(np.float32(0), images.shape), seen, origin)
+    return basis, Target("random", image, importance, everything=False)
 
 
 def picture(n: int) -> tuple[Any, Any, Any]:

@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import Basis, Target, load_scene, read_target, render_basis, solve
-from lightpaint.lighting.normal_equations import NormalEquations, weighted_problem
+from lightpaint.lighting.painting import squares_of
+from lightpaint.lighting.problem import Problem
 from lightpaint.scene.scene import Scene
 
 ROOT = Path(__file__).parent.parent
@@ -75,7 +76,7 @@ class Judge:
     """The objective of a set of weights under a basis that nobody solved with."""
 
     def __init__(self, reference: Basis, target: Target) -> None:
-        self.equations = NormalEquations.of(reference, *weighted_problem(reference, target))
+        self.equations = Problem.of(reference, target).equations
 
     def __call__(self, weights: Doubles) -> float:
         """Over all channels, relative to ‖Ψ‖²."""
@@ -119,13 +120,13 @@ def descend(
     import drjit as dr
     import mitsuba as mi
 
-    image, importance = weighted_problem(basis, target)
+    squares = squares_of(basis, target)
     loaded = scene.load()
     parameters = mi.traverse(loaded)
     keys = {light.name: key_of(parameters, loaded, light.name) for light in scene.lights}
     present = {x.name: mi.Color3f(*(max(v, 1e-3) for v in x.emission)) for x in scene.lights}
     integrator = mi.load_dict({"type": "prb", "max_depth": scene.integrator.max_depth})
-    psi, weight = mi.TensorXf(image), mi.TensorXf(importance[..., None] + 0 * image)
+    psi, weight = mi.TensorXf(squares.image), mi.TensorXf(squares.weight + 0 * squares.image)
     optimizer = mi.ad.Adam(lr=step_size)
     for name in keys:
         optimizer[name] = mi.Color3f(1)

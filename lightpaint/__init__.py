@@ -29,8 +29,8 @@ from lightpaint.images.png import display_picture
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.lighting.lighting import Lighting, combine, read_lighting, write_lighting
-from lightpaint.lighting.solve import Solution, solve
-from lightpaint.lighting.views import solve_views
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solve
 from lightpaint.pipeline import paint_views_with_light, paint_with_light, render_template
 from lightpaint.placement.suggest import Suggestion, suggest_lights
 from lightpaint.relit.export.exports import write_exports
@@ -75,7 +75,6 @@ __all__ = [
     "render_basis",
     "render_template",
     "solve",
-    "solve_views",
     "suggest_lights",
     "use_variant",
     "verdict",

@@ -16,20 +16,15 @@ from lightpaint.errors import LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable, restoring
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.png import write_png
-from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
-from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose, with_diagnosis
-from lightpaint.lighting.analysis.uncertainty import (
-    Uncertainty,
-    correct_noise,
-    error_bars,
-    with_error_bars,
-)
+from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_bounds
+from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.lighting import Lighting, combine, write_lighting
-from lightpaint.lighting.solve import Solution, problem_of, solution_of
-from lightpaint.lighting.views import joint_basis, joint_problem, parted
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
 from lightpaint.placement.suggest import Suggestion, check_suggestible, suggest_lights
 from lightpaint.progress import Progress, labelled, silent
 from lightpaint.relit.export.exports import EXPORTS, write_exports
@@ -187,41 +182,27 @@ def _paint(
     views[:] = _fitted(views, settings)
     reports = {view.folder: _progress_of(view, len(views), progress) for view in views}
     views[:] = [_with_basis(x, settings, len(views), reports[x.folder]) for x in views]
-    whole, bases = joint_basis([_basis(view) for view in views])
+    problem = Problem.of(
+        [_basis(view) for view in views],
+        [view.target for view in views],
+        constraints=constraints,
+        unpainted=settings.unpainted,
+        method=settings.method,
+        view=_fitted_in(views, settings),
+    )
     # In place: the caller's list is the last to hold the bases as they were.
-    views[:] = [replace(view, basis=basis) for view, basis in zip(views, bases, strict=True)]
-
-    problems = [
-        problem_of(
-            _basis(view),
-            view.target,
-            constraints=constraints,
-            unpainted=settings.unpainted,
-            method=settings.method,
-            view=_fitted_in(views, settings),
-        )
-        for view in views
-    ]
-    problem = joint_problem(problems, bases)
-    solution = solution_of(whole, problem, start=whole.present_weights)
-    solution, uncertainty = _improved(whole, solution, views, settings, progress)
-    alike = () if constraints else ambiguities(whole, solution)
-    joint = (whole, solution) if len(views) > 1 else None
-    parts = parted(solution, problems, bases)
-    diagnoses = [
-        diagnose(_basis(view), view.target, its, whole=joint)
-        for view, its in zip(views, parts, strict=True)
-    ]
-    solution = with_diagnosis(solution, diagnoses[0])
-    parts = [with_diagnosis(its, told) for its, told in zip(parts, diagnoses, strict=True)]
+    views[:] = [replace(v, basis=b) for v, b in zip(views, problem.views.bases, strict=True)]
+    solution = _improved(solution_of(problem), views, settings, progress)
+    analyses = analyse(solution)
+    solution = with_bounds(solution, analyses)
     with restoring(folder, written):
         write_lighting(folder / "lighting.json", solution.lighting)
         if (groups := views[0].groups) is not None:
             write_exports(folder, groups, solution.lighting)
         relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
         return [
-            _finished(view, its, uncertainty, told, alike, relit, settings, reports[view.folder])
-            for view, its, told in zip(views, parts, diagnoses, strict=True)
+            _finished(view, its, relit, settings, reports[view.folder])
+            for view, its in zip(views, analyses, strict=True)
         ]
 
 
@@ -291,37 +272,28 @@ def _with_basis(
 
 
 def _improved(
-    whole: Basis,
-    solution: Solution,
-    views: list[PaintedView],
-    settings: Settings,
-    progress: Progress,
-) -> tuple[Solution, Uncertainty | None]:
-    """What can be done against noise is done, and said how much of it is left."""
+    solution: Solution, views: list[PaintedView], settings: Settings, progress: Progress
+) -> Solution:
+    """What can be done against noise is done."""
     if settings.noise_correction:
-        solution = correct_noise(whole, solution)
+        solution = correct_noise(solution)
     scenes = [(view.scene, _basis(view)) for view in views if view.scene is not None]
     solution = refine_by_rendering(
-        scenes, whole, solution, rounds=settings.refine, seed=settings.seed, progress=progress
+        scenes, solution, rounds=settings.refine, seed=settings.seed, progress=progress
     )
-    uncertainty = error_bars(whole, solution)
-    solution = with_error_bars(solution, uncertainty)
     lighting = replace(solution.lighting, cd_per_unit=settings.cd_per_unit)
-    return replace(solution, lighting=lighting), uncertainty
+    return replace(solution, lighting=lighting)
 
 
 def _finished(
     view: PaintedView,
-    solution: Solution,
-    uncertainty: Uncertainty | None,
-    diagnosis: Diagnosis,
-    alike: tuple[Ambiguity, ...],
+    analysis: Analysis,
     relit: Scene | None,
     settings: Settings,
     progress: Progress,
 ) -> Look:
     """One view predicted, verified and shown in its folder."""
-    basis, scene = _basis(view), view.scene
+    basis, scene, solution = _basis(view), view.scene, analysis.solution
     view.folder.mkdir(exist_ok=True)
     predicted = combine(basis, solution.lighting)
     spp = settings.spp or (basis.origin.spp if scene is None else scene.spp)
@@ -343,9 +315,7 @@ def _finished(
         predicted=predicted,
         relit=relit,
         verification=verification,
-        uncertainty=uncertainty,
-        diagnosis=diagnosis,
-        ambiguities=alike,
+        analysis=analysis,
         suggestions=_suggested(view, solution, settings, progress),
     )
     show_look(look, view.folder, command=settings.command)

@@ -8,11 +8,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import write_text
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
-from lightpaint.lighting.analysis.ambiguity import Ambiguity
+from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggest import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
@@ -52,9 +52,8 @@ class Look:
     """One painting and its answer.
 
     relit and verification are None where there was only a saved basis and no scene.
-    uncertainty: how sure the lights are, None where nothing is known of the noise; diagnosis:
-    why the painting is not met; ambiguities: lights that it cannot tell apart, of several views
-    in none of them. suggestions: lights that would help most, None if they were not asked for.
+    analysis: how sure the lights are, and why the painting is not met. suggestions: lights that
+    would help most, None if they were not asked for.
     """
 
     target: Target
@@ -63,10 +62,18 @@ class Look:
     predicted: Estimate
     relit: Scene | None
     verification: Verification | None
-    uncertainty: Uncertainty | None
-    diagnosis: Diagnosis
-    ambiguities: tuple[Ambiguity, ...] = ()
+    analysis: Analysis
     suggestions: tuple[Suggestion, ...] | None = None
+
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """How sure the lights are; None where nothing is known of the noise."""
+        return self.analysis.uncertainty
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Why the painting is not met."""
+        return self.analysis.diagnosis
 
     @property
     def lighting(self) -> Lighting:
@@ -113,6 +120,7 @@ def show_look(look: Look, folder: Path, *, command: str) -> None:
         command=command,
         uncertainty=look.uncertainty,
         diagnosis=look.diagnosis,
+        unconstrained=look.analysis.unconstrained,
         suggestions=look.suggestions,
     )
     write_text(folder / "report.html", page)

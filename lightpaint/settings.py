@@ -7,7 +7,7 @@ from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import Space
+from lightpaint.lighting.problem import Space
 from lightpaint.scene.quality import Quality
 
 

@@ -1,9 +1,13 @@
 """A solve written out as rows of a matrix, for other solvers to answer."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
+from lightpaint.lighting.constraints.reduction import Knob, Reduction
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target.target import Target
 
 
@@ -16,3 +20,16 @@ def stacked(basis: Any, target: Target) -> tuple[Any, Any]:
         A[c, :, :, c] = (basis.images[..., c].reshape(n, -1).astype(np.float64) * root).T
     y = np.stack([target.image[..., c].ravel() * root for c in range(3)])
     return A.reshape(3 * root.size, 3 * n), y.ravel()
+
+
+def solve_free(
+    equations: NormalEquations, start: Any, *, is_scalar: Sequence[bool] = (), **how: Any
+) -> ReducedOptimum:
+    """The optimum of lights of which nothing is asked; some may have one weight for all channels.
+
+    start: (n, 3). how: as `solve_reduced` takes it.
+    """
+    n = len(start)
+    scalar = is_scalar or [False] * n
+    knobs = tuple(Knob.of_any_colour(k, is_scalar=scalar[k]) for k in range(n))
+    return solve_reduced(equations, Reduction(np.zeros((n, 3)), ("",) * n, knobs), start, **how)

@@ -32,9 +32,9 @@ from lightpaint.errors import LightingError, LightpaintError, SceneError, Target
 from lightpaint.files import MAX_TEXT
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import (
+    Certificate,
     Lighting,
     LightSetting,
-    Quality,
     read_lighting,
     write_lighting,
 )
@@ -75,7 +75,7 @@ def _lighting() -> Lighting:
     rest = LightSetting("rest", "sunsky", "", "×", (1, 1, 1), (1, 1, 1), is_fixed=True)
     bound = Bound(("lamp",), "lock", "lock", 0.5, (1.0, 2.0, 3.0), "emission")
     residuals = ((0.0,) * 3, (1.0,) * 3, (0.1,) * 3, (5, 6, 7))
-    quality = Quality(*residuals, True, ("rest",), ((1, 0.5), (2, 0.25)), (bound,))
+    quality = Certificate(*residuals, True, ("rest",), ((1, 0.5), (2, 0.25)), (bound,))
     return Lighting((lamp, rest), "evening", "1234", quality, cd_per_unit=100.0)
 
 

@@ -88,8 +88,8 @@ def test_display_space_on_the_command_line(folder: Path, capsys: pytest.CaptureF
     assert solved["converged"]
     assert "display" not in _solved("lin")["solve"]
     lighting = lp.read_lighting("dis/lighting.json")
-    assert lighting.quality is not None
-    assert lighting.quality.display == "srgb at +1.0 stops"
+    assert lighting.certificate is not None
+    assert lighting.certificate.display == "srgb at +1.0 stops"
 
     # On the display it is closer, and in light it cannot be.
     basis, painted = lp.read_basis("room.basis.exr"), lp.read_target("odd.exr").image
@@ -151,7 +151,7 @@ def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):
         )
         assert look.verification is not None
         assert look.verification.agrees
-        assert look.solution.quality.display == "srgb at +1.0 stops"
+        assert look.solution.certificate.display == "srgb at +1.0 stops"
         found = look.lighting.weights_for(look.basis)
         assert look.uncertainty is not None
         off = np.abs(found - truth) / np.maximum(look.uncertainty.standard_error, 1e-3)

@@ -18,8 +18,8 @@ from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.uncertainty import error_bars
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solve import problem_of, solution_of, solve
-from lightpaint.lighting.views import joint_basis, joint_problem, solve_views
+from lightpaint.lighting.solve import solve
+from lightpaint.lighting.views import joint_basis
 from lightpaint.pipeline import paint_views_with_light
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
@@ -54,7 +54,7 @@ def painting(basis: Basis, weights: np.ndarray, name: str) -> Target:
 def test_a_lighting_that_both_views_show_comes_back(bases: list[Basis]) -> None:
     weights = np.random.default_rng(0).uniform(0.1, 2, (4, 3))
     views = [(basis, painting(basis, weights, "x")) for basis in bases]
-    first, second = solve_views(views)
+    first, second = solve(*zip(*views, strict=True)).views
     assert first.lighting.lights == second.lighting.lights
     # float32 pixels of the paintings.
     np.testing.assert_allclose(first.lighting.weights_for(bases[0]), weights, rtol=1e-4)
@@ -63,7 +63,7 @@ def test_a_lighting_that_both_views_show_comes_back(bases: list[Basis]) -> None:
 def test_views_add(bases: list[Basis]) -> None:
     rng = np.random.default_rng(1)
     views = [(basis, painting(basis, rng.uniform(0, 2, (4, 3)), "x")) for basis in bases]
-    solutions = solve_views(views)
+    solutions = solve(*zip(*views, strict=True)).views
     solution = solutions[0]
     together = sum(
         (NormalEquations.of(b, t.image, t.importance) for b, t in views[1:]),
@@ -71,7 +71,7 @@ def test_views_add(bases: list[Basis]) -> None:
     )
     found = solution.lighting.weights_for(bases[0])
     best = together.objective(found).sum()
-    assert best == pytest.approx(sum(sum(s.quality.objective) for s in solutions))
+    assert best == pytest.approx(sum(sum(s.certificate.objective) for s in solutions))
     # No other lighting does better: not that of either view alone, nor any nearby.
     for basis, target in views:
         alone = solve(basis, target).lighting.weights_for(basis)
@@ -83,7 +83,8 @@ def test_views_add(bases: list[Basis]) -> None:
 
 def test_one_view_is_the_ordinary_solve(bases: list[Basis]) -> None:
     target = painting(bases[0], np.random.default_rng(2).uniform(0, 2, (4, 3)), "x")
-    assert solve_views([(bases[0], target)])[0].lighting == solve(bases[0], target).lighting
+    [one] = solve([bases[0]], [target]).views
+    assert one.lighting == solve(bases[0], target).lighting
 
 
 def test_other_lights_are_refused(bases: list[Basis], tmp_path: Path) -> None:
@@ -94,7 +95,7 @@ def test_other_lights_are_refused(bases: list[Basis], tmp_path: Path) -> None:
         (other, painting(other, weights[:1], "y")),
     ]
     with pytest.raises(BasisError, match="have other lights"):
-        solve_views(views)
+        solve(*zip(*views, strict=True))
 
 
 def test_from_the_command_line(
@@ -138,15 +139,11 @@ def test_error_bars_are_those_of_all_views_together(bases: list[Basis]) -> None:
     targets = [painting(basis, weights, "x") for basis in bases]
 
     def errors(*views: int) -> np.ndarray:
-        whole, parts = joint_basis([bases[k] for k in views])
-        problems = [problem_of(p, targets[k]) for p, k in zip(parts, views, strict=True)]
-        solution = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
-        return error_bars(whole, solution).standard_error
+        solution = solve([bases[k] for k in views], [targets[k] for k in views])
+        return error_bars(solution).standard_error
 
     alone = errors(0)
-    np.testing.assert_allclose(
-        alone, error_bars(bases[0], solve(bases[0], targets[0])).standard_error
-    )
+    np.testing.assert_allclose(alone, error_bars(solve(bases[0], targets[0])).standard_error)
     # The same pixels once more leave the bias as it is, and take the scatter for independent.
     ratio = errors(0, 0) / alone
     assert (ratio < 1 + 1e-9).all()
@@ -159,10 +156,8 @@ def test_error_bars_of_two_views_hold(room: Path) -> None:
     targets = [painting(render_basis(s, spp=2048, seed=99), weights, "x") for s in scenes]
     inside = []
     for seed in range(12):
-        whole, parts = joint_basis([render_basis(s, spp=16, seed=seed) for s in scenes])
-        problems = [problem_of(p, t) for p, t in zip(parts, targets, strict=True)]
-        solution = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
-        low, high = error_bars(whole, solution).interval
+        solution = solve([render_basis(s, spp=16, seed=seed) for s in scenes], targets)
+        low, high = error_bars(solution).interval
         inside.append((low <= weights) & (weights <= high))
     # 95 % are to be; 144 values, those of one seed and light together, so that some 36 count.
     assert 0.85 <= np.mean(inside) <= 0.995
@@ -171,8 +166,9 @@ def test_error_bars_of_two_views_hold(room: Path) -> None:
 def test_what_is_given_up_for_other_views(bases: list[Basis]) -> None:
     rng = np.random.default_rng(5)
     views = [(basis, painting(basis, rng.uniform(0, 2, (4, 3)), "x")) for basis in bases]
-    for (basis, target), solution in zip(views, solve_views(views), strict=True):
-        told, alone = diagnose(basis, target, solution), solve(basis, target)
+    solutions = solve(*zip(*views, strict=True)).views
+    for (basis, target), solution in zip(views, solutions, strict=True):
+        told, alone = diagnose(solution), solve(basis, target)
         # What no mix reaches is orthogonal to what some mix of any sign would: each from its map.
         D = target.importance[..., None].astype(np.float64)
         reached, out_of_reach = (
@@ -181,7 +177,7 @@ def test_what_is_given_up_for_other_views(bases: list[Basis]) -> None:
         )
         assert told.forbidden + told.compromise == pytest.approx(reached, rel=1e-4)
         assert told.unreachable + told.noise == pytest.approx(out_of_reach, rel=1e-4)
-        gap = sum(solution.quality.objective) - sum(alone.quality.objective)
+        gap = sum(solution.certificate.objective) - sum(alone.certificate.objective)
         assert told.compromise == pytest.approx(gap, rel=1e-3)
         assert told.compromise > 0.1 * told.total
         # Each is met by itself, so that nothing else can be in the way.

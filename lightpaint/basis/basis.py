@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -169,6 +170,17 @@ class Basis:
     def is_fixed(self) -> npt.NDArray[np.bool_]:
         """(n,), which lights stay as they are, with weight 1."""
         return np.array([light.is_fixed for light in self.lights], dtype=bool)
+
+    @cached_property
+    def power(self) -> npt.NDArray[np.float64]:
+        """‖Φᵢ‖² over the picture, (n, 3) float64; where an emitter is seen, nothing counts."""
+        counted = np.flatnonzero(~self.emitters_seen.ravel())
+        rows = self.images.reshape(len(self.lights), -1, 3)
+        power = np.zeros((len(self.lights), 3))
+        for start in range(0, counted.size, 2**13):
+            block = rows[:, counted[start : start + 2**13]].astype(np.float64)
+            power += np.einsum("npc,npc->nc", block, block)
+        return power
 
     def mix(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
         """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""

@@ -113,7 +113,7 @@ def show_look(look: Look, folder: Path) -> None:
     errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else terminal.numbers(light.emission)
-        if light.name in look.solution.quality.unreached and any(light.emission):
+        if light.name in look.solution.certificate.unreached and any(light.emission):
             solved += " (kept)"
         seen = look.lighting.photometry(light)
         table.add_row(
@@ -135,7 +135,7 @@ def show_look(look: Look, folder: Path) -> None:
     if look.uncertainty is not None:
         terminal.write(how_sure(look.basis, look.solution, look.uncertainty))
     terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    quality = look.solution.quality
+    quality = look.solution.certificate
     if quality.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
@@ -144,7 +144,7 @@ def show_look(look: Look, folder: Path) -> None:
             f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "
             "paint where it shines, or pass --unpainted"
         )
-    for ambiguity in look.ambiguities:
+    for ambiguity in look.analysis.ambiguities:
         terminal.say(ambiguity.sentence)
     if not quality.converged:
         terminal.say(

@@ -16,7 +16,6 @@ from lightpaint.errors import LightingError
 from lightpaint.files import one_line, read_text, strict_json, write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
@@ -72,7 +71,7 @@ class LightSetting:
 
 
 @dataclass(frozen=True)
-class Quality:
+class Certificate:
     """How good a solve is, per colour channel (R, G, B).
 
     kkt_residual: optimality measure of the solver (see solver.kkt_residual).
@@ -100,25 +99,29 @@ class Quality:
     display: str = ""
     rounds: int = 1
 
-    def of(self, equations: NormalEquations, weights: Doubles) -> "Quality":
-        """With the objective that `weights` (n, 3) have in `equations`."""
-        objective = equations.objective(weights)
-        norm = np.where(equations.target_norm2 > 0, equations.target_norm2, 1)
-        return replace(self, objective=_rgb(objective), relative_objective=_rgb(objective / norm))
+    def of(self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None) -> "Certificate":
+        """With what is missed, (3,), beside what a black picture would miss, (3,)."""
+        norm = np.where(norm2 > 0, norm2, 1)
+        return replace(
+            self,
+            objective=_rgb(objective),
+            relative_objective=_rgb(objective / norm),
+            objective_error=error,
+        )
 
 
 @dataclass(frozen=True)
 class Lighting:
     """Emissions for named lights.
 
-    quality: of the solve they come from, if they do.
+    certificate: of the solve they come from, if they do.
     cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
     """
 
     lights: tuple[LightSetting, ...]
     target: str = ""
     scene_identity: str = ""
-    quality: Quality | None = None
+    certificate: Certificate | None = None
     cd_per_unit: float | None = None
 
     def __post_init__(self) -> None:
@@ -176,7 +179,15 @@ class Lighting:
             else light
             for light in self.lights
         )
-        return replace(self, lights=lights, quality=None)
+        return replace(self, lights=lights, certificate=None)
+
+    def named(self, target: str) -> "Lighting":
+        """The same, as the answer to that target."""
+        return replace(self, target=target)
+
+    def with_certificate(self, certificate: Certificate | None) -> "Lighting":
+        """The same, with what shows how good it is."""
+        return replace(self, certificate=certificate)
 
     @classmethod
     def of_weights(
@@ -254,7 +265,7 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             for light in lighting.lights
         },
     }
-    if (q := lighting.quality) is not None:
+    if (q := lighting.certificate) is not None:
         data["solve"] = {
             "kkt_residual": list(q.kkt_residual),
             "objective": list(q.objective),
@@ -287,7 +298,7 @@ def read_lighting(path: str | Path) -> Lighting:
             lights=tuple(_read_setting(name, d) for name, d in data["lights"].items()),
             target=_read_text(data, "target"),
             scene_identity=_read_text(data, "scene_identity"),
-            quality=_read_quality(data["solve"]) if "solve" in data else None,
+            certificate=_read_certificate(data["solve"]) if "solve" in data else None,
             cd_per_unit=_read_scale(data["cd_per_unit"]) if "cd_per_unit" in data else None,
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -353,14 +364,14 @@ def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
     )
 
 
-def _read_quality(data: dict[str, Any]) -> Quality:
+def _read_certificate(data: dict[str, Any]) -> Certificate:
     r, g, b = (_read_count(v) for v in data["sweeps"])
     curve = []
     for count, missed in data.get("curve", []):
         if type(missed) not in (int, float):
             raise TypeError(f"curve has {missed!r} where a number is due")
         curve.append((_read_count(count), float(missed)))
-    return Quality(
+    return Certificate(
         _read_rgb(data["kkt_residual"]),
         _read_rgb(data["objective"]),
         _read_rgb(data["relative_objective"]),

@@ -1,55 +1,144 @@
-"""What a pixel costs where that is not one square per channel, and squares that stand for it.
+"""What a picture costs: squares of what it misses, or a loss that squares stand for near an answer.
 
-With the importance D, the part q of it that is for the current look C, and the view V:
-
-    F(x) = Σ D [(1 − q) ‖V(ψ) − V(x)‖² + q ‖V(C) − V(x)‖²]
-
-ψ is the painting Ψ; but where Ψ says only "at least this bright", it is x if that is brighter.
-V is the identity in linear light, and F then is convex.
+`Squares` are the linear problem: Σ D (Ψ − x)² in linear light, M and b are made of them. They are
+the loss where nothing else is asked. A `PaintingLoss` knows "at least this bright" and what a
+display shows; `reweighted.py` finds the squares that stand for it where it is least.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.view import View
 
 #: Pixels that go through the view at once.
 STRIP = 2**16
 
+#: From arrays of all views to the part of one of them.
+Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
+
+
+class Loss(Protocol):
+    """F, of pictures x, (h, w, 3) linear.
+
+    importance: (h, w) >= 0, where it counts. view: through which it sees x; None for linear light.
+    """
+
+    @property
+    def importance(self) -> Floats: ...
+
+    @property
+    def view(self) -> View | None: ...
+
+    @property
+    def norm2(self) -> Doubles:
+        """The objective of a black picture, (3,): ‖Ψ‖² where nothing else is asked."""
+
+    def objective(self, x: Floats) -> Doubles:
+        """F less the least that any picture could have, per channel, (3,)."""
+
+    def squares(self, x: Floats, *, from_clipping: bool = False) -> "Squares":
+        """Squares with F's own gradient at x (see `PaintingLoss.squares`)."""
+
+    def meant(self, x: Floats) -> Floats:
+        """What was to be there, (h, w, 3) linear, of a picture x: x itself where that will do."""
+
+    def missed(self, x: Floats) -> Doubles:
+        """What a picture misses of the painting, (h, w, 3), as the view shows it."""
+
+    def same_squares(self, a: Floats, b: Floats) -> bool:
+        """Whether the squares made for two pictures are the same, and so exact between them."""
+
+    def cut(self, part: Cut) -> "Loss":
+        """That of a part of the pixels, all arrays by `part`."""
+
 
 @dataclass(frozen=True)
 class Squares:
-    """Σ D f (y − x)², with F's own gradient at the x that it was made for.
+    """Σ weight (image − x)²: a loss, and what stands for one where it was made.
 
-    image: (h, w, 3), y. factor: (h, w, 3), f >= 0, of the importance. share: (h, w, 3), by how
-    much y follows the current look.
+    image: (h, w, 3). weight: (h, w, 1), or (h, w, 3) where channels differ, >= 0. share: of the
+    same shape, by how much the image follows the current look.
     """
 
-    image: Doubles
-    factor: Doubles
-    share: Doubles
+    image: Floats
+    weight: Floats
+    share: Floats
+
+    #: Light itself is compared.
+    view = None
+
+    @cached_property
+    def importance(self) -> Floats:
+        """(h, w), the most that any channel counts."""
+        return np.asarray(self.weight.max(axis=-1))
+
+    @cached_property
+    def norm2(self) -> Doubles:
+        """‖Ψ‖², (3,)."""
+        return self.objective(np.zeros_like(self.image))
+
+    def objective(self, x: Floats) -> Doubles:
+        """(3,), of a picture x (h, w, 3)."""
+        missed = np.subtract(self.image, x, dtype=np.float64)
+        return np.asarray((self.weight * np.square(missed)).sum(axis=(0, 1)))
+
+    def squares(self, x: Floats, *, from_clipping: bool = False) -> "Squares":
+        """These, at every x."""
+        return self
+
+    def meant(self, x: Floats) -> Floats:
+        """The image, whatever x is."""
+        return self.image
+
+    def missed(self, x: Floats) -> Doubles:
+        """What x misses of the image, (h, w, 3)."""
+        return np.asarray(np.subtract(self.image, x, dtype=np.float64))
+
+    def same_squares(self, a: Floats, b: Floats) -> bool:
+        """They are the same everywhere."""
+        return True
+
+    def cut(self, part: Cut) -> "Squares":
+        """Those of some of the pixels."""
+        return Squares(part(self.image), part(self.weight), part(self.share))
 
 
 @dataclass(frozen=True)
-class Loss:
-    """F, of pictures x of one size.
+class PaintingLoss:
+    """With the importance D, the part q of it that is for the current look C, and the view V:
+
+        F(x) = Σ D [(1 − q) ‖V(ψ) − V(x)‖² + q ‖V(C) − V(x)‖²]
+
+    ψ is the painting Ψ; but where Ψ says only "at least this bright", it is x if that is brighter.
+    V is the identity in linear light, and F then is convex.
 
     painted: (h, w, 3), Ψ, linear. importance: (h, w), D. share: (h, w), q. current: (h, w, 3), C,
-    linear. at_least: (h, w, 3), where brighter is as good; None for nowhere. view: V, None for
-    linear light.
+    linear. at_least: (h, w, 3), where brighter is as good. view: V, None for linear light.
     """
 
     painted: Floats
     importance: Floats
     share: Floats
     current: Floats
-    at_least: npt.NDArray[np.bool_] | None = None
+    at_least: Bools
     view: View | None = None
+
+    def cut(self, part: Cut) -> "PaintingLoss":
+        """That of some of the pixels."""
+        return replace(
+            self,
+            painted=part(self.painted),
+            importance=part(self.importance),
+            share=part(self.share),
+            current=part(self.current),
+            at_least=part(self.at_least),
+        )
 
     def shown(self, image: Floats) -> Doubles:
         """V of linear pixels, (…, 3)."""
@@ -73,7 +162,7 @@ class Loss:
             terms += q * (np.square(self._shown_current - shown)) - self._inevitable
         return np.asarray((D * terms).sum(axis=(0, 1)))
 
-    @property
+    @cached_property
     def norm2(self) -> Doubles:
         """The objective of a black picture, (3,): ‖Ψ‖² where nothing else is asked."""
         return self.objective(np.zeros_like(self.painted))
@@ -95,7 +184,7 @@ class Loss:
         return not differ[self.importance > 0].any()
 
     def squares(self, x: Floats, *, from_clipping: bool = False) -> Squares:
-        """The squares at x, (h, w, 3).
+        """Squares with F's own gradient at x, (h, w, 3).
 
         from_clipping: where the display clips x but not what is wanted there, F is flat. With it
         x is drawn back from there, as strongly as the chord between the two is steep.
@@ -110,14 +199,14 @@ class Loss:
             )
             for whole, part in zip((image, factor, share), made, strict=True):
                 whole.reshape(-1, 3)[where] = part
-        return Squares(image, factor, share)
+        return Squares(image, self.importance[..., None] * factor, share)
 
     def _of_strip(
         self,
         x: Floats,
         wanted: Floats,
         current: Floats,
-        exceeds: npt.NDArray[np.bool_],
+        exceeds: Bools,
         q: Floats,
         *,
         from_clipping: bool,
@@ -150,10 +239,12 @@ class Loss:
         image = x + np.where(some, gradient / safe, 0)
         return image, factor, np.where(some, from_current / safe, 0)
 
-    def _exceeds(self, x: Floats) -> npt.NDArray[np.bool_]:
-        if self.at_least is None:
-            return np.zeros(x.shape, bool)
-        return self.at_least & (x > self.painted)
+    def _exceeds(self, x: Floats) -> Bools:
+        return self.at_least & (x > self.painted) if self._may_exceed else self.at_least
+
+    @cached_property
+    def _may_exceed(self) -> bool:
+        return bool(self.at_least.any())
 
     def _moved(self, x: Floats) -> Doubles:
         """ψ at x, (h, w, 3)."""
@@ -172,8 +263,7 @@ class Loss:
         """What the painting and the current look cost each other, (h, w, 3), without D."""
         q = self.share[..., None]
         apart = np.square(self._shown_painting - self._shown_current)
-        if self.at_least is not None:
-            apart = np.where(self.at_least & (self.current >= self.painted), 0, apart)
+        apart = np.where(self.at_least & (self.current >= self.painted), 0, apart)
         return np.asarray(q * (1 - q) * apart)
 
 

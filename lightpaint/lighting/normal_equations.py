@@ -12,10 +12,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import SizeError, TargetError
+from lightpaint.errors import SizeError
 from lightpaint.lighting.algebra.quadratic import UNREACHED
 from lightpaint.lighting.algebra.threads import one_thread
-from lightpaint.target.target import Target
 
 #: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
 BLOCK = 2**13
@@ -86,8 +85,8 @@ def inner_products(
 ) -> tuple[Doubles, Doubles, Doubles]:
     """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) under the pixel weights `importance`.
 
-    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), or (h, w, 3) where it differs
-    between the channels, >= 0.
+    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w) or (h, w, 1), or (h, w, 3) where it
+    differs between the channels, >= 0.
     """
     n = images.shape[0]
     rows = images.reshape(n, -1, 3)
@@ -115,37 +114,3 @@ def inner_products(
                 np.multiply(painted[:, c], its, out=block[n])
                 gram[c] += block @ block.T
     return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
-
-
-def weighted_problem(
-    basis: Basis, target: Target, *, unpainted: float = 0.0
-) -> tuple[Floats, Floats]:
-    """The image and importance to solve for, of the size of the basis.
-
-    Pixels in which an emitter is seen directly count nothing unless somebody painted them:
-    at unit emission they would outshine everything the light falls on.
-
-    unpainted: weight of what is not painted against the current look. A pixel of
-    importance a then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖², which is one
-    residual of weight D = a + unpainted (1 − a) against the weighted mean of both images.
-    """
-    if unpainted < 0 or not np.isfinite(unpainted):
-        raise TargetError(f"--unpainted is a weight >= 0, not {unpainted:g}")
-    importance = target.importance.astype(np.float64)
-    image = target.image.astype(np.float64)
-    if target.everything:
-        importance = np.where(basis.emitters_seen, 0, importance)
-        if not importance.any():
-            raise TargetError(
-                f"target {target.name}: the camera sees an emitter in every pixel, so none "
-                "counts; give a mask of those that should"
-            )
-    if unpainted > 0:
-        current = basis.mix(basis.present_weights)
-        rest = unpainted * np.maximum(1 - importance, 0)
-        rest = np.where(basis.emitters_seen, 0, rest)
-        total = importance + rest
-        mixed = importance[..., None] * image + rest[..., None] * current
-        image = mixed / np.where(total > 0, total, 1)[..., None]
-        importance = total
-    return image, importance

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations
@@ -37,12 +37,11 @@ FLAT = 1e-5
 class Reweighting:
     """How the linear problem came about that a solution solves.
 
-    factor: (h, w, 3) >= 0, of the importance. at: (n, 3), the weights that the squares were made
-    for. rounds: linear problems solved to get there. step: the change of a light's picture in
-    the last, beside the brightest light's. converged: whether that was small.
+    at: (n, 3), the weights that its squares were made for. rounds: linear problems solved to get
+    there. step: the change of a light's picture in the last, beside the brightest light's.
+    converged: whether that was small.
     """
 
-    factor: Floats
     at: Doubles
     rounds: int
     step: float
@@ -83,12 +82,12 @@ def descend(
     count = 0
     while True:
         squares = loss.squares(x, from_clipping=from_clipping)
-        equations = equations_of(basis, loss, squares)
+        equations = NormalEquations.of(basis, squares.image, squares.weight)
         best = solve(equations, w)
         count += 1
         ahead = predicted(basis, best)
         step = _change(equations, w, best)
-        fall = _fall(loss, pull, squares, x, ahead, w, best)
+        fall = _fall(squares, pull, x, ahead, w, best)
         # A problem that is exact all the way has its optimum where the true one has it.
         is_exact = loss.same_squares(x, ahead)
         done = is_exact if loss.view is None else step <= STEP or fall <= FALL * value
@@ -101,19 +100,9 @@ def descend(
         if done or part == 0 or count >= ROUNDS:
             is_worse = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
             small = done or (part == 0 and fall <= FLAT * value)
-            return Descent(
-                w + part * (best - w) if is_worse else best,
-                squares,
-                equations,
-                Reweighting(squares.factor, w, count, step, small),
-            )
+            weights = w + part * (best - w) if is_worse else best
+            return Descent(weights, squares, equations, Reweighting(w, count, step, small))
         w, x, value = w + part * (best - w), x + part * (ahead - x), reached
-
-
-def equations_of(basis: Basis, loss: Loss, squares: Squares) -> NormalEquations:
-    """The linear problem that `squares` are."""
-    weight = loss.importance[..., None] * squares.factor
-    return NormalEquations.of(basis, squares.image, weight)
 
 
 def predicted(basis: Basis, weights: Doubles) -> Doubles:
@@ -134,16 +123,15 @@ def _value(loss: Loss, pull: NormalEquations | None, w: Doubles, x: Doubles) -> 
 
 
 def _fall(
-    loss: Loss,
-    pull: NormalEquations | None,
     squares: Squares,
+    pull: NormalEquations | None,
     x: Doubles,
     ahead: Doubles,
     w: Doubles,
     best: Doubles,
 ) -> float:
     """By how much the loss falls per step, at its beginning."""
-    slope = loss.importance[..., None] * squares.factor * (squares.image - x)
+    slope = squares.weight * (squares.image - x)
     fall = 2 * float((slope * (ahead - x)).sum())
     if pull is not None:
         gradient = np.einsum("cij,jc->ic", pull.M, w) - pull.b.T

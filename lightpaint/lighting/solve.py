@@ -1,40 +1,36 @@
-"""From basis and painting to lighting, in one call."""
+"""From basis and painting to lighting."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.view import View
-from lightpaint.errors import ConstraintError, TargetError
 from lightpaint.lighting.algebra.optimum import Method
-from lightpaint.lighting.constraints.constrained import preferring
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.linear import chosen_reduction, linear_solution, with_objective
-from lightpaint.lighting.loss import Loss
-from lightpaint.lighting.normal_equations import NormalEquations, weighted_problem
+from lightpaint.lighting.constraints.reduced_problem import (
+    ReducedOptimum,
+    problems,
+    solve_reduced,
+)
+from lightpaint.lighting.constraints.reduction import only
+from lightpaint.lighting.constraints.sparse import best_knobs
+from lightpaint.lighting.lighting import Certificate, Lighting
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import descend
-from lightpaint.lighting.solution import Refinement, Solution, Space
+from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 
-__all__ = [
-    "Refinement",
-    "Solution",
-    "Space",
-    "chosen_reduction",
-    "problem_of",
-    "solution_of",
-    "solve",
-    "with_objective",
-]
+#: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
+PULL = 1e-7
 
 
 def solve(
-    basis: Basis,
-    target: Target,
+    basis: Basis | Sequence[Basis],
+    target: Target | Sequence[Target],
     *,
     constraints: Constraints | None = None,
     unpainted: float = 0.0,
@@ -44,173 +40,185 @@ def solve(
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
+    basis, target: of one view; or of several, in the same order, for the one lighting that comes
+    closest to all: a pixel counts the same in whichever view it is, and `views` of the solution
+    has the answer to each.
     constraints: what else is asked of the lights.
     unpainted: weight of what is not painted, against the current look.
     start: lighting to begin with (the present one by default): a good guess saves sweeps, the
     answer is the same, but for what no painted pixel tells: lights that reach none keep the start.
     method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
-    quality of the answer then says that it has not converged.
+    certificate of the answer then says that it has not converged.
     view: for an answer that comes closest in what this view shows, instead of in linear light.
 
     Lights that are kept have weight 1; the others make up what they leave of the target.
 
     Raises SizeError if basis and target differ in size, TargetError if nothing counts,
-    ConstraintError if a constraint does not fit the lights.
+    ConstraintError if a constraint does not fit the lights, BasisError if views differ in lights.
     """
-    problem = problem_of(
+    problem = Problem.of(
         basis, target, constraints=constraints, unpainted=unpainted, method=method, view=view
     )
-    begin = basis.present_weights if start is None else start.weights_for(basis)
-    return solution_of(basis, problem, start=begin)
+    begin = problem.start if start is None else start.weights_for(problem.basis)
+    return solution_of(replace(problem, start=begin))
 
 
-def problem_of(
-    basis: Basis,
-    target: Target,
-    *,
-    constraints: Constraints | None = None,
-    unpainted: float = 0.0,
-    method: Method = "polished",
-    view: View | None = None,
-) -> Solution:
-    """What is to be solved, with the present lighting for an answer. As of `solve`."""
-    if not isinstance(target, Target):
-        raise TargetError(f"the target is a {type(target).__name__}: give what read_target returns")
-    if not (constraints is None or isinstance(constraints, Constraints)):
-        raise ConstraintError(
-            f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
-        )
-    target = target.fitted_to(basis.size, resize=False)
-    image, importance = weighted_problem(basis, target, unpainted=unpainted)
-    counted = np.where(importance > 0, importance, 1)
-    equations = NormalEquations.of(basis, image, importance)
-    problem = Solution(
-        lighting=Lighting.of_weights(basis, basis.present_weights, target=target.name),
-        image=image,
-        importance=importance,
-        equations=equations,
-        solved=equations,
-        current_share=np.where(importance > 0, 1 - target.importance / counted, 0),
-        constraints=constraints,
-        method=method,
-    )
-    if view is None and (target.at_least is None or not target.at_least[importance > 0].any()):
-        return problem
-    return _with_loss(basis, target, problem, view)
+def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
+    """The solution of a problem. start: (n, 3), where to begin, its own start by default.
 
-
-def _with_loss(basis: Basis, target: Target, problem: Solution, view: View | None) -> Solution:
-    asked = problem.constraints
-    if view is not None and asked is not None:
-        # The pull to the present is of squared light: of light as bright as the view makes it.
-        pull = asked.prefer_current * 4.0**view.stops
-        asked = replace(asked, prefer_current=pull)
-    loss = Loss(
-        painted=target.image.astype(np.float64),
-        importance=problem.importance,
-        share=problem.current_share,
-        current=basis.mix(basis.present_weights),
-        at_least=target.at_least,
-        view=view,
-    )
-    return replace(problem, constraints=asked, loss=loss)
-
-
-def solution_of(basis: Basis, problem: Solution, *, start: Doubles) -> Solution:
-    """`problem` with the weights that solve `problem.solved`. start: (n, 3), where to begin.
-
-    Where the problem has a loss that no linear problem stands for yet, one is found first.
+    Where its loss is no linear problem, one that stands for it is found first.
     """
-    if problem.loss is not None and problem.reweighting is None:
-        return _reweighted(basis, problem, problem.loss, start)
-    if problem.reweighting is None:
-        return linear_solution(basis, problem, start=start)
-    # One more step of the last linear problem, in which lights may reach less than they do, and
-    # which says nothing of other lights than those that were chosen.
-    asked = problem.constraints
-    reduction = chosen_reduction(basis, problem) if asked and asked.sparse is not None else None
-    solution = linear_solution(basis, problem, start=start, reduction=reduction)
-    quality = replace(
-        solution.quality,
-        unreached=problem.quality.unreached,
-        curve=problem.quality.curve,
-        converged=solution.quality.converged and problem.reweighting.converged,
-    )
-    lighting = replace(solution.lighting, quality=quality)
-    return replace(solution, lighting=lighting, tried=problem.tried)
-
-
-def _reweighted(basis: Basis, problem: Solution, loss: Loss, start: Doubles) -> Solution:
-    """The solution that minimises `loss`, of the linear problem that stands for it there.
-
-    With `sparse` the lights are chosen where all of them would lead.
-    """
-    asked = problem.constraints
-    sparse = asked is not None and asked.sparse is not None
-    every = asked
-    if asked is not None and sparse:
-        every = replace(asked, sparse=None)
-    # Where the painting says "at least" it is first taken by its word, which also tells which
-    # lights reach something that counts.
-    first = linear_solution(basis, replace(problem, constraints=every), start=start)
-    weights = first.lighting.weights_for(basis)
-    solution = _descended(basis, replace(problem, constraints=every), loss, weights)
-    if sparse:
-        weights = solution.lighting.weights_for(basis)
-        chosen = linear_solution(basis, replace(solution, constraints=asked), start=weights)
-        reduction = chosen_reduction(basis, chosen)
-        weights = chosen.lighting.weights_for(basis)
-        solution = _descended(
-            basis, replace(problem, constraints=asked), loss, weights, reduction=reduction
+    begin = problem.start if start is None else start
+    if problem.is_linear:
+        return _linear(problem, begin)
+    # The painting is first taken at its word, which also tells what lights reach.
+    first = _linear(replace(problem, constraints=_of_all(problem.constraints)), begin)
+    solution = _descended(first.problem, first.weights)
+    if problem.constraints.sparse is not None:
+        # The lights are chosen where all of them would lead.
+        chosen = _linear(
+            replace(solution.problem, constraints=problem.constraints), solution.weights
         )
-        solution = replace(solution, tried=chosen.tried)
-        first = replace(first, lighting=chosen.lighting)
-    quality = replace(
-        solution.quality, unreached=first.quality.unreached, curve=first.quality.curve
+        held = replace(problem, reduction=chosen.problem.reduction)
+        solution = replace(_descended(held, chosen.weights), tried=chosen.tried)
+        first = chosen
+    return _told(solution, unreached=first.certificate.unreached, curve=first.certificate.curve)
+
+
+def again(solution: Solution, problem: Problem) -> Solution:
+    """The solution of `problem`, which differs from that of `solution` in what is solved.
+
+    After reweighting it is one more step of the last linear problem, in which lights may reach
+    less than they do, and which says nothing of other lights than those that were chosen.
+    """
+    if problem.is_linear:
+        return _linear(replace(problem, reduction=problem.full), solution.weights)
+    assert solution.reweighting is not None
+    step = _one(problem, solution.weights)
+    before, reweighting = solution.certificate, solution.reweighting
+    converged = step.certificate.converged and reweighting.converged
+    certificate = replace(
+        step.certificate,
+        unreached=before.unreached,
+        curve=before.curve,
+        rounds=before.rounds,
+        converged=converged,
     )
-    return replace(solution, lighting=replace(solution.lighting, quality=quality))
+    lighting = step.lighting.with_certificate(certificate)
+    return replace(step, lighting=lighting, tried=solution.tried, reweighting=reweighting)
 
 
-def _descended(
-    basis: Basis,
-    problem: Solution,
-    loss: Loss,
-    start: Doubles,
-    *,
-    reduction: Reduction | None = None,
-) -> Solution:
-    """From weights (n, 3) within what is asked to the least of `loss`."""
+def _linear(problem: Problem, start: Doubles) -> Solution:
+    """The solution of the squares. With `sparse`, of the best lights in it."""
+    count = problem.constraints.sparse
+    if count is None or not problem.full.knobs:
+        return _one(problem, start)
+    equations, curve = problem.pulled(problem.solved), []
+    path = best_knobs(problems(equations, problem.full), problem.full, count)
+    for chosen in path:
+        found = solve_reduced(equations, only(problem.full, chosen), start)
+        curve.append((len(chosen), found.weights))
+    best = max((chosen for chosen in path if len(chosen) <= count), key=len)
+    solution = _one(replace(problem, reduction=only(problem.full, best)), start)
+    # What was chosen and has come out dark is left out as well.
+    on = [k for k, x in enumerate(problem.full.knobs) if solution.weights[list(x.lights)].any()]
+    left = replace(solution.problem, reduction=only(problem.full, on))
+    solution = replace(solution, problem=left, tried=tuple(curve))
+    norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
+    told = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
+    return _told(solution, curve=tuple(told))
 
-    def linear(equations: NormalEquations, begin: Doubles) -> Solution:
-        one = replace(problem, loss=None, equations=equations, solved=equations)
-        return linear_solution(basis, one, start=begin, reduction=reduction)
 
-    def weights_of(equations: NormalEquations, begin: Doubles) -> Doubles:
-        return linear(equations, begin).lighting.weights_for(basis)
+def _one(problem: Problem, start: Doubles) -> Solution:
+    """The solution of the squares as the reduction has the lights."""
+    equations = problem.pulled(problem.solved)
+    optimum = solve_reduced(equations, problem.reduction, start, method=problem.method)
+    return _solution(problem, optimum, optimum.weights, equations)
 
-    found = descend(basis, loss, start, weights_of, pull=_pull(basis, problem))
-    its = linear(found.equations, found.reweighting.at)
-    solution = replace(
-        problem,
-        image=found.squares.image,
-        current_share=found.squares.share,
-        equations=found.equations,
-        solved=found.equations,
+
+def _descended(problem: Problem, start: Doubles) -> Solution:
+    """From weights (n, 3) within what is asked to the least of the loss."""
+
+    def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
+        asked = problem.pulled(equations)
+        return solve_reduced(asked, problem.reduction, begin, method=problem.method)
+
+    found = descend(
+        problem.basis,
+        problem.loss,
+        start,
+        lambda equations, begin: best_of(equations, begin).weights,
+        pull=problem.pull,
+    )
+    solved = replace(problem, squares=found.squares, equations=found.equations)
+    optimum = best_of(found.equations, found.reweighting.at)
+    solution = _solution(solved, optimum, found.weights, problem.pulled(found.equations))
+    certificate = replace(
+        solution.certificate,
+        converged=optimum.converged and found.reweighting.converged,
+        rounds=1 + found.reweighting.rounds,
+    )
+    return replace(
+        solution,
+        lighting=solution.lighting.with_certificate(certificate),
         reweighting=found.reweighting,
     )
-    quality = with_objective(basis, solution, its.quality, found.weights)
-    quality = replace(quality, converged=quality.converged and found.reweighting.converged)
-    lighting = its.lighting
-    if (found.weights != lighting.weights_for(basis)).any():
-        asked = [(light.constraint, light.is_active) for light in lighting.lights]
-        lighting = Lighting.of_weights(basis, found.weights, asked=asked, target=lighting.target)
-    return replace(solution, lighting=replace(lighting, quality=quality))
 
 
-def _pull(basis: Basis, problem: Solution) -> NormalEquations | None:
-    """What the pull to the present adds to the objective, if it is asked for."""
-    if problem.constraints is None or not problem.constraints.prefer_current:
-        return None
-    e = problem.equations
-    nothing = NormalEquations(0 * e.M, 0 * e.b, 0 * e.target_norm2)
-    return preferring(nothing, basis, basis.present_weights, problem.constraints.prefer_current)
+def _solution(
+    problem: Problem, optimum: ReducedOptimum, weights: Doubles, equations: NormalEquations
+) -> Solution:
+    """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull."""
+    view, names = problem.loss.view, problem.basis.names
+    certificate = Certificate(
+        kkt_residual=_rgb(optimum.kkt_residual),
+        objective=(0, 0, 0),
+        relative_objective=(0, 0, 0),
+        sweeps=optimum.sweeps,
+        converged=optimum.converged,
+        unreached=tuple(n for n, ok in zip(names, optimum.reached, strict=True) if not ok),
+        display="" if view is None else view.spoken,
+    ).of(problem.objective(weights), problem.norm2)
+    labels = problem.reduction.labels
+    asked = [(label, False) for label in labels]
+    if any(labels):
+        held = _held_back(equations, problem.basis, optimum.weights)
+        asked = [(label, bool(label) and bool(h)) for label, h in zip(labels, held, strict=True)]
+    lighting = Lighting.of_weights(
+        problem.basis, weights, asked=asked, target=problem.name, certificate=certificate
+    )
+    return Solution(problem, lighting)
+
+
+def _held_back(equations: NormalEquations, basis: Basis, weights: Doubles) -> Bools:
+    """(n,), whether a light would change if it alone were let go.
+
+    The gradient g = M w − b must vanish for a free light that is on, and may not be
+    negative for one that is off; where it does not do so, something holds the light.
+    """
+    lit = equations.reached
+    power = np.where(lit, np.einsum("cii->ic", equations.M), 0)
+    g = np.where(lit, np.einsum("cij,jc->ic", equations.M, weights) - equations.b.T, 0)
+    size = np.abs(equations.b.T[lit] / np.sqrt(power[lit])).max(initial=0) or 1.0
+    # Of what has one weight for all channels they pull together.
+    scalar = np.array([light.is_scalar for light in basis.lights], dtype=bool)
+    g[scalar], power[scalar] = (x[scalar].sum(axis=1, keepdims=True) for x in (g, power))
+    root = np.sqrt(np.where(power > 0, power, 1))
+    violation = np.abs(np.minimum(weights * root, g / root))
+    return np.asarray((violation > PULL * size).any(axis=1))
+
+
+def _of_all(constraints: Constraints) -> Constraints:
+    """Without the choice of a few lights."""
+    return replace(constraints, sparse=None) if constraints.sparse is not None else constraints
+
+
+def _told(solution: Solution, **about: object) -> Solution:
+    """`solution` with this in its certificate."""
+    certificate = replace(solution.certificate, **about)  # type: ignore[arg-type]
+    return replace(solution, lighting=solution.lighting.with_certificate(certificate))
+
+
+def _rgb(values: Doubles) -> tuple[float, float, float]:
+    r, g, b = (float(v) for v in values)
+    return r, g, b

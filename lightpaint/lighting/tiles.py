@@ -33,8 +33,8 @@ FEW_LIGHTS = 32
 class TiledEquations:
     """The problem of one basis, target and importance, updated in place.
 
-    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w), >= 0. The images are not
-    copied, target and importance are.
+    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w) or (h, w, 1), or (h, w, 3) where
+    channels differ, >= 0. The images are not copied, target and importance are.
 
     The sums of the tiles are the base of a pyramid, each of whose nodes is the sum of two by
     two below it: a dirty tile costs its own sum and three additions per level, and the order
@@ -46,7 +46,10 @@ class TiledEquations:
     ) -> None:
         self._images = images
         n, height, width, _ = images.shape
-        if target.shape != (height, width, 3) or importance.shape != (height, width):
+        if importance.ndim == 2:
+            importance = importance[..., None]
+        fits = importance.shape in ((height, width, 1), (height, width, 3))
+        if target.shape != (height, width, 3) or not fits:
             raise SizeError(
                 f"target {target.shape} and importance {importance.shape} do not fit basis images "
                 f"of {(height, width)}"
@@ -75,16 +78,18 @@ class TiledEquations:
     ) -> None:
         """Paint over a rectangle: what is given replaces the target or the importance there.
 
-        region: slices of rows and columns. target: (rows, columns, 3) or one colour;
-        importance: (rows, columns) or one number. Raises ValueError, and leaves all as it is,
-        for a negative or infinite importance and for what does not fit the region.
+        region: slices of rows and columns. target: (rows, columns, 3) or one colour; importance:
+        (rows, columns), (rows, columns, 1 or 3) or one number. Raises ValueError, and leaves all
+        as it is, for a negative or infinite importance and for what does not fit the region.
         """
-        for along, length in zip(region, self._importance.shape, strict=True):
+        for along, length in zip(region, self._target.shape[:2], strict=True):
             _tiles(along, length, self.side)
         if target is not None:
             np.broadcast_to(target, self._target[region].shape)
         if importance is not None:
             given = np.asarray(importance)
+            if given.shape == self._target[region].shape[:2]:
+                given = given[..., None]
             if not (np.isfinite(given).all() and (given >= 0).all()):
                 raise ValueError("importance is a finite weight >= 0 of each pixel")
             self._importance[region] = given
@@ -120,9 +125,9 @@ class TiledEquations:
             slice(columns.start * side, columns.stop * side),
         )
         # The target goes along as one more image.
-        D = np.empty((*tiles, 1, side * side))
+        D = np.empty((*tiles, self._importance.shape[2], side * side))
         pixels = np.empty((*tiles, 3, n + 1, side * side))
-        _cut(self._importance[where][None, ..., None], side, out=D[:, :, :, None])
+        _cut(self._importance[where][None], side, out=D[:, :, :, None])
         _cut(self._images[(slice(None), *where)], side, out=pixels[:, :, :, :n])
         _cut(self._target[where][None], side, out=pixels[:, :, :, n:])
         if not D.all():

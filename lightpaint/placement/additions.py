@@ -7,16 +7,15 @@ measured on the other, and the other way around: noise that was fitted does not 
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import mix
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise import pseudo_inverse, without_noise
-from lightpaint.lighting.constraints.constrained import weights_of
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, problems
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.placement.candidates import Candidates
@@ -124,8 +123,8 @@ class _Solver:
         """(n + m, 3), the best with the candidates `chosen`; the others are 0."""
         x = np.zeros(len(self.reduction.unknowns))
         for problem, here, values in self._solved(chosen):
-            x[[problem.its[k] for k in here]] = values
-        return weights_of(self.reduction, x)
+            x[problem.its[here]] = values
+        return self.reduction.weights(x)
 
     def objective(self, chosen: Iterable[int]) -> float:
         """What is missed with these weights, as the images they were solved with have it."""
@@ -136,7 +135,7 @@ class _Solver:
         gains = np.zeros(len(self.reduction.unknowns))
         for problem, here, x in self._solved(chosen):
             inside = (x > problem.lower[here]) & (x < problem.upper[here])
-            free = np.asarray(here, dtype=int)[inside]
+            free = here[inside]
             gradient = problem.b - problem.M[:, here] @ x
             # What is left of a column once the free unknowns have made up for it as they can.
             cross = problem.M[free]
@@ -145,17 +144,20 @@ class _Solver:
             alone = power - np.einsum("ik,ij,jk->k", cross, inverse, cross, optimize=True)
             safe = np.where(alone > ALONE * power, alone, np.inf)
             gains[problem.its] = np.square(np.maximum(gradient, 0)) / safe
-        knobs = self.reduction.knobs[self.first :]
-        return np.array([gains[list(its)].sum() for _, its in knobs])
+        places = self.reduction.places[self.first :]
+        return np.array([gains[list(its)].sum() for its in places])
 
-    def _solved(self, chosen: Iterable[int]) -> Iterator[tuple[ReducedProblem, list[int], Doubles]]:
+    def _solved(self, chosen: Iterable[int]) -> Iterator[tuple[ReducedProblem, Indices, Doubles]]:
         """Each problem, which of its unknowns are not off, and their best values."""
         off = set(range(self.first, len(self.reduction.knobs)))
         off -= {self.first + k for k in chosen}
-        unknowns = {i for knob in off for i in self.reduction.knobs[knob][1]}
+        unknowns = {i for knob in off for i in self.reduction.places[knob]}
         for problem in self.problems:
-            here = [k for k, i in enumerate(problem.its) if i not in unknowns]
-            yield problem, here, _best(problem, here)
+            left = [k for k, i in enumerate(problem.its.tolist()) if i not in unknowns]
+            here = np.array(left, dtype=np.intp)
+            p = problem.of(here)
+            x = minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps).x
+            yield problem, here, x
 
 
 class _Fold:
@@ -207,16 +209,3 @@ def _standard_error(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:
     """
     a, b = (fold.missed_map(chosen) for fold in folds)
     return float(np.sqrt(np.square(a - b).sum())) / 2
-
-
-def _best(problem: ReducedProblem, here: Sequence[int]) -> Doubles:
-    """The best of the unknowns at `here`, the others 0."""
-    place = {k: j for j, k in enumerate(here)}
-    caps = [
-        replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
-        for cap in problem.caps
-        if cap.unknowns[0] in place
-    ]
-    lower, upper = problem.lower[here], problem.upper[here]
-    M: Doubles = problem.M[np.ix_(here, here)]
-    return minimise(M, problem.b[here], lower=lower, upper=upper, caps=caps).x

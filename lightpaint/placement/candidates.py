@@ -13,11 +13,9 @@ from lightpaint.basis.basis import Basis, mix
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import block_mean, whole_factor
 from lightpaint.lighting.algebra.threads import one_thread
-from lightpaint.lighting.constraints.constrained import preferring
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduction import Reduction, Unknown, reduce_to
+from lightpaint.lighting.constraints.reduction import Knob, Reduction
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
-from lightpaint.lighting.solve import Solution, chosen_reduction
+from lightpaint.lighting.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -69,8 +67,8 @@ class Candidates:
             np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
             image,
             importance,
-            _with_free_lights(_reduction(basis, solution), count),
-            _pull(basis, solution, count),
+            _with_free_lights(solution.problem.reduction, count),
+            _pull(solution, count),
             count,
         )
 
@@ -99,31 +97,21 @@ class Candidates:
             return NormalEquations(*inner_products(images, self.image, self.importance))
 
 
-def _reduction(basis: Basis, solution: Solution) -> Reduction:
-    if solution.constraints:
-        return chosen_reduction(basis, solution)
-    return reduce_to(Constraints(), basis.lights)
-
-
 def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
     """`reduction` with that many lights more, of which nothing is asked."""
     n = len(reduction.held)
-    held = np.vstack([reduction.held, np.zeros((count, 3))])
-    labels = [*reduction.labels, *[""] * count]
-    more = Reduction(held, labels, [*reduction.unknowns], [*reduction.caps], [*reduction.knobs])
-    for k in range(n, n + count):
-        more.add([Unknown(((k, axis),)) for axis in np.eye(3)], None)
-    return more
+    more = tuple(Knob.of_any_colour(k) for k in range(n, n + count))
+    return Reduction(
+        np.vstack([reduction.held, np.zeros((count, 3))]),
+        (*reduction.labels, *[""] * count),
+        (*reduction.knobs, *more),
+    )
 
 
-def _pull(basis: Basis, solution: Solution, count: int) -> NormalEquations | None:
+def _pull(solution: Solution, count: int) -> NormalEquations | None:
     """What draws the lights to their present emission; nothing draws the candidates."""
-    if not (solution.constraints and solution.constraints.prefer_current):
+    if (pull := solution.problem.pull) is None:
         return None
-    n = len(basis.lights)
-    nothing = NormalEquations(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros(3))
-    strength = solution.constraints.prefer_current
-    pull = preferring(nothing, basis, basis.present_weights, strength)
     return NormalEquations(
         np.pad(pull.M, ((0, 0), (0, count), (0, count))),
         np.pad(pull.b, ((0, 0), (0, count))),

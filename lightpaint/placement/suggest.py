@@ -18,7 +18,7 @@ from lightpaint.basis.render.render import render_basis, why_not_one_pass
 from lightpaint.colour.photometry import Photometry, photometry, point_flux
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import whole_factor
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.placement.additions import Addition, find_additions
 from lightpaint.placement.candidates import Candidates
 from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
@@ -115,7 +115,7 @@ def suggest_lights(
         raise SceneError(f"--suggest {count}: ask for one light or more")
     check_suggestible(scene)
     norm2 = float(solution.norm2.sum())
-    if sum(solution.quality.objective) <= NOTHING_MISSED**2 * norm2:
+    if sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:
         return ()
     # The gains are of the last linear problem, which may be on another scale.
     total = solution.energy

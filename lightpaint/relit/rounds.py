@@ -7,7 +7,7 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.refine import refine
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.views import joint_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.relight import relight
@@ -17,7 +17,6 @@ from lightpaint.scene.scene import Scene
 
 def refine_by_rendering(
     views: Sequence[tuple[Scene, Basis]],
-    whole: Basis,
     solution: Solution,
     *,
     rounds: int,
@@ -27,10 +26,9 @@ def refine_by_rendering(
 ) -> Solution:
     """`rounds` times: render the scene under the solution's lighting and take a Newton step.
 
-    views: scene and basis of each view; whole: of all of them (see solve/views.py), for which
-    the solution is. spp: samples per pixel of each render, on the film of the basis; as many
-    as the basis has by default. Every round draws random numbers of its own, which neither the
-    basis nor a verification uses.
+    views: scene and basis of each view; the solution is of all of them. spp: samples per pixel
+    of each render, on the film of the basis; as many as the basis has by default. Every round
+    draws random numbers of its own, which neither the basis nor a verification uses.
     """
     for k in range(rounds):
         mixed = []
@@ -39,7 +37,7 @@ def refine_by_rendering(
             label = f"refinement {k + 1}"
             samples = max(2, basis.origin.spp) if spp is None else spp
             mixed.append(_mixed(scene, basis, solution, samples, its_seed, label, progress))
-        solution = refine(whole, solution, joint_estimate(mixed))
+        solution = refine(solution, joint_estimate(mixed))
     return solution
 
 

@@ -15,7 +15,7 @@ from lightpaint.files import write_bytes
 from lightpaint.images.blocks import block_mean, enlarged
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.report.pictures import (
     diverging,
     painted,

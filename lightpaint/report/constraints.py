@@ -1,14 +1,12 @@
 """The part of the report on what constraints cost the picture. Returns HTML."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.view import View
 from lightpaint.images.blocks import block_mean
-from lightpaint.lighting.solve import Solution, solution_of
+from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure
 from lightpaint.report.sentences import spoken_percent
 from lightpaint.report.verdict import relative_residual
@@ -20,20 +18,19 @@ WIDTH = 320
 AROUND = 2
 
 
-def constraints_section(basis: Basis, solution: Solution, *, view: View) -> str:
-    """The best lighting without constraints beside the one as asked, both from the basis.
+def constraints_section(
+    basis: Basis, solution: Solution, free: Solution | None, *, view: View
+) -> str:
+    """The best lighting without constraints, `free`, beside the one as asked, from the basis.
 
-    With `sparse`, what other numbers of lights would miss. Empty where nothing is asked, and for
-    one of several views, whose lighting answers the others too.
+    With `sparse`, what other numbers of lights would miss. Empty where there is none.
     """
-    if not solution.constraints or solution.is_one_of_several:
+    if free is None:
         return ""
-    start = solution.lighting.weights_for(basis)
-    anew = replace(solution, constraints=None, method="polished", reweighting=None)
-    free = solution_of(basis, anew, start=start)
+    start = solution.weights
     without, asked = (spoken_percent(relative_residual(x)) for x in (free, solution))
     pictures = [
-        (free.lighting.weights_for(basis), "Without constraints", f"{without} missed."),
+        (free.weights, "Without constraints", f"{without} missed."),
         (start, "As asked", f"{asked} missed."),
     ]
     return (
@@ -48,7 +45,7 @@ def constraints_section(basis: Basis, solution: Solution, *, view: View) -> str:
 
 def _curve(solution: Solution, free: Solution) -> str:
     """With `sparse`, what is missed by number of lights."""
-    curve = solution.quality.curve
+    curve = solution.certificate.curve
     if not curve:
         return ""
     used = _used(solution)
@@ -73,7 +70,7 @@ def _row(what: str, missed: float) -> str:
 
 def _numbers(basis: Basis, solution: Solution, view: View) -> str:
     """With `sparse`, pictures with fewer and with more lights."""
-    used, missed_with = _used(solution), dict(solution.quality.curve)
+    used, missed_with = _used(solution), dict(solution.certificate.curve)
     pictures = [
         (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
         for count, weights in solution.tried
@@ -98,9 +95,8 @@ def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], view: View)
 
 def _used(solution: Solution) -> int:
     """The number of lights of the curve that the answer has."""
-    assert solution.constraints is not None
-    most = solution.constraints.sparse or 0
-    return max((count for count, _ in solution.quality.curve if count <= most), default=0)
+    most = solution.problem.constraints.sparse or 0
+    return max((count for count, _ in solution.certificate.curve if count <= most), default=0)
 
 
 def _lights(count: int) -> str:

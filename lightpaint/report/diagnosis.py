@@ -11,7 +11,7 @@ from lightpaint.colour.view import View
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import SIGNED, Picture, figure, scale
 from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
@@ -69,15 +69,15 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
 def _steps(solution: Solution) -> str:
     """What was done against noise, besides sampling."""
     steps = []
-    if solution.noise_removed:
+    if solution.problem.noise_removed:
         steps.append(
-            f"{spoken_percent(solution.noise_removed)} of the noise's power in the "
+            f"{spoken_percent(solution.problem.noise_removed)} of the noise's power in the "
             "equations was taken out of them"
         )
-    if solution.refinement is not None:
+    if solution.problem.refinement is not None:
         steps.append(
             "the answer was refined by a render of the mix, which decided "
-            f"{spoken_percent(solution.refinement.share)} of the last step"
+            f"{spoken_percent(solution.problem.refinement.share)} of the last step"
         )
     text = "; ".join(steps)
     return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""

@@ -12,7 +12,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.view import View
 from lightpaint.images.png import png_bytes
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verify import LIMIT, Verification
 from lightpaint.report.pictures import (
     DIVERGING,

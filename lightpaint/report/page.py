@@ -17,7 +17,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggest import Suggestion
 from lightpaint.relit.verify import Verification
 from lightpaint.report.constraints import constraints_section
@@ -47,13 +47,15 @@ def report_page(
     command: str,
     uncertainty: Uncertainty | None = None,
     diagnosis: Diagnosis | None = None,
+    unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
 ) -> str:
     """The page as HTML text.
 
     verification: None where nothing was rendered to check the prediction.
     command: the shell command that made the result.
-    uncertainty, diagnosis, suggestions: without them the page has no section on what they tell.
+    uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
+    what they tell.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -73,7 +75,7 @@ def report_page(
         exposure=_exposure(view, predicted.image),
         maps=maps(solution, predicted.image, current, verification=verification, view=view),
         missed=missed_section(solution, diagnosis, current, view=view)
-        + constraints_section(basis, solution, view=view),
+        + constraints_section(basis, solution, unconstrained, view=view),
         suggestions=suggestion_section(
             suggestions, view=view, cd_per_unit=solution.lighting.cd_per_unit
         ),

@@ -12,7 +12,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.view import View
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 
 #: False colours of a signed quantity from −1 to +1, in display values. Their lightness

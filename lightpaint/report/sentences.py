@@ -9,7 +9,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place
 from lightpaint.lighting.analysis.uncertainty import SIDES, Uncertainty
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import LightSetting
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.report.verdict import energy_shares
 
 #: Shares of the miss, or of a light, that are too small to speak of.

@@ -18,7 +18,8 @@ from lightpaint.colour.photometry import Photometry
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import LightSetting
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verify import LIMIT, Verification
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.sentences import relative_errors, spoken_error
@@ -37,6 +38,7 @@ def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     errors = None if uncertainty is None else relative_errors(uncertainty)
     shares = energy_shares(basis, solution.lighting)
     settings = {light.name: light for light in solution.lighting.lights}
+    unreached = solution.certificate.unreached
     rows = []
     for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
         share = shares[k]
@@ -52,7 +54,7 @@ def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
             f'<th scope="row">{name}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
             f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
-            f"<td>{change(light, setting, solution.quality.unreached)}{error}{_asked(setting)}</td>"
+            f"<td>{change(light, setting, unreached)}{error}{_asked(setting)}</td>"
             f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
             f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
         )
@@ -103,7 +105,7 @@ def _asked(setting: LightSetting) -> str:
 
 def fit_table(solution: Solution) -> str:
     """Objective with its standard error, optimality and sweeps, per channel and in all."""
-    q = solution.quality
+    q = solution.certificate
     norm2 = np.where(solution.norm2 > 0, solution.norm2, 1)
     errors = None if q.objective_error is None else np.array(q.objective_error)
     each = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
@@ -152,7 +154,7 @@ def render_table(
     verification: Verification | None,
 ) -> str:
     """Where the basis comes from, and which pixels and lights took no part."""
-    origin, q = basis.origin, solution.quality
+    origin, q = basis.origin, solution.certificate
     height, width = basis.size
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
@@ -177,9 +179,9 @@ def render_table(
 
 def _fitted_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
     """What was compared with the painting, where it was not plain light."""
-    if (loss := solution.loss) is None or solution.reweighting is None:
+    if solution.problem.is_linear or solution.reweighting is None:
         return []
-    q, facts = solution.quality, []
+    q, facts = solution.certificate, []
     if q.display:
         facts += [
             ("Fitted in display space", f"as {q.display} shows it"),
@@ -193,7 +195,8 @@ def _fitted_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, st
                 f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
             ),
         ]
-    if loss.at_least is not None and loss.at_least[solution.importance > 0].any():
+    loss = solution.problem.loss
+    if isinstance(loss, PaintingLoss) and loss.at_least[solution.importance > 0].any():
         its = loss.at_least & (solution.importance > 0)[..., None]
         brighter = its & (predicted.image > loss.painted)
         facts.append(

@@ -8,7 +8,7 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.normal_equations import BLOCK
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verify import LIMIT, Verification
 
 
@@ -46,7 +46,7 @@ def relative_residual(solution: Solution) -> float:
     """
     norm2 = _norm2(solution)
     # A painting that is black wherever it counts is met by darkness alone.
-    missed = sum(solution.quality.objective)
+    missed = sum(solution.certificate.objective)
     return float(np.sqrt(missed / norm2)) if norm2 > 0 else float(missed > 0)
 
 
@@ -80,7 +80,7 @@ def linear_residual(solution: Solution, predicted: Estimate) -> float:
 
 def codes_missed(solution: Solution) -> float:
     """What is missed in display space, RMS over pixels and channels, in codes of 255."""
-    mean = sum(solution.quality.objective) / (3 * float(solution.importance.sum()))
+    mean = sum(solution.certificate.objective) / (3 * float(solution.importance.sum()))
     return 255 * float(np.sqrt(mean))
 
 
@@ -94,16 +94,16 @@ def verdict(solution: Solution, predicted: Estimate, verification: Verification 
     if solution.space == "linear":
         fit += f" (RMS; {noise})"
     else:
-        fit += f" as {solution.quality.display} shows it (RMS, {codes_missed(solution):.1f} of 255 "
-        fit += f"codes missed; {noise}) and "
+        fit += f" as {solution.certificate.display} shows it (RMS, {codes_missed(solution):.1f} of "
+        fit += f"255 codes missed; {noise}) and "
         fit += f"{100 * max(1 - linear_residual(solution, predicted), 0):.0f} % in linear light"
-    if not solution.quality.converged:
+    if not solution.certificate.converged:
         fit += ", from a solve that stopped before it converged"
     return f"{fit}; {agreement(verification)}."
 
 
 def _norm2(solution: Solution) -> float:
-    if solution.loss is not None:
+    if not solution.problem.is_linear:
         return float(solution.norm2.sum())
     weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
     return float(weighted.sum())

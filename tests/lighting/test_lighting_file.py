@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from lightpaint.errors import LightingError
 from lightpaint.lighting.lighting import (
+    Certificate,
     Lighting,
     LightSetting,
-    Quality,
     read_lighting,
     write_lighting,
 )
@@ -29,8 +29,8 @@ SETTINGS = st.builds(
     emission=COLOURS,
     weight=COLOURS,
 )
-QUALITIES = st.builds(
-    Quality,
+CERTIFICATES = st.builds(
+    Certificate,
     kkt_residual=COLOURS,
     objective=COLOURS,
     relative_objective=COLOURS,
@@ -43,7 +43,7 @@ LIGHTINGS = st.builds(
     lights=st.lists(SETTINGS, max_size=5, unique_by=lambda s: s.name).map(tuple),
     target=st.text(max_size=8),
     scene_identity=st.text(max_size=8),
-    quality=st.none() | QUALITIES,
+    certificate=st.none() | CERTIFICATES,
 )
 
 
@@ -59,9 +59,9 @@ def good(tmp_path: Path) -> tuple[Path, dict[str, Any]]:
     """A file of two lights, and its content."""
     lamp = LightSetting("lamp", "area", "radiance", "W/(m² sr)", (1.5, 2, 3), (1.5, 2, 3))
     sun = LightSetting("sun", "directional", "irradiance", "W/m²", (0.1, 0, 0), (0.1, 0, 0))
-    quality = Quality((0, 0, 0), (1, 1, 1), (0.1, 0.1, 0.1), (5, 6, 7), True, ("sun",))
+    certificate = Certificate((0, 0, 0), (1, 1, 1), (0.1, 0.1, 0.1), (5, 6, 7), True, ("sun",))
     path = tmp_path / "lighting.json"
-    write_lighting(path, Lighting((lamp, sun), "evening", "1234", quality))
+    write_lighting(path, Lighting((lamp, sun), "evening", "1234", certificate))
     return path, json.loads(path.read_text(encoding="utf-8"))
 
 
@@ -78,7 +78,7 @@ def test_a_file_without_a_solve_is_complete(good: tuple[Path, dict[str, Any]]):
     path, data = good
     del data["solve"], data["target"], data["scene_identity"], data["lightpaint"]
     path.write_text(json.dumps(data))
-    assert read_lighting(path).quality is None
+    assert read_lighting(path).certificate is None
 
 
 REMOVALS = [

@@ -9,7 +9,6 @@ import pytest
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.lighting.views import solve_views
 from lightpaint.target.target import Target
 
 SIZE = (12, 10)
@@ -42,10 +41,10 @@ def test_both_methods_come_to_one_answer(make_basis: Any, seed: int, asked: Any)
         solve(basis, target, constraints=constraints, method=method)
         for method in ("polished", "gauss-seidel")
     )
-    assert swept.method == "gauss-seidel"
-    assert polished.quality.converged
-    assert swept.quality.converged
-    assert min(swept.quality.sweeps) > 0
+    assert swept.problem.method == "gauss-seidel"
+    assert polished.certificate.converged
+    assert swept.certificate.converged
+    assert min(swept.certificate.sweeps) > 0
     # Both residuals are 1e-12 of b at most; M⁻¹ makes errors of weights of that.
     M, b = swept.equations.M, swept.equations.b
     slack = max(np.linalg.norm(np.linalg.inv(M[c]), 2) for c in range(3))
@@ -67,19 +66,19 @@ def _alike(make_basis: Any) -> Any:
 
 def test_running_out_of_sweeps_is_said(make_basis: Any) -> None:
     basis, target = _alike(make_basis)
-    assert solve(basis, target).quality.converged
+    assert solve(basis, target).certificate.converged
     for constraints in (None, Constraints.of({"light 2": {"limits": {"max": [9, 9, 9]}}})):
         swept = solve(basis, target, constraints=constraints, method="gauss-seidel")
-        assert not swept.quality.converged
-        assert max(swept.quality.sweeps) == 20_000
-        assert max(swept.quality.kkt_residual) > 1e-12
+        assert not swept.certificate.converged
+        assert max(swept.certificate.sweeps) == 20_000
+        assert max(swept.certificate.kkt_residual) > 1e-12
 
 
 def test_the_method_stays_where_the_answer_is_improved(make_basis: Any) -> None:
     basis, target = _alike(make_basis)
-    better = correct_noise(basis, solve(basis, target, method="gauss-seidel"))
-    assert better.method == "gauss-seidel"
-    assert max(better.quality.sweeps) > 0
-    views = solve_views([(basis, target), (basis, target)], method="gauss-seidel")
-    assert [view.method for view in views] == ["gauss-seidel"] * 2
-    assert not views[0].quality.converged
+    better = correct_noise(solve(basis, target, method="gauss-seidel"))
+    assert better.problem.method == "gauss-seidel"
+    assert max(better.certificate.sweeps) > 0
+    views = solve([basis, basis], [target, target], method="gauss-seidel").views
+    assert [view.problem.method for view in views] == ["gauss-seidel"] * 2
+    assert not views[0].certificate.converged

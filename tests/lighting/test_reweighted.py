@@ -16,13 +16,14 @@ from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.refine import refine
 from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.loss import Loss
+from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import predicted
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import problem_of, solution_of, solve
-from lightpaint.lighting.views import joint_basis, joint_problem, parted, solve_views
+from lightpaint.lighting.solve import again, solve
 from lightpaint.target.target import Target
 
 SIZE = (8, 9)
@@ -107,15 +108,15 @@ def test_at_least_is_the_optimum_of_the_hinge(make_basis: Any, seed: int, unpain
     # It is convex, and the quasi-Newton method's finite differences are good to some 1e-8.
     best = _best(value, [np.ones_like(w), w])
     assert value(w) <= best * (1 + 1e-9)
-    assert solution.quality.converged
+    assert solution.certificate.converged
     # Certified as any linear solve is: the last problem is exact around its own optimum.
-    assert max(solution.quality.kkt_residual) <= 1e-12
+    assert max(solution.certificate.kkt_residual) <= 1e-12
     assert np.abs(_projected_gradient(value, w)).max() < 1e-5 * value(0 * w)
     # What is said of it is the hinge, without what the painting and the look cost each other.
     if not unpainted:
-        assert sum(solution.quality.objective) == pytest.approx(value(w), rel=1e-9)
+        assert sum(solution.certificate.objective) == pytest.approx(value(w), rel=1e-9)
         assert solution.norm2.sum() == pytest.approx(value(0 * w), rel=1e-9)
-    assert sum(solution.quality.objective) <= value(w) * (1 + 1e-9)
+    assert sum(solution.certificate.objective) <= value(w) * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("view", [None, SRGB, View("agx", 1.0), View("filmic", -1.0)])
@@ -125,14 +126,14 @@ def test_the_objective_never_rises(
 ):
     basis, image, importance = _random(make_basis, seed)
     target = _target(image, importance, top=0.3 if view is None else None)
-    problem = solve(basis, target, view=view)
+    loss = solve(basis, target, view=view).problem.loss
     plain = solve(basis, replace(target, at_least=None))
-    values = [problem.loss.objective(predicted(basis, plain.lighting.weights_for(basis))).sum()]
+    values = [loss.objective(predicted(basis, plain.weights)).sum()]
     for rounds in range(1, 12):
         monkeypatch.setattr(reweighted, "ROUNDS", rounds)
         solution = solve(basis, target, view=view)
-        values.append(sum(solution.quality.objective))
-        assert solution.quality.converged or view is not None or rounds < 6
+        values.append(sum(solution.certificate.objective))
+        assert solution.certificate.converged or view is not None or rounds < 6
     assert (np.diff(values) <= 1e-12 * values[0]).all()
 
 
@@ -147,9 +148,12 @@ def test_running_out_of_rounds_keeps_what_was_won(
     problem = solve(basis, target, constraints=asked)
     monkeypatch.setattr(reweighted, "ROUNDS", 1)
     solution = solve(basis, target, constraints=asked, view=view)
-    assert not solution.quality.converged
+    assert not solution.certificate.converged
     begin = predicted(basis, problem.lighting.weights_for(basis))
-    assert sum(solution.quality.objective) < (1 - 1e-4) * solution.loss.objective(begin).sum()
+    assert (
+        sum(solution.certificate.objective)
+        < (1 - 1e-4) * solution.problem.loss.objective(begin).sum()
+    )
     labels = [light.constraint for light in solution.lighting.lights]
     assert labels == [light.constraint for light in problem.lighting.lights]
     assert solution.lighting.emission["light 1"] == basis.lights[1].emission
@@ -180,9 +184,9 @@ def test_only_a_lower_end_is_black(make_basis: Any):
     target = _target(np.full((*SIZE, 3), 5.0), top=0.4)
     solution = solve(basis, target)
     # Round-off of float64, squared.
-    assert sum(solution.quality.objective) < 1e-28
+    assert sum(solution.certificate.objective) < 1e-28
     assert (combine(basis, solution.lighting).image >= 0.4 * (1 - 1e-6)).all()
-    assert solution.quality.converged
+    assert solution.certificate.converged
 
 
 VIEWS = [SRGB, View("srgb", 2.0), View("filmic"), View("linear", 0.5), View("agx", 1.0)]
@@ -202,11 +206,11 @@ def test_a_display_fit_is_stationary_and_no_worse(
     w = solution.lighting.weights_for(basis)
     assert value(w) <= value(linear) * (1 + 1e-12)
     if not unpainted:
-        assert sum(solution.quality.objective) == pytest.approx(value(w), rel=1e-9)
+        assert sum(solution.certificate.objective) == pytest.approx(value(w), rel=1e-9)
     # The last linear problem is solved as any is.
-    assert max(solution.quality.kkt_residual) <= 1e-12
+    assert max(solution.certificate.kkt_residual) <= 1e-12
     # A round changes no light by more than 1e-6 beside the brightest.
-    assert solution.quality.converged
+    assert solution.certificate.converged
     assert np.abs(_projected_gradient(value, w)).max() < 1e-6 * value(0 * w)
 
 
@@ -230,20 +234,12 @@ def test_what_is_clipped_comes_back(make_basis: Any):
     rng = np.random.default_rng(0)
     basis = make_basis(images=0.2 + rng.random((2, *SIZE, 3)))
     truth = np.array([[0.2, 0.1, 0.3], [0.1, 0.2, 0.1]])
-    loss = Loss(
-        painted=_pictures(basis, truth),
-        importance=np.ones(SIZE),
-        share=np.zeros(SIZE),
-        current=np.zeros((*SIZE, 3)),
-        view=SRGB,
-    )
-    problem = solve(basis, _target(_pictures(basis, truth)), view=SRGB)
+    problem = Problem.of(basis, _target(_pictures(basis, truth)), view=SRGB)
 
     def linear(equations: Any, begin: Any) -> Any:
-        one = replace(problem, loss=None, equations=equations, solved=equations)
-        return solution_of(basis, one, start=begin).lighting.weights_for(basis)
+        return solve_reduced(equations, problem.reduction, begin).weights
 
-    found = reweighted.descend(basis, loss, np.full((2, 3), 50.0), linear)
+    found = reweighted.descend(basis, problem.loss, np.full((2, 3), 50.0), linear)
     np.testing.assert_allclose(found.weights, truth, rtol=1e-5)
 
 
@@ -253,9 +249,9 @@ def test_squares_have_the_gradient_of_the_loss(make_basis: Any, view: View | Non
     rng = np.random.default_rng(2)
     top = 0.5 / 2.0 ** (view.stops if view else 0)
     image, current, x = rng.uniform(0.1, 1, (3, *SIZE, 3)) * top
-    loss = Loss(image, rng.random(SIZE), rng.random(SIZE), current, image > 0.6 * top, view)
+    loss = PaintingLoss(image, rng.random(SIZE), rng.random(SIZE), current, image > 0.6 * top, view)
     squares = loss.squares(x)
-    gradient = -2 * loss.importance[..., None] * squares.factor * (squares.image - x)
+    gradient = -2 * squares.weight * (squares.image - x)
     step = 1e-6 * top
     for y, k, c in [(0, 0, 0), (3, 4, 1), (7, 8, 2), (5, 1, 0), (2, 2, 1), (6, 3, 2)]:
         aside = np.zeros_like(x)
@@ -294,20 +290,20 @@ def test_constraints_hold_and_nothing_near_is_better(
     asked = dict(asked)
     constraints = Constraints.of(asked.pop("lights", {}), **asked)
     solution = solve(basis, target, constraints=constraints, view=view)
-    assert solution.quality.converged
+    assert solution.certificate.converged
     w = solution.lighting.weights_for(basis)
     plain = solve(basis, target, constraints=constraints).lighting.weights_for(basis)
     pull = constraints.prefer_current * np.square(basis.images, dtype=np.float64).sum((1, 2))
 
     def value(w: Any) -> float:
-        missed = float(solution.loss.objective(_pictures(basis, w)).sum())
+        missed = float(solution.problem.loss.objective(_pictures(basis, w)).sum())
         return missed + float((pull * np.square(w - basis.present_weights)).sum())
 
     assert value(w) <= value(plain) * (1 + 1e-9)
     if constraints.sparse:
         assert (w.any(axis=1)).sum() <= 2
-        assert solution.quality.curve
-        assert dict(solution.quality.curve)[2] == pytest.approx(
+        assert solution.certificate.curve
+        assert dict(solution.certificate.curve)[2] == pytest.approx(
             np.sqrt(value(w) / solution.norm2.sum()), rel=0.05
         )
     # Any mix of two lightings that constraints allow is allowed, too.
@@ -336,12 +332,12 @@ def test_views_together_are_one_picture(make_basis: Any, view: View | None):
         (second, _target(image[5:], importance[5:])),
     ]
     expected = solve(basis, whole, unpainted=0.2, view=view)
-    found = solve_views(parts, unpainted=0.2, view=view)
+    found = solve(*zip(*parts, strict=True), unpainted=0.2, view=view).views
     w = expected.lighting.weights_for(basis)
     # As exactly as rounds end.
     np.testing.assert_allclose(found[0].lighting.weights_for(first), w, atol=1e-5)
-    together = sum(sum(s.quality.objective) for s in found)
-    assert together == pytest.approx(sum(expected.quality.objective), rel=1e-9)
+    together = sum(sum(s.certificate.objective) for s in found)
+    assert together == pytest.approx(sum(expected.certificate.objective), rel=1e-9)
     M = found[0].equations.M + found[1].equations.M
     np.testing.assert_allclose(M, expected.equations.M, rtol=1e-4)
 
@@ -374,12 +370,10 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
         basis, image, importance = _random(make_basis, seed + 50 * k)
         bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
         targets.append(_target(image, importance + 0.01, top=None if view else 0.6))
-    whole, parts = joint_basis(bases)
-    problems = [problem_of(b, t, view=view) for b, t in zip(parts, targets, strict=True)]
-    joint = solution_of(whole, joint_problem(problems, parts), start=whole.present_weights)
+    joint = solve(bases, targets, view=view)
     told, energies = [], []
-    for b, t, its in zip(parts, targets, parted(joint, problems, parts), strict=True):
-        found = diagnose(b, t, its, whole=(whole, joint))
+    for b, its in zip(bases, joint.views, strict=True):
+        found = diagnose(its)
         free, alone = (_least(its, b, f) for f in (_of_any_sign, lambda A, y: nnls(A, y)[0]))
         energy = _least(its, b, partial(_as_solved, joint, iter(range(3))))
         # Pixels in float32, sums of 72 of them.
@@ -389,7 +383,7 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
         assert found.forbidden == close(alone - free)
         assert found.compromise == close(energy - alone)
         assert found.missed == pytest.approx(
-            np.sqrt(sum(its.quality.objective) / its.norm2.sum()), rel=1e-5
+            np.sqrt(sum(its.certificate.objective) / its.norm2.sum()), rel=1e-5
         )
         told.append(found)
         energies.append(energy)
@@ -409,7 +403,7 @@ def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, view: View
     basis, image, importance = _random(make_basis, 2)
     target = _target(image, importance)
     solution = solve(basis, target, view=view)
-    found = diagnose(basis, target, solution)
+    found = diagnose(solution)
     # As pixels have it in float32, and normal equations in float64.
     assert solution.energy == pytest.approx(found.total, rel=1e-5)
     assert found.lighting_total == pytest.approx(found.total, rel=1e-5)
@@ -421,7 +415,7 @@ def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any)
     nowhere = replace(target, at_least=np.repeat((importance == 0)[..., None], 3, axis=-1))
     assert nowhere.at_least.any()
     a, b = solve(basis, target), solve(basis, nowhere)
-    assert b.loss is None
+    assert b.problem.is_linear
     assert a.lighting == b.lighting
 
 
@@ -446,10 +440,10 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | 
         )
         basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2)
         solution = solve(basis, target, view=view)
-        low, high = error_bars(basis, solution).interval
+        low, high = error_bars(solution).interval
         held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
         off.append(solution.lighting.weights_for(basis) - truth)
-        corrected = correct_noise(basis, solution)
+        corrected = correct_noise(solution)
         corrected_off.append(corrected.lighting.weights_for(basis) - truth)
     assert 0.8 <= np.mean(held) <= 1
     assert np.square(corrected_off).mean() < np.square(off).mean()
@@ -473,18 +467,17 @@ def test_lights_once_chosen_stay_chosen(make_basis: Any, seed: int, view: View |
     solution = solve(basis, target, constraints=asked, view=view)
     w = solution.lighting.weights_for(basis)
     mix = combine(basis, solution.lighting)
-    refined = refine(basis, solution, Estimate(mix.image, 0.5 * mix.half_difference))
-    again = solution_of(basis, solution, start=w)
-    for found in (again, correct_noise(basis, solution), refined):
+    refined = refine(solution, Estimate(mix.image, 0.5 * mix.half_difference))
+    for found in (again(solution, solution.problem), correct_noise(solution), refined):
         v = found.lighting.weights_for(basis)
         assert v.any(axis=1).tolist() == w.any(axis=1).tolist()
         # Noise of 1e-4 moves nothing further, squares that end where the loss does neither.
         np.testing.assert_allclose(v, w, atol=2e-3)
-        assert sum(found.quality.objective) == pytest.approx(
-            sum(solution.quality.objective), rel=1e-4
+        assert sum(found.certificate.objective) == pytest.approx(
+            sum(solution.certificate.objective), rel=1e-4
         )
         assert [count for count, _ in found.tried] == [1, 2, 3, 4]
-        assert found.quality.curve == solution.quality.curve
+        assert found.certificate.curve == solution.certificate.curve
         assert [x.constraint for x in found.lighting.lights] == [
             x.constraint for x in solution.lighting.lights
         ]

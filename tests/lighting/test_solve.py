@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 from lightpaint.errors import ConstraintError, LightingError, SizeError, TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.normal_equations import weighted_problem
+from lightpaint.lighting.painting import squares_of
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -41,6 +41,12 @@ def _seen() -> Any:
     return seen
 
 
+def _weighted(basis: Any, target: Target, *, unpainted: float = 0.0) -> tuple[Any, Any]:
+    """The image and importance that are solved for."""
+    squares = squares_of(basis, target, unpainted=unpainted)
+    return squares.image, squares.weight[..., 0]
+
+
 def _squares(importance: Any, image: Any, basis: Any, w: Any) -> Any:
     residual = image - np.einsum("nhwc,nc->hwc", basis.images.astype(np.float64), w)
     return (importance[..., None] * residual**2).sum(axis=(0, 1))
@@ -51,7 +57,7 @@ def test_one_residual_stands_for_two(make_basis: Any, unpainted: float):
     """Σ a‖Ψ−x‖² + unpainted (1−a)‖current−x‖² and the weighted residual differ by a constant."""
     basis = make_basis(4, SIZE, seen=_seen())
     target = _random_target()
-    image, importance = weighted_problem(basis, target, unpainted=unpainted)
+    image, importance = _weighted(basis, target, unpainted=unpainted)
     current = basis.mix(basis.present_weights)
     a = target.importance.astype(np.float64)
     rest = unpainted * np.where(basis.emitters_seen, 0, np.maximum(1 - a, 0))
@@ -70,7 +76,7 @@ def test_seen_emitters_do_not_count_if_nobody_said_what_does(make_basis: Any):
     basis = make_basis(3, SIZE, seen=_seen())
     target = _target(np.ones((*SIZE, 3)))
     for unpainted in (0.0, 2.0):
-        _, importance = weighted_problem(basis, target, unpainted=unpainted)
+        _, importance = _weighted(basis, target, unpainted=unpainted)
         np.testing.assert_array_equal(importance, np.where(_seen(), 0, 1))
 
 
@@ -78,10 +84,10 @@ def test_seen_emitters_count_where_somebody_painted_them(make_basis: Any):
     basis = make_basis(3, SIZE, seen=_seen())
     painted = np.zeros(SIZE)
     painted[0, 0] = painted[8, 8] = 0.5
-    _, importance = weighted_problem(basis, _target(np.ones((*SIZE, 3)), painted))
+    _, importance = _weighted(basis, _target(np.ones((*SIZE, 3)), painted))
     np.testing.assert_array_equal(importance, painted)
     # What is not painted pulls towards the current look, but not where an emitter is seen.
-    _, importance = weighted_problem(basis, _target(np.ones((*SIZE, 3)), painted), unpainted=4)
+    _, importance = _weighted(basis, _target(np.ones((*SIZE, 3)), painted), unpainted=4)
     np.testing.assert_array_equal(importance, painted + np.where(_seen(), 0, 4 * (1 - painted)))
 
 
@@ -111,8 +117,8 @@ def test_a_known_lighting_comes_back(make_basis: Any, n: int):
     solution = solve(basis, _target(image))
     # The picture is float32: its round-off, 6e-8, times the condition of the basis.
     np.testing.assert_allclose(solution.lighting.weights_for(basis), truth, atol=1e-6)
-    assert solution.quality.converged
-    assert max(solution.quality.relative_objective) < 1e-12
+    assert solution.certificate.converged
+    assert max(solution.certificate.relative_objective) < 1e-12
     np.testing.assert_allclose(combine(basis, solution.lighting).image, image, atol=1e-5)
 
 
@@ -160,7 +166,7 @@ def test_what_reaches_nothing_keeps_the_start(make_basis: Any, asked: Constraint
         solution = solve(basis, _random_target(), start=begin, constraints=asked)
         expected = basis.lights[2].emission if begin is None else (7.0, 7.0, 7.0)
         assert solution.lighting.emission["light 2"] == pytest.approx(expected)
-        assert solution.quality.unreached == ("light 2",)
+        assert solution.certificate.unreached == ("light 2",)
 
 
 def test_a_start_for_other_lights(make_basis: Any):
@@ -176,15 +182,15 @@ def test_a_light_that_reaches_nothing_painted_is_named_and_kept(make_basis: Any)
     painted = np.zeros(SIZE)
     painted[:6] = 1
     solution = solve(basis, _target(np.full((*SIZE, 3), 0.7), painted))
-    assert solution.quality.unreached == ("back",)
+    assert solution.certificate.unreached == ("back",)
     assert solution.lighting.emission["back"] == basis.lights[1].emission
-    assert solution.quality.converged
+    assert solution.certificate.converged
 
 
 def test_a_black_painting_turns_the_lights_off(make_basis: Any):
     solution = solve(make_basis(4, SIZE), _target(np.zeros((*SIZE, 3))))
     assert all(rgb == (0, 0, 0) for rgb in solution.lighting.emission.values())
-    assert solution.quality.objective == solution.quality.relative_objective == (0, 0, 0)
+    assert solution.certificate.objective == solution.certificate.relative_objective == (0, 0, 0)
 
 
 def test_quality_tells_the_objective_of_the_answer(make_basis: Any):
@@ -194,8 +200,8 @@ def test_quality_tells_the_objective_of_the_answer(make_basis: Any):
     expected = _squares(target.importance, target.image, basis, w)
     norm2 = (target.importance[..., None] * np.square(target.image, dtype=float)).sum(axis=(0, 1))
     # float64 sums over some hundred pixels.
-    np.testing.assert_allclose(solution.quality.objective, expected, rtol=1e-10)
-    np.testing.assert_allclose(solution.quality.relative_objective, expected / norm2, rtol=1e-6)
+    np.testing.assert_allclose(solution.certificate.objective, expected, rtol=1e-10)
+    np.testing.assert_allclose(solution.certificate.relative_objective, expected / norm2, rtol=1e-6)
     assert solution.lighting.target == "painted"
     assert solution.lighting.scene_identity == basis.origin.scene_identity
 
@@ -212,7 +218,7 @@ def test_mixing_copies_no_basis(make_basis: Any):
         mixed = basis.mix(basis.present_weights)
         _, mixing = tracemalloc.get_traced_memory()
         tracemalloc.reset_peak()
-        weighted_problem(basis, target, unpainted=1.0)
+        squares_of(basis, target, unpainted=1.0)
         _, weighting = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -257,7 +263,7 @@ def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
     weights = solution.lighting.weights_for(basis)
     assert (weights[fixed] == 1).all()
     assert solution.lighting.fixed == {basis.names[k] for k in fixed}
-    assert solution.quality.converged
+    assert solution.certificate.converged
 
     free = [k for k in range(n) if k not in fixed]
     root = np.sqrt(target.importance.astype(np.float64)).ravel()
@@ -267,7 +273,7 @@ def test_what_is_kept_leaves_scipy_the_rest_of_the_target(
         expected, norm = nnls(columns[free].T, left)
         # The solver stops at a KKT residual of 1e-10 of a problem that is well conditioned.
         np.testing.assert_allclose(weights[free, c], expected, atol=1e-7)
-        assert solution.quality.objective[c] == pytest.approx(norm**2, rel=1e-9)
+        assert solution.certificate.objective[c] == pytest.approx(norm**2, rel=1e-9)
 
 
 @pytest.mark.parametrize("unpainted", [0.0, 0.3])
@@ -294,7 +300,7 @@ def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
     assert black.weights_for(basis).tolist() == [[1, 1, 1], [0, 0, 0], [1, 1, 1]]
     alone = _with_fixed(make_basis(2, SIZE), [0, 1])
     everything = solve(alone, _random_target())
-    assert everything.quality.converged
+    assert everything.certificate.converged
     assert (everything.lighting.weights_for(alone) == 1).all()
     with pytest.raises(LightingError, match="kept as it is, so its emission is 1 1 1"):
         black.with_emission(basis.names[0], (2, 2, 2))

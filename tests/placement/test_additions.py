@@ -33,7 +33,7 @@ def _problem(make_basis: Any, seed: int, n: int = 3, m: int = 4) -> tuple[Any, A
 
 
 def _missed(basis: Any, target: Target, constraints: Any = None) -> float:
-    return sum(solve(basis, target, constraints=constraints).quality.objective)
+    return sum(solve(basis, target, constraints=constraints).certificate.objective)
 
 
 def _joined(basis: Any, added: Any, chosen: list[int]) -> Any:
@@ -58,7 +58,7 @@ def test_the_gains_are_those_of_the_full_solve(make_basis: Any, seed: int):
         chosen.append(addition.candidate)
         joined = _joined(basis, added, chosen)
         solution = solve(joined, target)
-        left = sum(solution.quality.objective)
+        left = sum(solution.certificate.objective)
         # Sums over float32 pixels.
         assert addition.gain == pytest.approx(before - left, rel=1e-4, abs=1e-6 * before)
         np.testing.assert_allclose(
@@ -87,7 +87,7 @@ def test_constraints_hold_for_the_lights_there_are(make_basis: Any, asked: Any):
     named = {n: asked.get(n, asked.get("*", {})) for n in basis.names}
     named = {n: wish for n, wish in named.items() if wish}
     full = solve(joined, target, constraints=Constraints.of(named))
-    gain = sum(solution.quality.objective) - sum(full.quality.objective)
+    gain = sum(solution.certificate.objective) - sum(full.certificate.objective)
     assert found.gain == pytest.approx(gain, rel=1e-4)
     np.testing.assert_allclose(
         found.weights, full.lighting.weights_for(joined), atol=1e-5, rtol=1e-4
@@ -153,7 +153,7 @@ def test_noise_alone_gains_nothing(make_basis: Any):
         target = _target(images.sum(axis=0))
         solution = solve(basis, target)
         candidates = Candidates.of(basis, solution, added)
-        least = 0.01 * sum(solution.quality.objective)
+        least = 0.01 * sum(solution.certificate.objective)
         offered += len(find_additions(candidates, count=1, least=least))
     # Of 40 tries with 20 candidates each; at 3 standard errors hardly any.
     assert offered <= 2

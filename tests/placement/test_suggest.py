@@ -84,7 +84,7 @@ def test_a_light_that_is_missing_is_found(tmp_path: Path, hidden: Any):
     with_it = tmp_path / "pasted.xml"
     with_it.write_text(pasted, encoding="utf-8")
     _, _, again = _solved(with_it, target)
-    left = sum(again.quality.objective) / sum(solution.quality.objective)
+    left = sum(again.certificate.objective) / sum(solution.certificate.objective)
     assert left == pytest.approx(first.missed_share, abs=0.05)
     np.testing.assert_allclose(again.lighting.emission[first.name], first.emission, rtol=0.15)
     # The same again for the same seed.
@@ -123,7 +123,7 @@ def test_noise_is_not_taken_for_a_lack_of_light(tmp_path: Path, seed: int):
     basis = render_basis(scene, spp=4)
     painted = render_basis(scene, spp=4, seed=seed)
     solution = solve(basis, _target(painted.mix(painted.present_weights)))
-    missed = sum(solution.quality.objective) / solution.equations.target_norm2.sum()
+    missed = sum(solution.certificate.objective) / solution.equations.target_norm2.sum()
     assert missed > 0.01**2  # else it would not look at all
     assert suggest_lights(scene, basis, solution) == ()
 

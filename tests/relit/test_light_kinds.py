@@ -161,7 +161,7 @@ def test_a_light_with_one_weight_keeps_its_colour(assets: Path) -> None:
     r, g, b = solution.lighting.emission["it"]
     assert r == g == b
     assert 0 < r < 1
-    assert solution.quality.converged
+    assert solution.certificate.converged
 
 
 CHECKERS = """<shape type="rectangle" id="it"><emitter type="area">

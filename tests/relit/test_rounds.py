@@ -43,13 +43,13 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
     for seed in range(SEEDS):
         basis = lp.render_basis(scene, spp=16, seed=seed)
         plain = solve(basis, target)
-        found = {"plain": plain, "corrected": correct_noise(basis, plain)}
+        found = {"plain": plain, "corrected": correct_noise(plain)}
         if seed < REFINED:
             found["refined"] = refine_by_rendering(
                 [(scene, basis)], basis, plain, rounds=1, seed=seed
             )
         for name, solution in found.items():
-            low, high = error_bars(basis, solution).interval
+            low, high = error_bars(solution).interval
             inside = (low <= truth + 1e-12) & (truth <= high + 1e-12)
             held.setdefault(name, []).append(float(inside.mean()))
             w = solution.lighting.weights_for(basis)
@@ -58,7 +58,7 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
         assert len(held[name]) == SEEDS
         assert 0.85 <= np.mean(held[name]) <= 0.99, name
     assert np.mean(held["refined"]) >= 0.85
-    least = sum(best.quality.objective)
+    least = sum(best.certificate.objective)
     # Of the same seeds.
     excess = {name: np.mean(values[:REFINED]) - least for name, values in objective.items()}
     assert excess["refined"] < 0.9 * excess["plain"]
@@ -79,7 +79,7 @@ def test_a_refined_look_is_verified_and_tells_its_errors(
     tmp_path: Path, scene: lp.Scene, target: lp.Target
 ):
     look = lp.paint_with_light(scene, target, tmp_path, spp=16, refine=1, use_cache=False)
-    assert look.solution.refinement is not None
+    assert look.solution.problem.refinement is not None
     assert look.verification is not None
     assert look.verification.agrees
     written = lp.read_lighting(tmp_path / "lighting.json")

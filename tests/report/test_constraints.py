@@ -1,17 +1,16 @@
 """What the report shows of the cost of constraints."""
 
 import re
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from lightpaint.colour.view import View
+from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.lighting.views import solve_views
 from lightpaint.report.constraints import constraints_section
 from lightpaint.target.target import Target
 
@@ -26,12 +25,12 @@ def _solved(make_basis: Any, constraints: Constraints | None, n: int = 5) -> Any
 
 
 def _missed(solution: Any) -> float:
-    quality = solution.quality
+    quality = solution.certificate
     return float(np.sqrt(sum(quality.objective) / solution.equations.target_norm2.sum()))
 
 
 def _section(basis: Any, target: Target, solution: Any) -> str:
-    return constraints_section(basis, solution, view=View())
+    return constraints_section(basis, solution, without_constraints(solution), view=View())
 
 
 def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:
@@ -47,15 +46,16 @@ def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:
     pictures = re.findall(r'src="(data:[^"]*)"', page)
     assert pictures[0] != pictures[1]
     # Of an answer with the noise taken out it is asked of the same equations.
-    assert "Without constraints" in _section(basis, target, correct_noise(basis, solution))
+    assert "Without constraints" in _section(basis, target, correct_noise(solution))
 
 
 def test_without_constraints_there_is_nothing_to_show(make_basis: Any) -> None:
     basis, target, solution = _solved(make_basis, None)
     assert _section(basis, target, solution) == ""
-    assert _section(basis, target, replace(solution, constraints=Constraints())) == ""
+    empty = solve(basis, target, constraints=Constraints())
+    assert _section(basis, target, empty) == ""
     constraints = Constraints.of({"light 1": {"off": True}})
-    one, _ = solve_views([(basis, target), (basis, target)], constraints=constraints)
+    one, _ = solve([basis, basis], [target, target], constraints=constraints).views
     assert _section(basis, target, one) == ""
 
 
@@ -68,8 +68,8 @@ def test_what_fewer_and_more_lights_would_miss(
     shown = [int(count) for count in re.findall(r"<strong>With (\d) lights?", page)]
     assert shown == around
     assert f"{sparse} light{'' if sparse == 1 else 's'}, as asked" in page
-    assert page.count("<tr>") == 1 + len(solution.quality.curve) + 1
-    for count, missed in solution.quality.curve:
+    assert page.count("<tr>") == 1 + len(solution.certificate.curve) + 1
+    for count, missed in solution.certificate.curve:
         assert f"{count} light" in page
         assert f"{100 * missed:.0f} %" in page
 

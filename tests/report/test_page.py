@@ -238,18 +238,18 @@ def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
     assert "×1.5" in key
     assert "off" in fill
     assert "0.0 %" in fill
-    assert result["solution"].quality.unreached == ("back",)
+    assert result["solution"].certificate.unreached == ("back",)
     assert "unchanged: reaches nothing painted" in back
     assert "back (kept as they are)" in body
 
 
 def test_the_numbers_are_there(make_basis: Any):
     result = _result(make_basis)
-    quality, checked = result["solution"].quality, result["verification"]
+    its, checked = result["solution"].certificate, result["verification"]
     text = Page(report_page(**result)).text("main")
     for number in (
-        *(f"{value:.3g}" for value in quality.relative_objective),
-        *(f"{value:.1e}" for value in quality.kkt_residual),
+        *(f"{value:.3g}" for value in its.relative_objective),
+        *(f"{value:.1e}" for value in its.kkt_residual),
         f"{checked.rmse:.3g}; noise alone gives {checked.noise_rmse:.3g}",
         f"{checked.z_rms:.3f}; about 1 is noise",
         f"mean {checked.delta_e_mean:.2f}; 95 % of pixels below {checked.delta_e_95:.2f}",

@@ -33,7 +33,7 @@ def _solved(make_basis: Any, **options: Any) -> Any:
     image = np.random.default_rng(1).random((*SIZE, 3)).astype(np.float32)
     target = Target("t", image, np.ones(SIZE, np.float32), everything=False)
     solution = solve(basis, target)
-    return basis, solution, error_bars(basis, solution), diagnose(basis, target, solution)
+    return basis, solution, error_bars(solution), diagnose(solution)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ them, and three channels in one call hardly more than one.
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
+from lightpaint.lighting.algebra.nearest import is_suspect
 from lightpaint.lighting.algebra.quadratic import EPSILON, kkt_step
 
 #: Times √n, added to the unit diagonal of M, so that no set of lights, coincident ones
@@ -30,15 +31,17 @@ def clipped_newton(
     size: Doubles,
     *,
     tolerance: float,
-) -> tuple[Doubles, Doubles, int]:
+) -> tuple[Doubles, Doubles, int, bool]:
     """Minimise ½ xᵀM x − bᵀx, lower <= x <= upper, for each of c problems.
 
     M: (c, n, n), scaled to a unit diagonal, with rows of 0 where an unknown changes nothing;
     b, lower, upper: (c, n), or one bound for all. x: (c, n), between the bounds, to begin with.
     size: (c,), what the KKT residuals are relative to.
-    Returns x, to the last bit at the bounds that hold it, the KKT residuals, (c,), and how many
-    steps were taken. Where a residual is more than `tolerance`, x is of no use.
+    Returns x, to the last bit at the bounds that hold it, the KKT residuals, (c,), how many steps
+    were taken, and whether the last was of a matrix that may be singular: there are then other x
+    that are as good (see nearest.py). Where a residual is more than `tolerance`, x is of no use.
     """
+    matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
     for step in range(MAX_STEPS + 1):
         gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b
         residual = np.abs(kkt_step(gradient, x, lower, upper)).max(axis=1, initial=0) / size
@@ -47,13 +50,13 @@ def clipped_newton(
             break
         stays = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
         # Problems that are solved stay as they are, whatever the others still need.
-        move = _newton(M, gradient, ~stays & is_open[:, None])
+        move, matrix = _newton(M, gradient, counts & ~stays & is_open[:, None])
         x = np.minimum(np.maximum(x + move, lower), upper)
-    return x, residual, step
+    return x, residual, step, is_suspect(matrix)
 
 
-def _newton(M: Doubles, gradient: Doubles, free: Bools) -> Doubles:
-    """The steps to the optima of the free unknowns, (c, n); 0 for the others."""
+def _newton(M: Doubles, gradient: Doubles, free: Bools) -> tuple[Doubles, Doubles]:
+    """Steps to the optima of the free unknowns, (c, n), 0 for the others, and their matrices."""
     # All matrices are of those unknowns that are free in any problem. What is not free there
     # has a row of the identity, which moves nothing.
     rows = np.flatnonzero(free.any(axis=0))
@@ -65,4 +68,4 @@ def _newton(M: Doubles, gradient: Doubles, free: Bools) -> Doubles:
     right = np.where(here, -gradient[:, rows], 0)
     move = np.zeros_like(gradient)
     move[:, rows] = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
-    return move
+    return move, matrix

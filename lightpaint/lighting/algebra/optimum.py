@@ -9,15 +9,20 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.algebra.active_set import polish
+from lightpaint.lighting.algebra.capped_newton import capped_newton
 from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
-from lightpaint.lighting.algebra.quadratic import Cap, Quadratic, scaled
-from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.lighting.algebra.nearest import nearest_equal
+from lightpaint.lighting.algebra.quadratic import UNREACHED, Cap, Quadratic, scaled
+from lightpaint.lighting.algebra.threads import one_thread, side_by_side
 
-__all__ = ["Cap", "Method", "Optimum", "minimise"]
+__all__ = ["Cap", "Method", "Optimum", "minimise", "minimise_each"]
 
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]
+
+#: Unknowns up to which several problems are solved in the same calls; beyond, each on a thread.
+FEW = 64
 
 #: Sweeps before a polish is tried again, if one did not do.
 SWEEPS_BETWEEN = 50
@@ -70,9 +75,9 @@ def minimise(
     to 0 by default. max_sweeps: the limit of Gauss–Seidel passes; running out of them is a
     result.
 
-    If M is singular, as with two lights at one place, many x are optimal. The polish leaves
-    directions in which nothing changes as they are at `start`, so that the answer stays near it;
-    which one it is, is not promised. Unknowns with M_ii = 0 keep their start.
+    If M is singular, as with two lights at one place, many x are optimal: the answer is near
+    `start` (nearest.py), but which one it is, is not promised. Unknowns with M_ii = 0 keep their
+    start.
 
     Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """
@@ -84,9 +89,14 @@ def minimise(
         dark = q.feasible(np.where(np.diag(q.M) > 0, 0.0, x))
         x = dark if q.violations(dark)[2] == 0 else x
     by_method = _by_sweeps if method == "gauss-seidel" else _polished
+    start_at = x
     with one_thread():
         x, sweeps, steps = by_method(q, x, tolerance, max_sweeps)
         left, multipliers, residual = q.violations(x)
+        if steps and (near := nearest_equal(q, x, start_at)) is not x:
+            there = q.violations(near)
+            if there[2] <= max(tolerance, residual):
+                x, (left, multipliers, residual) = near, there
     return Optimum(
         _unscaled(q, x, lower, upper),
         left / q.scale,
@@ -98,14 +108,102 @@ def minimise(
     )
 
 
+def minimise_each(
+    M: Doubles,
+    b: Doubles,
+    *,
+    lower: Doubles,
+    upper: Doubles,
+    start: Doubles,
+    method: Method = "polished",
+    tolerance: float = 1e-12,
+    max_sweeps: int = 20_000,
+) -> list[Optimum]:
+    """`minimise` for each of c problems of one size, without caps.
+
+    M: (c, n, n); b, lower, upper, start: (c, n). For few unknowns numpy's calls cost more than
+    the arithmetic in them, so that all are solved by the same calls; many are solved side by side.
+    """
+    count, n = b.shape
+    found: dict[int, Optimum] = {}
+    if n <= FEW and method == "polished" and max_sweeps > 0:
+        found = _at_once(M, b, lower, upper, start, tolerance)
+
+    def solve(c: int) -> Optimum:
+        return minimise(
+            M[c],
+            b[c],
+            lower=lower[c],
+            upper=upper[c],
+            start=start[c],
+            method=method,
+            tolerance=tolerance,
+            max_sweeps=max_sweeps,
+        )
+
+    left = [c for c in range(count) if c not in found]
+    solved = side_by_side(solve, left) if n > FEW and len(left) > 1 else map(solve, left)
+    found.update(zip(left, solved, strict=True))
+    return [found[c] for c in range(count)]
+
+
+def _at_once(
+    M: Doubles, b: Doubles, lower: Doubles, upper: Doubles, start: Doubles, tolerance: float
+) -> dict[int, Optimum]:
+    """Those of the problems that clipped steps solve. Arguments as of `minimise_each`."""
+    power = np.einsum("cii->ci", M)
+    counts = power > UNREACHED * power.max(axis=1, keepdims=True, initial=0)
+    # A problem in which nothing asks for light has an answer that takes no steps.
+    asks = np.any((b > 0) & counts, axis=1)
+    if not (asks.any() and np.isfinite(M).all() and np.isfinite(b).all()):
+        return {}
+    # What changes nothing is left out: the others then have the bits that they have without it.
+    rows = np.flatnonzero(counts.any(axis=0))
+    if rows.size < counts.shape[1]:
+        M, b, counts = np.ascontiguousarray(M[:, rows][:, :, rows]), b[:, rows], counts[:, rows]
+        power = power[:, rows]
+    its = counts & asks[:, None]
+    root = np.sqrt(np.where(its, power, 1))
+    scale = np.where(its, 1 / root, 0)
+    M, b = (M * scale[:, :, None]) * scale[:, None, :], b * scale
+    low, high = lower[:, rows] * root, upper[:, rows] * root
+    size = np.abs(b).max(axis=1)
+    if low.any():
+        pull = np.matmul(M, np.clip(0, low, high)[:, :, None])[:, :, 0]
+        size = np.maximum(size, np.abs(pull).max(axis=1))
+    size = np.where(asks, size, 1)
+    begin = np.where(its, np.minimum(np.maximum(start[:, rows] * root, low), high), 0)
+    with one_thread():
+        x, residuals, steps, is_singular = clipped_newton(
+            M, b, low, high, begin, size, tolerance=tolerance
+        )
+        if is_singular:
+            return {}
+        gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b
+    value = np.where(x <= low, lower[:, rows], x * scale)
+    value = np.where(x >= high, upper[:, rows], value)
+    found, none = {}, np.zeros(0)
+    for c in np.flatnonzero(asks & (residuals <= tolerance)).tolist():
+        answer = np.clip(start[c], lower[c], upper[c])
+        answer[rows] = np.where(counts[c], value[c], answer[rows])
+        multipliers = np.zeros(answer.size)
+        multipliers[rows] = gradient[c] * root[c]
+        found[c] = Optimum(answer, multipliers, none, float(residuals[c]), 0, steps, tolerance)
+    return found
+
+
 def _polished(
     q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int
 ) -> tuple[Doubles, int, int]:
     """(x, sweeps, steps): Newton's clipped steps, or else the polish with sweeps between tries."""
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
-    if residual > tolerance and max_sweeps > 0 and not q.groups:
-        trial, left, steps = clipped_newton(
+    if residual > tolerance and max_sweeps > 0 and q.groups:
+        found, kkt, steps = capped_newton(q, x, tolerance=tolerance)
+        if kkt <= tolerance and q.violations(found)[2] <= tolerance:
+            return found, 0, steps
+    elif residual > tolerance and max_sweeps > 0:
+        trial, left, steps, _ = clipped_newton(
             q.M[None],
             q.b[None],
             q.lower[None],

@@ -62,11 +62,14 @@ class Quadratic:
     def feasible(self, x: Doubles) -> Doubles:
         """The nearest point to x that keeps to all bounds and caps."""
         x = np.clip(x, self.lower, self.upper)
-        for k, group in enumerate(self.groups):
-            a, low, high = self.A[k, group], self.lower[group], self.upper[group]
-            wanted = min(max(float(a @ x[group]), self.cap_lower[k]), self.cap_upper[k])
-            if wanted != float(a @ x[group]):
-                x[group] = _moved_along(a, x[group], low, high, wanted)
+        value = self.A @ x
+        wanted = np.minimum(np.maximum(value, self.cap_lower), self.cap_upper)
+        out = np.flatnonzero(value != wanted)
+        for size in {self.groups[k].size for k in out}:
+            caps = np.array([k for k in out if self.groups[k].size == size])
+            its = np.stack([self.groups[k] for k in caps])
+            low, high = self.lower[its], self.upper[its]
+            x[its] = moved_along(self.A[caps[:, None], its], x[its], low, high, wanted[caps])
         return x
 
     def caps_met(self, x: Doubles) -> tuple[Bools, Bools]:
@@ -85,23 +88,21 @@ class Quadratic:
         if not self.groups:
             return multipliers
         at_lower, at_upper = self.caps_met(x)
-        for k in np.flatnonzero(at_lower | at_upper):
+        low, high = x <= self.lower, x >= self.upper
+        between = self.A * (~low & ~high)
+        weight = np.einsum("kn,kn->k", between, between)
+        met = at_lower | at_upper
+        free = met & (weight > 0)
+        multipliers[free] = (between[free] @ gradient) / weight[free]
+        for k in np.flatnonzero(met & ~free):
+            # Any λ between these serves; the smallest is taken.
             group = self.groups[k]
-            a, values = self.A[k, group], gradient[group] / self.A[k, group]
-            low, high = x[group] <= self.lower[group], x[group] >= self.upper[group]
-            between = ~low & ~high
-            if between.any():
-                value = float(np.sum((a * a * values)[between]) / np.sum((a * a)[between]))
-            else:
-                # Any λ between these serves; the smallest is taken.
-                least = float(values[high & ~low].max(initial=-np.inf))
-                most = float(values[low & ~high].min(initial=np.inf))
-                value = min(max(0.0, least), most) if least <= most else (least + most) / 2
-            if not at_lower[k]:
-                value = min(value, 0.0)
-            if not at_upper[k]:
-                value = max(value, 0.0)
-            multipliers[k] = value
+            values = gradient[group] / self.A[k, group]
+            least = float(values[high[group] & ~low[group]].max(initial=-np.inf))
+            most = float(values[low[group] & ~high[group]].min(initial=np.inf))
+            multipliers[k] = min(max(0.0, least), most) if least <= most else (least + most) / 2
+        multipliers = np.where(at_lower, multipliers, np.minimum(multipliers, 0.0))
+        multipliers = np.where(at_upper, multipliers, np.maximum(multipliers, 0.0))
         return multipliers
 
     def violations(self, x: Doubles) -> tuple[Doubles, Doubles, float]:
@@ -187,46 +188,55 @@ def _scaled_caps(
     caps: tuple[Cap, ...], scale: Doubles, low: Doubles, high: Doubles
 ) -> tuple[Doubles, Doubles, Doubles, Doubles, list[Indices]]:
     A = np.zeros((len(caps), scale.size))
-    cap_lower, cap_upper, cap_scale = np.zeros((3, len(caps)))
-    groups: list[Indices] = []
-    for k, cap in enumerate(caps):
-        group = np.array(cap.unknowns, dtype=np.intp)
-        coefficients = np.array(cap.coefficients, dtype=np.float64)
-        if not (group.size and group.shape == coefficients.shape and (coefficients > 0).all()):
+    groups = [np.array(cap.unknowns, dtype=np.intp) for cap in caps]
+    for k, (cap, group) in enumerate(zip(caps, groups, strict=True)):
+        count = len(cap.coefficients)
+        if not (group.size == count > 0 and min(cap.coefficients) > 0):
             raise ValueError(f"cap {k} needs one coefficient > 0 for each of its unknowns: {cap}")
-        if len({*group.tolist()}) < group.size or A[:, group].any():
+        if len({*cap.unknowns}) < count or A[:, group].any():
             raise ValueError(f"cap {k} shares an unknown with itself or another: {cap}")
-        coefficients = coefficients * scale[group]
-        length = float(np.linalg.norm(coefficients))
-        A[k, group] = coefficients / length
-        cap_lower[k], cap_upper[k], cap_scale[k] = cap.lower / length, cap.upper / length, length
-        least, most = float(A[k, group] @ low[group]), float(A[k, group] @ high[group])
-        limits = np.array([least, most, cap_lower[k], cap_upper[k]])
-        room = 16 * EPSILON * float(np.abs(limits[np.isfinite(limits)]).max(initial=0))
-        if cap.lower > cap.upper or least > cap_upper[k] + room or most < cap_lower[k] - room:
-            raise ValueError(
-                f"cap {k} asks for {cap.lower:g} to {cap.upper:g}, and the bounds of its unknowns "
-                f"allow {least * length:g} to {most * length:g}: nothing satisfies both"
-            )
-        groups.append(group)
-    return A, cap_lower, cap_upper, cap_scale, groups
+        A[k, group] = cap.coefficients
+    A *= scale
+    length = np.sqrt(np.einsum("kn,kn->k", A, A))
+    A /= length[:, None]
+    cap_lower, cap_upper = (
+        np.array([getattr(cap, end) for cap in caps], np.float64) / length
+        for end in ("lower", "upper")
+    )
+    # Where a cap has no part, no bound counts, were it infinite.
+    least, most = (np.where(A > 0, A * np.where(A > 0, x, 0), 0).sum(axis=1) for x in (low, high))
+    limits = np.stack([least, most, cap_lower, cap_upper])
+    room = 16 * EPSILON * np.abs(np.where(np.isfinite(limits), limits, 0)).max(axis=0, initial=0)
+    cannot = (cap_lower > cap_upper) | (least > cap_upper + room) | (most < cap_lower - room)
+    for k in np.flatnonzero(cannot).tolist():
+        raise ValueError(
+            f"cap {k} asks for {caps[k].lower:g} to {caps[k].upper:g}, and the bounds of its "
+            f"unknowns allow {least[k] * length[k]:g} to {most[k] * length[k]:g}: nothing "
+            "satisfies both"
+        )
+    return A, cap_lower, cap_upper, length, groups
 
 
-def _moved_along(a: Doubles, x: Doubles, low: Doubles, high: Doubles, wanted: float) -> Doubles:
-    """clip(x + t a) with the t for which a · clip(x + t a) is `wanted`, by its breakpoints."""
-    ends = np.concatenate([(low - x) / a, (high - x) / a])
-    ends = np.sort(ends[np.isfinite(ends)])
-    values = np.array([float(a @ np.clip(x + t * a, low, high)) for t in ends])
-    after = int(np.searchsorted(values, wanted))
-    # Between two breakpoints the value is linear in t; the slope is of those still free to move.
-    if ends.size == 0:
-        t = (wanted - float(a @ x)) / float(a @ a)
-    elif 0 < after < ends.size:
-        t0, t1, v0, v1 = ends[after - 1], ends[after], values[after - 1], values[after]
-        t = t1 if v1 == v0 else t0 + (t1 - t0) * (wanted - v0) / (v1 - v0)
-    else:
-        end = 0 if after == 0 else -1
-        beyond = ends[end] + (-1.0 if after == 0 else 1.0)
-        slope = abs(float(a @ np.clip(x + beyond * a, low, high)) - values[end])
-        t = ends[end] + (0 if slope == 0 else (wanted - values[end]) / slope)
-    return np.asarray(np.clip(x + t * a, low, high))
+def moved_along(a: Doubles, x: Doubles, low: Doubles, high: Doubles, wanted: Doubles) -> Doubles:
+    """clip(x + t a) with the t for which a · clip(x + t a) is `wanted`, for each of k rows.
+
+    a, x, low, high: (k, m), a > 0; wanted: (k,). The sum rises with t, in a straight line between
+    the t at which an unknown comes to a bound.
+    """
+    ends = np.sort(np.concatenate([(low - x) / a, (high - x) / a], axis=1), axis=1)
+    at_ends = x[:, None] + ends[..., None] * a[:, None]
+    sums = np.einsum("km,kem->ke", a, np.clip(at_ends, low[:, None], high[:, None]))
+    after = (sums < wanted[:, None]).sum(axis=1)
+    walls = np.pad(ends, ((0, 0), (1, 1)), constant_values=((0, 0), (-np.inf, np.inf)))
+    rows = np.arange(len(a))
+    first, last = walls[rows, after], walls[rows, after + 1]
+    # Some t between the two that the answer lies between.
+    least, most = (np.where(np.isfinite(end), end, 0) for end in (first, last))
+    some = (least + most) / 2
+    some = np.where(np.isfinite(last), some, least + 1)
+    some = np.where(np.isfinite(first), some, np.where(np.isfinite(last), most - 1, 0))
+    there = x + some[:, None] * a
+    slope = (np.square(a) * ((there > low) & (there < high))).sum(axis=1)
+    short = wanted - (a * np.clip(there, low, high)).sum(axis=1)
+    t = np.clip(some + short / np.where(slope > 0, slope, np.inf), first, last)
+    return np.asarray(np.clip(x + t[:, None] * a, low, high))

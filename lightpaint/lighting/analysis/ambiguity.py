@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.basis.basis import Basis
 from lightpaint.lighting.algebra.quadratic import UNREACHED
-from lightpaint.lighting.solve import Solution
+from lightpaint.lighting.solution import Solution
 
 #: Two images are taken for one if their normalised inner product is above 1 − ALIKE, and
 #: several make up for each other if what is left of a mix of them is below that share.
@@ -49,11 +48,12 @@ class Ambiguity:
         )
 
 
-def ambiguities(basis: Basis, solution: Solution) -> tuple[Ambiguity, ...]:
-    """The lights of `basis` that the painting cannot tell apart, as far as its noise lets see.
+def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
+    """The lights that the painting cannot tell apart, as far as its noise lets see.
 
     Noise makes the images of two lights at one place differ: by its share of their power.
     """
+    basis = solution.basis
     free = np.flatnonzero(~basis.is_fixed)
     noise, power = (
         np.square(images[free], dtype=np.float64).sum(axis=(1, 2, 3))

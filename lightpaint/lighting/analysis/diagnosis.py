@@ -17,15 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
-from lightpaint.lighting.analysis.directions import block_diagonal, columns, unknown_groups
+from lightpaint.lighting.analysis.directions import all_columns, block_diagonal
 from lightpaint.lighting.analysis.noise import pseudo_inverse
 from lightpaint.lighting.analysis.release import bounds_of
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import combine
-from lightpaint.lighting.solve import Solution, solution_of
-from lightpaint.target.target import Target
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import again
 
 #: Blocks along each side of the image over which it is asked where light is missing, and
 #: regions that are spoken of: left, middle, right.
@@ -95,22 +94,15 @@ class Diagnosis:
         return part / self.total if self.total > 0 else 0.0
 
 
-def diagnose(
-    basis: Basis,
-    target: Target,
-    solution: Solution,
-    *,
-    whole: tuple[Basis, Solution] | None = None,
-) -> Diagnosis:
-    """Split what `solution` misses of `target`. Raises SizeError if they differ in size.
+def diagnose(solution: Solution) -> Diagnosis:
+    """Split what `solution`, of one view, misses of its target.
 
-    whole: of one of several views, the joint basis and its solution: what holds the lights does
-    so in all views together.
+    Of one of several views, what holds the lights does so in all views together.
     """
-    target = target.fitted_to(basis.size, resize=False)
-    weights = solution.lighting.weights_for(basis)
+    basis, loss, weights = solution.basis, solution.problem.loss, solution.weights
+    [target] = solution.problem.views.targets
     predicted = combine(basis, solution.lighting)
-    free = of_any_sign(basis, solution)
+    free = of_any_sign(solution)
     D = solution.weight.astype(np.float64)
     missed = solution.image.astype(np.float64) - predicted.image
     # The difference of two mixes, so that both maps add up to what is missed, to the bit.
@@ -124,9 +116,10 @@ def diagnose(
     # Where nothing was painted no colour is missed either.
     uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
     outside = target.image.astype(np.float64) - predicted.image
-    seen = outside if solution.loss is None else solution.loss.missed(predicted.image)
-    compromise = min(_given_up(basis, solution, weights), total - out_of_reach)
-    bounds, left_out = bounds_of(*(whole or (basis, solution)))
+    seen = outside if solution.problem.is_linear else loss.missed(predicted.image)
+    compromise = min(_given_up(solution), total - out_of_reach)
+    whole = solution.whole or solution
+    bounds, left_out = bounds_of(whole)
     return Diagnosis(
         total=total,
         unreachable=out_of_reach - noise,
@@ -139,8 +132,8 @@ def diagnose(
         ignored_map=uncounted * luminance(outside),
         bounds=bounds,
         bounds_left_out=left_out,
-        lighting_total=total if whole is None else whole[1].energy,
-        is_constrained=bool(solution.constraints),
+        lighting_total=total if whole is solution else whole.energy,
+        is_constrained=bool(solution.problem.constraints),
         compromise=compromise,
         place=_place(solution, unreachable) if out_of_reach > noise else None,
     )
@@ -149,37 +142,35 @@ def diagnose(
 def _relative(solution: Solution, D: Floats, total: float) -> float:
     """What is missed relative to the painting, root mean square."""
     norm2 = float((D * np.square(solution.image, dtype=np.float64)).sum())
-    if solution.loss is not None:
-        total, norm2 = sum(solution.quality.objective), float(solution.norm2.sum())
+    if not solution.problem.is_linear:
+        total, norm2 = sum(solution.certificate.objective), float(solution.norm2.sum())
     return float(np.sqrt(total / norm2)) if norm2 > 0 else 0.0
 
 
-def _given_up(basis: Basis, solution: Solution, weights: Doubles) -> float:
+def _given_up(solution: Solution) -> float:
     """By how much the energy of this view exceeds that of the best lighting for it alone.
 
     After reweighting, both of the same squares: the loss itself is on another scale.
     """
-    if not solution.is_one_of_several:
+    if solution.whole is None:
         return 0.0
-    alone = solution_of(basis, solution, start=weights)
+    alone = again(solution, solution.problem)
     return max(solution.energy - alone.energy, 0.0)
 
 
 def with_diagnosis(solution: Solution, diagnosis: Diagnosis) -> Solution:
-    """`solution` whose quality has the bounds, for lighting.json."""
-    quality = replace(solution.quality, bounds=diagnosis.bounds)
-    return replace(solution, lighting=replace(solution.lighting, quality=quality))
+    """`solution` whose certificate has the bounds, for lighting.json."""
+    certificate = replace(solution.certificate, bounds=diagnosis.bounds)
+    return replace(solution, lighting=solution.lighting.with_certificate(certificate))
 
 
-def of_any_sign(basis: Basis, solution: Solution) -> Doubles:
+def of_any_sign(solution: Solution) -> Doubles:
     """The weights (n, 3) that come closest if they may be negative; kept lights stay at 1."""
-    equations = solution.equations
-    weights = solution.lighting.weights_for(basis)
-    for unknowns in unknown_groups(basis, equations):
-        to = columns(unknowns, len(weights))
+    equations, weights = solution.equations, solution.weights
+    whole = block_diagonal(equations.M)
+    for to in all_columns(solution):
         gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
-        M = to.T @ block_diagonal(equations.M) @ to
-        step = to @ pseudo_inverse(M) @ (to.T @ gradient.ravel())
+        step = to @ pseudo_inverse(to.T @ whole @ to) @ (to.T @ gradient.ravel())
         weights = weights - step.reshape(3, -1).T
     return weights
 

@@ -3,82 +3,64 @@
 Weights (n, 3) lie flat in a direction, (3 n), channel by channel.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
-from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.lighting.constraints.constrained import (
-    free_directions,
-    preferring,
-    solve_constrained,
-)
-from lightpaint.lighting.constraints.reduction import channel_groups
-from lightpaint.lighting.linear import chosen_reduction
+from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.constraints.reduced_problem import solve_reduced
+from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import Unknowns, solve_normal_equations, unknowns_of
+
+#: Share by which a sum may be short of its limit and be said to be at it.
+AT_LIMIT = 1e-9
 
 
-def unknown_groups(basis: Basis, equations: NormalEquations) -> list[Unknowns]:
-    """(light, channels it moves together) of each unknown weight, by independent problem."""
-    is_scalar = [light.is_scalar for light in basis.lights]
-    unknowns = [x for x in unknowns_of(equations.reached, is_scalar) if not basis.is_fixed[x[0]]]
-    if any(len(channels) > 1 for _, channels in unknowns):
-        return [unknowns]
-    return [[x for x in unknowns if x[1] == [c]] for c in range(3)]
+@dataclass(frozen=True)
+class Room:
+    """What the unknowns of one block may do about an answer.
+
+    columns: (3 n, k), what each changes of the weights, 0 where a light reaches nothing.
+    x: (k,), where they are. free: (k, m), directions in which no bound and no cap holds them.
+    off: (o,), those that are at 0 and may be more, each by itself.
+    """
+
+    columns: Doubles
+    x: Doubles
+    free: Doubles
+    off: Indices
 
 
-def columns(unknowns: Unknowns, n: int) -> Doubles:
-    """(3 n, unknowns): 1 where a weight is that unknown."""
-    made = np.zeros((3, n, len(unknowns)))
-    for k, (i, cs) in enumerate(unknowns):
-        made[cs, i, k] = 1
-    return made.reshape(3 * n, -1)
+def rooms(solution: Solution, equations: NormalEquations) -> Iterator[Room]:
+    """One for every set of channels that the unknowns couple. equations: what is solved."""
+    reduction, lit = solution.problem.reduction, solution.equations.reached
+    x = solve_reduced(equations, reduction, solution.weights).x
+    at_cap = _at_caps(reduction, x)
+    for block in reduction.blocks:
+        its = block.its
+        columns = _columns(reduction, its, lit)
+        reaches = columns.any(axis=0)
+        inside = (reduction.lower[its] < x[its]) & (x[its] < reduction.upper[its]) & reaches
+        rows = at_cap[:, its]
+        rows = rows[rows.any(axis=1)]
+        off = (x[its] == 0) & (reduction.lower[its] == 0) & (reduction.upper[its] > 0) & reaches
+        off &= ~rows.any(axis=0)
+        yield Room(columns, x[its], _keeping(rows, np.flatnonzero(inside)), np.flatnonzero(off))
 
 
-def moving(basis: Basis, solution: Solution) -> list[Doubles]:
+def moving(solution: Solution) -> list[Doubles]:
     """(3 n, k), directions in which nothing holds the answer, for each independent problem."""
-    weights = solution.lighting.weights_for(basis)
-    if solution.constraints:
-        solved = pulled_to_present(basis, solution, solution.solved)
-        reduction = chosen_reduction(basis, solution)
-        to = free_directions(solved, reduction, weights)
-        touched = np.any(to.reshape(3, len(weights), -1), axis=1)
-        return [to[:, touched[group].any(axis=0)] for group in channel_groups(reduction)]
-    groups = unknown_groups(basis, solution.solved)
-    return [
-        columns([(i, cs) for i, cs in group if weights[i, cs[0]] > 0], len(weights))
-        for group in groups
-    ]
+    solved = solution.problem.pulled(solution.problem.solved)
+    return [room.columns @ room.free for room in rooms(solution, solved)]
 
 
-def answer_to(basis: Basis, solution: Solution, equations: NormalEquations) -> Doubles:
+def answer_to(solution: Solution, equations: NormalEquations) -> Doubles:
     """The weights (n, 3) that solve `equations` under the same bounds as the answer."""
-    start = solution.lighting.weights_for(basis)
-    if solution.constraints:
-        asked = pulled_to_present(basis, solution, equations)
-        return solve_constrained(asked, chosen_reduction(basis, solution), start).weights
-    free = [k for k, light in enumerate(basis.lights) if not light.is_fixed]
-    weights = start.copy()
-    weights[free] = solve_normal_equations(
-        equations.holding(basis.is_fixed),
-        start[free],
-        is_scalar=[basis.lights[k].is_scalar for k in free],
-        # Far below the errors that are asked for.
-        tolerance=1e-6,
-        max_sweeps=2000,
-    ).weights
-    return weights
-
-
-def pulled_to_present(
-    basis: Basis, solution: Solution, equations: NormalEquations
-) -> NormalEquations:
-    """`equations` with the pull to the present that was asked for, if any was."""
-    strength = solution.constraints.prefer_current if solution.constraints else 0.0
-    if not strength:
-        return equations
-    return preferring(equations, basis, basis.present_weights, strength)
+    problem = solution.problem
+    asked = problem.pulled(equations)
+    return solve_reduced(asked, problem.reduction, solution.weights).weights
 
 
 def block_diagonal(M: Doubles) -> Doubles:
@@ -88,3 +70,57 @@ def block_diagonal(M: Doubles) -> Doubles:
     for c in range(3):
         whole[c, :, c] = M[c]
     return whole.reshape(3 * n, 3 * n)
+
+
+def all_columns(solution: Solution) -> Iterator[Doubles]:
+    """(3 n, k), what every unknown changes of the weights, for each independent problem.
+
+    As if nothing were asked: kept lights alone stay.
+    """
+    lights = np.flatnonzero(~solution.basis.is_fixed)
+    scalar = np.array([light.is_scalar for light in solution.basis.lights], dtype=bool)
+    lit = solution.equations.reached
+    columns = np.zeros((3, len(scalar), 3, lights.size))
+    for k, light in enumerate(lights):
+        for c in range(3):
+            # One weight for all channels is the unknown of the first.
+            columns[c, light, 0 if scalar[light] else c, k] = lit[light, c]
+    flat = columns.reshape(3 * len(scalar), 3, lights.size)
+    if scalar.any():
+        yield flat.reshape(len(flat), -1)
+    else:
+        yield from (flat[:, c] for c in range(3))
+
+
+def _columns(reduction: Reduction, its: Indices, lit: Bools) -> Doubles:
+    """(3 n, k), C of these unknowns, 0 where a light reaches nothing."""
+    place = np.full(len(reduction.unknowns), -1)
+    place[its] = np.arange(its.size)
+    unknown, light, rgb = reduction.columns
+    within = place[unknown] >= 0
+    made = np.zeros((3, len(lit), its.size))
+    for c in range(3):
+        made[c, light[within], place[unknown[within]]] = rgb[within, c]
+    return (made * lit.T[:, :, None]).reshape(3 * len(lit), its.size)
+
+
+def _at_caps(reduction: Reduction, x: Doubles) -> Doubles:
+    """(j, unknowns), coefficients of the caps whose sums are at a limit."""
+    rows = []
+    for cap in reduction.caps:
+        its, coefficients = list(cap.unknowns), np.asarray(cap.coefficients)
+        if not cap.lower * (1 + AT_LIMIT) < coefficients @ x[its] < cap.upper * (1 - AT_LIMIT):
+            row = np.zeros(x.size)
+            row[its] = coefficients
+            rows.append(row)
+    return np.array(rows).reshape(-1, x.size)
+
+
+def _keeping(rows: Doubles, inside: Indices) -> Doubles:
+    """(k, m), directions of the unknowns inside their bounds that keep the sums `rows`, (j, k)."""
+    free = np.eye(rows.shape[1])[:, inside]
+    if not len(rows):
+        return free
+    _, sizes, right = np.linalg.svd(rows[:, inside])
+    rank = int((sizes > AT_LIMIT * sizes.max(initial=0)).sum())
+    return np.asarray(free @ right[rank:].T)

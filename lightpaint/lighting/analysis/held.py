@@ -12,8 +12,8 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.lighting.bound import Kind, Per
-from lightpaint.lighting.constraints.constrained import ConstrainedOptimum
-from lightpaint.lighting.constraints.reduction import Reduction, Unknown
+from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum
+from lightpaint.lighting.constraints.reduction import Knob, Reduction, Unknown
 
 
 @dataclass(frozen=True)
@@ -42,19 +42,19 @@ class Answer:
     basis: Basis
     reduction: Reduction
     full: Reduction
-    found: ConstrainedOptimum
+    found: ReducedOptimum
     gradient: Doubles
     power: Doubles
     is_active: tuple[bool, ...]
 
     @property
     def w(self) -> Doubles:
-        return self.found.result.weights
+        return self.found.weights
 
 
 def all_held(o: Answer) -> Iterator[Held]:
     """Everything that holds a light, by zero or by what is asked."""
-    with_knob = {k for lights, _ in o.reduction.knobs for k in lights}
+    with_knob = {k for knob in o.reduction.knobs for k in knob.lights}
     for k, light in enumerate(o.basis.lights):
         if light.is_fixed:
             yield Held((k,), "kept", _freed(o, (k,)), *_by_channel(o, k, 2 * o.gradient[k]))
@@ -64,71 +64,67 @@ def all_held(o: Answer) -> Iterator[Held]:
             if kind == "off":  # which holds it from above only
                 force = np.minimum(force.sum() / 3 if light.is_scalar else force, 0) * np.ones(3)
             yield Held((k,), kind, _freed(o, (k,)), *_by_channel(o, k, force))
-    for knob, (lights, its) in enumerate(o.reduction.knobs):
-        if all(o.reduction.unknowns[i].upper == 0 for i in its) and _is_left_out(o, knob):
-            if any(o.is_active[k] for k in lights):
-                yield _left_out(o, knob)
+    for place, (knob, full) in enumerate(zip(o.reduction.knobs, o.full.knobs, strict=True)):
+        is_active = any(o.is_active[k] for k in knob.lights)
+        left_out = all(x.upper == 0 for x in knob.unknowns)
+        if left_out and any(x.upper > 0 for x in full.unknowns):
+            if is_active:
+                yield _left_out(o, place)
             continue
-        yield from _at_zero(o, knob)
-        if any(o.is_active[k] for k in lights):
-            yield _asked(o, knob)
+        yield from _at_zero(o, place)
+        if is_active:
+            yield _asked(o, place)
 
 
-def _is_left_out(o: Answer, knob: int) -> bool:
-    return any(o.full.unknowns[i].upper > 0 for i in o.full.knobs[knob][1])
-
-
-def _left_out(o: Answer, knob: int) -> Held:
-    lights, its = o.full.knobs[knob]
-    forces = np.minimum([_force(o, o.full.unknowns[i]) for i in its], 0)
-    powers = np.array([_power(o, o.full.unknowns[i]) for i in its])
+def _left_out(o: Answer, place: int) -> Held:
+    knob = o.full.knobs[place]
+    forces = np.minimum([_force(o, x) for x in knob.unknowns], 0)
+    powers = np.array([_power(o, x) for x in knob.unknowns])
     estimates = np.square(forces / 2) / np.where(powers > 0, powers, 1)
-    multiplier, per = _of_unknowns(o.full, knob, forces)
+    multiplier, per = _of_unknowns(knob, forces)
     # Three channels move by themselves, several primaries get into each other's way.
     estimate = estimates.sum() if per == "emission" else estimates.max(initial=0)
-    return Held(lights, "left out", float(estimate), multiplier, per, knob)
+    return Held(knob.lights, "left out", float(estimate), multiplier, per, place)
 
 
-def _at_zero(o: Answer, knob: int) -> Iterator[Held]:
+def _at_zero(o: Answer, place: int) -> Iterator[Held]:
     """What of a light is off, and would be less than that."""
-    lights, its = o.reduction.knobs[knob]
-    unknowns = [o.reduction.unknowns[i] for i in its]
-    off = np.array([u.lower == 0 and o.found.x[i] == 0 for u, i in zip(unknowns, its, strict=True)])
-    if not off.any() or (not off.all() and not _is_free(unknowns)):
+    knob, its = o.reduction.knobs[place], list(o.reduction.places[place])
+    off = (o.reduction.lower[its] == 0) & (o.found.x[its] == 0)
+    if not off.any() or (not off.all() and not knob.is_free):
         return  # a light that mixes primaries is on if one of them is
-    forces = np.where(off, 2 * np.maximum(o.found.multipliers[list(its)], 0), 0)
-    powers = np.array([_power(o, u) for u in unknowns])
+    forces = np.where(off, 2 * np.maximum(o.found.multipliers[its], 0), 0)
+    powers = np.array([_power(o, x) for x in knob.unknowns])
     forces = np.where(powers > 0, forces, 0)
     if not forces.any():
         return
     estimates = np.square(forces / 2) / np.where(powers > 0, powers, 1)
-    multiplier, per = _of_unknowns(o.reduction, knob, forces)
+    multiplier, per = _of_unknowns(knob, forces)
     estimate = estimates.sum() if per == "emission" else estimates.max()
-    yield Held(lights, "zero", float(estimate), multiplier, per, knob)
+    yield Held(knob.lights, "zero", float(estimate), multiplier, per, place)
 
 
-def _asked(o: Answer, knob: int) -> Held:
+def _asked(o: Answer, place: int) -> Held:
     """What is asked of a light that has a knob, or of the lights on one dimmer."""
-    lights, its = o.reduction.knobs[knob]
-    estimate = _freed(o, lights)
+    knob, its = o.reduction.knobs[place], list(o.reduction.places[place])
+    lights, estimate = knob.lights, _freed(o, knob.lights)
     if len(lights) > 1:
-        [unknown] = (o.reduction.unknowns[i] for i in its)
+        [unknown] = knob.unknowns
         each = tuple(2 * float(rgb @ o.gradient[k]) for k, rgb in unknown.columns)
-        return Held(lights, "tie", estimate, each, "dimmer", knob)
+        return Held(lights, "tie", estimate, each, "dimmer", place)
     [k] = lights
-    unknowns = [o.reduction.unknowns[i] for i in its]
     at_limit = np.array([_is_at_limit(o, i) for i in its])
-    forces = np.where(at_limit, 2 * o.found.multipliers[list(its)], 0)
+    forces = np.where(at_limit, 2 * o.found.multipliers[its], 0)
     cap = sum(
         2 * float(o.found.cap_multipliers[j])
         for j, cap in enumerate(o.reduction.caps)
         if cap.unknowns[0] == its[0]
     )
-    if forces.any() and _is_free(unknowns):
+    if forces.any() and knob.is_free:
         # With a limit of luminance besides, a channel feels both.
         return Held(lights, "limits", estimate, _numbers(forces + cap * LUMINANCE), "emission")
     if forces.any():
-        multiplier, per = _of_unknowns(o.reduction, knob, forces)
+        multiplier, per = _of_unknowns(knob, forces)
         return Held(lights, "limits", estimate, multiplier, per)
     if cap:
         return Held(lights, "limits", estimate, (cap,), "luminance")
@@ -160,26 +156,16 @@ def _by_channel(o: Answer, k: int, force: Doubles) -> tuple[tuple[float, ...], P
     return _numbers(force), "emission"
 
 
-def _of_unknowns(reduction: Reduction, knob: int, forces: Doubles) -> tuple[tuple[float, ...], Per]:
+def _of_unknowns(knob: Knob, forces: Doubles) -> tuple[tuple[float, ...], Per]:
     """A multiplier per unit of each unknown, (k,), in the terms of the light."""
-    lights, its = reduction.knobs[knob]
-    unknowns = [reduction.unknowns[i] for i in its]
-    if len(lights) > 1:
+    if len(knob.lights) > 1:
         return _numbers(forces), "dimmer"
-    if _is_free(unknowns):
+    if knob.is_free:
         return _numbers(forces), "emission"
-    sizes = np.array([float(u.columns[0][1] @ LUMINANCE) for u in unknowns])
+    sizes = np.array([float(x.columns[0][1] @ LUMINANCE) for x in knob.unknowns])
     # Of several primaries, the one that brings most.
     rates = forces / sizes
     return (float(rates[np.argmax(np.abs(rates))]),), "luminance"
-
-
-def _is_free(unknowns: list[Unknown]) -> bool:
-    """Whether a light has three channels, each by itself."""
-    return len(unknowns) == 3 and all(
-        len(u.columns) == 1 and (u.columns[0][1] == axis).all()
-        for u, axis in zip(unknowns, np.eye(3), strict=True)
-    )
 
 
 def _force(o: Answer, unknown: Unknown) -> float:

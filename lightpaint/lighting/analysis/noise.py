@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis, mix
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduction import channel_groups, reduce_to
+from lightpaint.basis.basis import mix
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations
 from lightpaint.lighting.solution import Solution
 
@@ -40,21 +38,24 @@ class Noise:
     objective_noise: Doubles
 
 
-def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
+def noise_sums(solution: Solution) -> Noise:
     """One pass over the pixels that count."""
+    basis, problem, weights = solution.basis, solution.problem, solution.weights
     n = len(weights)
     importance = solution.importance.ravel()
     # (pixels, 1), or (pixels, 3) where channels differ.
-    weight, share = (x.reshape(-1, x.shape[2]) for x in (solution.weight, solution.current_shares))
-    residual, mixed = residual_and_noise(basis, solution, weights)
+    squares = problem.squares
+    weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
+    residual, mixed = residual_and_noise(solution)
     present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
     images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
     # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
-    reduction = reduce_to(solution.constraints or Constraints(), basis.lights)
-    is_coupled = len(channel_groups(reduction)) < 3
+    is_coupled = len(problem.full.channel_groups) < 3
     power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
     gradient = np.zeros((3, n, 3, n))
-    pulled = _pulled(basis, solution, weights)
+    # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
+    # pixel it adds Φᵢ hᵢ times this.
+    pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
     unseen = ~basis.emitters_seen.ravel()
     counted = np.flatnonzero((importance > 0) | (unseen & pulled.any()))
     for start in range(0, counted.size, BLOCK):
@@ -86,46 +87,36 @@ def noise_sums(basis: Basis, solution: Solution, weights: Doubles) -> Noise:
     )
 
 
-def _pulled(basis: Basis, solution: Solution, weights: Doubles) -> Doubles:
-    """(n, 3), what Φᵢ hᵢ of a pixel adds to the noise of the gradient by the pull to the present.
-
-    The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by.
-    """
-    strength = solution.constraints.prefer_current if solution.constraints else 0.0
-    return np.asarray(2 * strength * (basis.present_weights - weights))
-
-
-def residual_and_noise(
-    basis: Basis, solution: Solution, weights: Doubles
-) -> tuple[Doubles, Doubles]:
+def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:
     """What the answer misses, and half the difference of what its two halves predict.
 
     Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
     it holds the current look.
     """
+    basis, weights, r = solution.basis, solution.weights, solution.problem.refinement
     residual = solution.image.astype(np.float64) - basis.mix(weights)
-    noise: Doubles
-    if (r := solution.refinement) is not None:
-        noise = np.asarray(r.noise + mix(basis.half_differences, weights - r.before), np.float64)
+    if r is not None:
+        noise = r.noise + mix(basis.half_differences, weights - r.before)
     else:
         noise = mix(basis.half_differences, weights).astype(np.float64)
         present = mix(basis.half_differences, basis.present_weights)
-        noise = np.asarray(noise - solution.current_shares * present, np.float64)
-    return residual.reshape(-1, 3), noise.reshape(-1, 3)
+        noise = noise - solution.problem.squares.share * present
+    return residual.reshape(-1, 3), np.asarray(noise, np.float64).reshape(-1, 3)
 
 
 def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
     """Some weights, (n, 3), and what noise made b − M w lack there on average, (3, n)."""
-    if (r := solution.refinement) is not None:
+    removed, r = solution.problem.noise_removed, solution.problem.refinement
+    if r is not None:
         return r.before, r.lacking
     n = noise.power.shape[1]
     # At no light at all the noise of the basis lacks nothing in M: all of it is still to come.
     nothing = np.zeros((n, 3))
-    if solution.noise_removed == 0:
+    if removed == 0:
         return nothing, -noise.drawn
-    weights = np.array([light.weight for light in solution.lighting.lights])
+    weights = solution.weights
     lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.drawn
-    return weights, (1 - solution.noise_removed) * lack
+    return weights, (1 - removed) * lack
 
 
 def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:

@@ -12,10 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.directions import block_diagonal, moving, pulled_to_present
+from lightpaint.lighting.analysis.directions import block_diagonal, moving
 from lightpaint.lighting.analysis.noise import (
     lacking_gradient,
     noise_sums,
@@ -23,10 +22,12 @@ from lightpaint.lighting.analysis.noise import (
     residual_and_noise,
 )
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
-from lightpaint.lighting.solve import Refinement, Solution, solution_of
+from lightpaint.lighting.problem import Refinement
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import again
 
 
-def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
+def refine(solution: Solution, mixed: Estimate) -> Solution:
     """One step from the weights w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over w' >= 0.
 
     g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of what was solved.
@@ -36,31 +37,31 @@ def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
     Raises SizeError if it has another size, BasisError where nothing is known of the basis' noise:
     then nothing says how much of the render to believe.
     """
+    basis, problem, w = solution.basis, solution.problem, solution.weights
     if not basis.knows_noise:
         raise BasisError(
             f"{basis.origin.scene} says nothing of its noise, so that a render of the mix cannot "
-            "be weighed against it: leave --refine out"
+            "be weighed against it: leave refine out"
         )
     if mixed.size != basis.size:
         raise SizeError(
             f"the render of the mix is {mixed.size[1]}x{mixed.size[0]} but the basis is "
             f"{basis.size[1]}x{basis.size[0]}: render it on the film of the basis"
         )
-    w = solution.lighting.weights_for(basis)
     missed = solution.image.astype(np.float64) - mixed.image
     _, rendered, _ = inner_products(basis.images, missed, solution.weight)
-    M = solution.solved.M
-    known = solution.solved.b - np.einsum("cij,jc->ci", M, w)
+    M = problem.solved.M
+    known = problem.solved.b - np.einsum("cij,jc->ci", M, w)
 
-    sums = noise_sums(basis, solution, w)
+    sums = noise_sums(solution)
     before, lacking = lacking_gradient(solution, sums)
     # What the gradient lacked there, and what the noise in M makes it lack on the way here.
-    remains = 1 - solution.noise_removed
+    remains = 1 - problem.noise_removed
     lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - before)
-    _, noise = residual_and_noise(basis, solution, w)
+    _, noise = residual_and_noise(solution)
     noise = noise.reshape(mixed.image.shape)
     # The painting's own noise, where it holds the current look, is not the render's to change.
-    t = _share(basis, solution, lacking, noise, mixed.half_difference.astype(np.float64))
+    t = _share(solution, lacking, noise, mixed.half_difference.astype(np.float64))
 
     gradient = t * rendered + (1 - t) * known
     refinement = Refinement(
@@ -70,37 +71,32 @@ def refine(basis: Basis, solution: Solution, mixed: Estimate) -> Solution:
         share=t,
     )
     right = np.einsum("cij,jc->ci", M, w) + gradient
-    problem = replace(
-        solution,
-        solved=NormalEquations(M, right, solution.equations.target_norm2),
-        refinement=refinement,
-    )
-    return solution_of(basis, problem, start=w)
+    corrected = NormalEquations(M, right, problem.equations.target_norm2)
+    return again(solution, replace(problem, corrected=corrected, refinement=refinement))
 
 
-def _share(
-    basis: Basis, solution: Solution, lacking: Doubles, known: Floats, rendered: Floats
-) -> float:
+def _share(solution: Solution, lacking: Doubles, known: Floats, rendered: Floats) -> float:
     """The t that makes the expected excess (1 − t)² (B + K) + t² R least: (B + K) / (B + K + R).
 
     B: excess by what is lacking in the known gradient; K, R: by the noise of the prediction,
     as known so far and as rendered. All measured by M⁻¹ along what nothing holds.
     """
     bias, spread = 0.0, np.zeros(2)
-    M = pulled_to_present(basis, solution, solution.solved).M
-    for to in moving(basis, solution):
+    M = solution.problem.pulled(solution.problem.solved).M
+    for to in moving(solution):
         inverse = pseudo_inverse(to.T @ block_diagonal(M) @ to)
         lacks = to.T @ lacking.ravel()
         bias += float(lacks @ inverse @ lacks)
         for k, noise in enumerate((known, rendered)):
-            C = _pushed(basis, solution, noise, to)
+            C = _pushed(solution, noise, to)
             spread[k] += np.einsum("ij,ij->", inverse, C)
     total = bias + spread.sum()
     return float((bias + spread[0]) / total) if total > 0 else 1.0
 
 
-def _pushed(basis: Basis, solution: Solution, noise: Floats, to: Doubles) -> Doubles:
+def _pushed(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
     """(k, k), covariance of the push that the noise of a prediction gives along `to`, (3 n, k)."""
+    basis = solution.basis
     n = len(basis.lights)
     along = to.reshape(3, n, -1)
     images, noise = basis.images.reshape(n, -1, 3), noise.reshape(-1, 3)

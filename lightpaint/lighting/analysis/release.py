@@ -9,14 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.held import Answer, Held, all_held
 from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.constraints.constrained import constrained_optimum, preferring
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduction import Reduction, Unknown, channel_groups, reduce_to
+from lightpaint.lighting.constraints.reduced_problem import solve_reduced
+from lightpaint.lighting.constraints.reduction import Knob, Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solve import Solution, chosen_reduction
+from lightpaint.lighting.solution import Solution
 
 #: Bounds for which the problem is solved again, those that seem to matter most: so many, and of
 #: large problems about as many as WORK has unknowns, at least so many.
@@ -26,44 +24,40 @@ RELEASED, WORK, FEWEST = 32, 2048, 4
 SMALLEST = 1e-12
 
 
-def bounds_of(basis: Basis, solution: Solution) -> tuple[tuple[Bound, ...], int]:
+def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
     """What holds the lights of `solution`, the largest gain first, and how many more there are.
 
     For these, which seem to matter less, the problem was not solved again.
     """
-    equations, constraints = solution.solved, solution.constraints or Constraints()
-    if constraints.prefer_current:
-        present = basis.present_weights
-        equations = preferring(equations, basis, present, constraints.prefer_current)
-    answer = _answer(basis, solution, equations)
+    problem = solution.problem
+    equations = problem.pulled(problem.solved)
+    answer = _answer(solution, equations)
     least = SMALLEST * float(solution.equations.target_norm2.sum())
     held = [h for h in all_held(answer) if h.estimate > least]
     held.sort(key=lambda h: -h.estimate)
-    before, bounds = _value(solution.solved, answer.w), []
-    size = len(answer.reduction.unknowns) // len(channel_groups(answer.reduction))
+    before, bounds = _value(problem.solved, answer.w), []
+    size = len(answer.reduction.unknowns) // len(answer.reduction.channel_groups)
     for h in held[: min(max(WORK // max(size, 1), FEWEST), RELEASED)]:
         reduction, x = _without(answer, h)
-        freed = constrained_optimum(equations, reduction, answer.w, x=x)
-        gain = before - _value(solution.solved, freed.result.weights)
-        if not constraints.prefer_current:
+        freed = solve_reduced(equations, reduction, answer.w, x=x)
+        gain = before - _value(problem.solved, freed.weights)
+        if problem.pull is None:
             gain = max(gain, 0.0)  # but for round-off it is
-        names = tuple(basis.names[k] for k in h.lights)
+        names = tuple(solution.basis.names[k] for k in h.lights)
         label = answer.full.labels[h.lights[0]]
         held_by = h.kind if h.kind in ("zero", "kept", "left out") else label
         bounds.append(Bound(names, h.kind, held_by, gain, h.multiplier, h.per))
     return tuple(sorted(bounds, key=lambda bound: -bound.gain)), len(held) - len(bounds)
 
 
-def _answer(basis: Basis, solution: Solution, equations: NormalEquations) -> Answer:
-    full = reduce_to(solution.constraints or Constraints(), basis.lights)
-    reduction = chosen_reduction(basis, solution) if solution.constraints else full
-    found = constrained_optimum(equations, reduction, solution.lighting.weights_for(basis))
+def _answer(solution: Solution, equations: NormalEquations) -> Answer:
+    found = solve_reduced(equations, solution.problem.reduction, solution.weights)
     lit = equations.reached
-    gradient = np.einsum("cij,jc->ic", equations.M, found.result.weights) - equations.b.T
+    gradient = np.einsum("cij,jc->ic", equations.M, found.weights) - equations.b.T
     return Answer(
-        basis,
-        reduction,
-        full,
+        solution.basis,
+        solution.problem.reduction,
+        solution.problem.full,
         found,
         np.where(lit, gradient, 0),
         np.where(lit, np.einsum("cii->ic", equations.M), 0),
@@ -79,28 +73,23 @@ def _value(equations: NormalEquations, w: Doubles) -> float:
 
 def _without(o: Answer, held: Held) -> tuple[Reduction, Doubles]:
     """The reduction with that alone let go, and the answer in its unknowns."""
-    unknowns, x = [*o.reduction.unknowns], o.found.x
+    knobs, x = [*o.reduction.knobs], o.found.x
+    if held.kind == "left out":
+        knobs[held.knob] = o.full.knobs[held.knob]
+    elif held.kind == "zero":
+        knob, its = knobs[held.knob], o.reduction.places[held.knob]
+        below = tuple(
+            replace(u, lower=-np.inf, upper=0.0) if x[i] == 0 else u
+            for u, i in zip(knob.unknowns, its, strict=True)
+        )
+        knobs[held.knob] = replace(knob, unknowns=below)
     if held.kind in ("left out", "zero"):
-        its = o.reduction.knobs[held.knob][1]
-        for i in its:
-            if held.kind == "left out":
-                unknowns[i] = o.full.unknowns[i]
-            elif x[i] == 0:
-                unknowns[i] = replace(unknowns[i], lower=-np.inf, upper=0.0)
-        return replace(o.reduction, unknowns=unknowns), x
-    caps = {cap.unknowns[0]: cap for cap in o.reduction.caps}
-    made, values = Reduction(o.reduction.held.copy(), [*o.reduction.labels]), list[float]()
-    for lights, its in o.reduction.knobs:
-        if not set(lights) & set(held.lights):
-            cap = caps.get(its[0])
-            limits = None
-            if cap is not None:
-                limits = (np.array(cap.coefficients), cap.lower, cap.upper)
-            made.add([unknowns[i] for i in its], limits)
-            values += [float(x[i]) for i in its]
-    for k in held.lights:
-        made.held[k] = 0
-        colours = np.ones((1, 3)) if o.basis.lights[k].is_scalar else np.eye(3)
-        made.add([Unknown(((k, colour),)) for colour in colours], None)
-        values += o.w[k, : len(colours)].tolist()
-    return made, np.array(values)
+        return replace(o.reduction, knobs=tuple(knobs)), x
+    left = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(held.lights)]
+    weights = o.reduction.held.copy()
+    weights[list(held.lights)] = 0
+    freed = [Knob.of_any_colour(k, is_scalar=o.basis.lights[k].is_scalar) for k in held.lights]
+    values = [x[list(o.reduction.places[k])] for k in left]
+    values += [o.w[k.lights[0], : len(k.unknowns)] for k in freed]
+    made = replace(o.reduction, held=weights, knobs=(*(knobs[k] for k in left), *freed))
+    return made, np.concatenate(values)

@@ -8,18 +8,15 @@ of M turns that into the covariance of the weights (docs/method.md, "How sure").
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError
 from lightpaint.lighting.analysis.directions import (
+    Room,
     answer_to,
     block_diagonal,
-    columns,
     moving,
-    pulled_to_present,
-    unknown_groups,
+    rooms,
 )
 from lightpaint.lighting.analysis.noise import (
     SINGULAR,
@@ -29,10 +26,10 @@ from lightpaint.lighting.analysis.noise import (
     pseudo_inverse,
     without_noise,
 )
-from lightpaint.lighting.constraints.constrained import free_directions
 from lightpaint.lighting.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solve import Solution, chosen_reduction, solution_of
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import again
 
 #: Standard errors on either side of a 95 % interval.
 SIDES = 1.96
@@ -82,130 +79,97 @@ class Uncertainty:
         return np.maximum(self.weights - side, 0), self.weights + side
 
 
-def error_bars(basis: Basis, solution: Solution) -> Uncertainty | None:
-    """Standard error and bias of every weight that `solve` or `refine` found.
+def error_bars(solution: Solution) -> Uncertainty | None:
+    """Standard error and bias of every weight that a solve or `refine` found.
 
     None where nothing is known of the noise of the basis: that is not the same as none.
     After reweighting they are of the last linear problem.
 
-    Lights that are kept or reach nothing have none. Under constraints, what a limit holds has
-    none either: the error is of what is free to move there.
+    Lights that are kept or reach nothing have none. What a limit holds that was asked for has none
+    either: the error is of what is free to move there. What is off may be on by as much as noise
+    could hide, and no more (see `_one_sided`).
     """
-    if not basis.knows_noise:
+    problem, weights = solution.problem, solution.weights
+    if not problem.basis.knows_noise:
         return None
-    weights = solution.lighting.weights_for(basis)
-    equations = solution.equations
-    noise = noise_sums(basis, solution, weights)
+    equations, solved = problem.equations, problem.solved
+    noise = noise_sums(solution)
     corrected = without_noise(equations, noise.power)
     before, lacking = lacking_gradient(solution, noise)
-    step = solution.solved.b - np.einsum("cij,jc->ci", solution.solved.M, before) + lacking
+    step = solved.b - np.einsum("cij,jc->ci", solved.M, before) + lacking
     right = np.einsum("cij,jc->ci", corrected, before) + step
     unbiased = NormalEquations(corrected, right, equations.target_norm2)
-    if solution.constraints:
-        return _constrained_error_bars(basis, solution, noise, unbiased)
-    bias = np.asarray(answer_to(basis, solution, unbiased) - weights)
+    bias = np.asarray(answer_to(solution, unbiased) - weights)
 
-    scatter, excess = np.zeros_like(weights), np.zeros(3)
     # How firmly lights are off, had there been no bias.
-    gradient = np.einsum("cij,jc->ic", corrected, weights + bias) - right.T
+    asked = problem.pulled(unbiased)
+    gradient = (np.einsum("cij,jc->ci", asked.M, weights + bias) - asked.b).ravel()
     # A render of the mix shows all of an earlier error, of which a step by the noisy M leaves
     # a part; the unbiased answer, on which the interval hangs, has the scatter of its own M.
-    M_of_scatter = solution.solved.M if solution.refinement is None else corrected
-    for unknowns in unknown_groups(basis, equations):
-        to = columns(unknowns, len(weights))
-        M = to.T @ block_diagonal(M_of_scatter) @ to
-        C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
-        flat = np.array([weights[i, cs[0]] for i, cs in unknowns])
-        errors, spread = _propagated(M, C, flat, to.T @ gradient.T.ravel())
-        for (i, cs), error in zip(unknowns, errors, strict=True):
-            scatter[i, cs] = error
-        for c in {c for _, cs in unknowns for c in cs}:
-            excess[c] += spread / len({c for _, cs in unknowns for c in cs})
-    excess += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
+    scatters = problem.pulled(solved if problem.refinement is None else unbiased)
+    M, C = block_diagonal(scatters.M), noise.gradient.reshape(gradient.size, -1)
+    missed = block_diagonal(equations.M)
+    variance, excess = np.zeros(gradient.size), np.zeros(gradient.size)
+    for room in rooms(solution, scatters):
+        to = room.columns
+        errors, covariance = _propagated(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
+        excess += np.einsum("pq,qp->p", missed, to @ covariance @ to.T)
+        covariance[room.off], covariance[:, room.off] = 0, 0
+        variance += np.einsum("pi,ij,pj->p", to, covariance, to, optimize=True)
+        variance += np.square(to) @ np.square(errors)
+    scatter = np.sqrt(np.maximum(variance, 0)).reshape(3, -1).T
+    by_channel = excess.reshape(3, -1).sum(axis=1)
+    by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
     return Uncertainty(
         weights,
         scatter,
         bias,
         noise.objective_error,
         noise.objective_noise,
-        excess,
+        by_channel,
         solution.norm2,
     )
 
 
-def _constrained_error_bars(
-    basis: Basis, solution: Solution, noise: Noise, unbiased: NormalEquations
-) -> Uncertainty:
-    """As `error_bars`, along the directions of the weights that constraints leave."""
-    weights = solution.lighting.weights_for(basis)
-    reduction = chosen_reduction(basis, solution)
-    solved = solution.solved if solution.refinement is None else unbiased
-    solved = pulled_to_present(basis, solution, solved)
-    bias = answer_to(basis, solution, unbiased) - weights
-    to = free_directions(solved, reduction, weights)
-    inverse = pseudo_inverse(to.T @ block_diagonal(solved.M) @ to)
-    C = to.T @ noise.gradient.reshape(len(to), len(to)) @ to
-    covariance = to @ inverse @ C @ inverse @ to.T
-    n = len(weights)
-    scatter = np.sqrt(np.maximum(np.diag(covariance), 0)).reshape(3, n).T
-    by_channel = covariance.reshape(3, n, 3, n)
-    M = solution.equations.M
-    excess = np.array([(M[c] * by_channel[c, :, c]).sum() for c in range(3)])
-    excess += np.einsum("ic,cij,jc->c", bias, M, bias)
-    return Uncertainty(
-        weights,
-        scatter,
-        np.asarray(bias),
-        noise.objective_error,
-        noise.objective_noise,
-        excess,
-        solution.norm2,
-    )
-
-
-def correct_noise(basis: Basis, solution: Solution, *, share: float | None = None) -> Solution:
+def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """The solution of the equations without that share of the noise power in M and b.
 
     share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
     What was solved before, `solution`, is where it starts. docs/method.md has what it is worth.
     Raises BasisError where nothing is known of the noise.
     """
+    basis = solution.basis
     if not basis.knows_noise:
         raise BasisError(
             f"{basis.origin.scene} says nothing of its noise, so that none can be corrected: "
-            "leave --correct-noise out, and denoise the layers or render them with more samples"
+            "leave noise_correction=True out, and denoise the layers or render them with more "
+            "samples"
         )
-    weights = solution.lighting.weights_for(basis)
-    noise = noise_sums(basis, solution, weights)
+    noise = noise_sums(solution)
     e = solution.equations
     least = without_noise(e, noise.power)
     if share is None:
-        share = _best_share(basis, solution, noise, least)
-    problem = replace(
-        solution,
-        solved=NormalEquations(
-            (1 - share) * e.M + share * least, e.b - share * noise.drawn, e.target_norm2
-        ),
-        noise_removed=share,
+        share = _best_share(solution, noise, least)
+    corrected = NormalEquations(
+        (1 - share) * e.M + share * least, e.b - share * noise.drawn, e.target_norm2
     )
-    return solution_of(basis, problem, start=weights)
+    return again(solution, replace(solution.problem, corrected=corrected, noise_removed=share))
 
 
-def _best_share(basis: Basis, solution: Solution, noise: Noise, least: Doubles) -> float:
+def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
     """The share s that makes the expected excess of the objective least, in steps of SHARES.
 
     What is left of the bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which
     grows as M_s = M − s N becomes smaller. least: M without all noise.
     """
-    weights = solution.lighting.weights_for(basis)
-    e, n = solution.equations, len(weights)
+    e, n = solution.equations, len(solution.weights)
     unbiased = NormalEquations(least, e.b - noise.drawn, noise.objective_noise)
-    bias = answer_to(basis, solution, unbiased) - weights
+    bias = answer_to(solution, unbiased) - solution.weights
     shares = np.linspace(0, 1, SHARES + 1)
     cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, e.M, bias)
     # The pull to the present keeps weights from moving, and is no part of what is missed.
-    pull = pulled_to_present(basis, solution, e).M - e.M
-    for to in moving(basis, solution):
+    pull = np.zeros_like(e.M) if solution.problem.pull is None else solution.problem.pull.M
+    for to in moving(solution):
         M, left, stiff = (to.T @ block_diagonal(x) @ to for x in (e.M, least, pull))
         C = to.T @ noise.gradient.reshape(3 * n, 3 * n) @ to
         for k, s in enumerate(shares):
@@ -221,47 +185,39 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
     lights: list[LightSetting] = []
     for light, error in zip(solution.lighting.lights, uncertainty.standard_error, strict=True):
         r, g, b = (float(v) for v in error)
-        kept = light.is_fixed or light.name in solution.quality.unreached
+        kept = light.is_fixed or light.name in solution.certificate.unreached
         lights.append(light if kept else replace(light, standard_error=(r, g, b)))
     r, g, b = (float(v) for v in uncertainty.objective_error)
-    quality = replace(solution.quality, objective_error=(r, g, b))
-    lighting = replace(solution.lighting, lights=tuple(lights), quality=quality)
+    certificate = replace(solution.certificate, objective_error=(r, g, b))
+    lighting = replace(solution.lighting, lights=tuple(lights), certificate=certificate)
     return replace(solution, lighting=lighting)
 
 
-def _propagated(M: Doubles, C: Doubles, w: Doubles, gradient: Doubles) -> tuple[Doubles, float]:
-    """Standard deviation of each weight of one problem, and the excess it causes.
+def _propagated(M: Doubles, C: Doubles, room: Room, gradient: Doubles) -> tuple[Doubles, Doubles]:
+    """Errors of unknowns that are off, (k,), and the covariance of all, (k, k), 0 for what is held.
 
-    C: covariance of the gradient's noise. Cov(w) = M⁻¹ C M⁻¹ over the lights that are on,
-    and those that are off by no more than noise.
+    M: (k, k); C: (k, k), covariance of the noise of the gradient, (k,). Cov(x) = M⁻¹ C M⁻¹ over
+    what is free, and what is off by no more than noise.
     """
-    errors = np.zeros(w.size)
-    on = w > 0
-    may_be_on = on.copy()
-    for i in np.flatnonzero(~on).tolist():
-        errors[i] = _one_sided(M, C, on, i, float(gradient[i]))
-        may_be_on[i] = errors[i] > 0
-    free = np.flatnonzero(may_be_on)
-    inverse = pseudo_inverse(M[np.ix_(free, free)])
-    covariance = inverse @ C[np.ix_(free, free)] @ inverse
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0))
-    errors[free] = np.where(on[free], spread, errors[free])
-    return errors, float(np.einsum("ij,ij->", M[np.ix_(free, free)], covariance))
+    errors = np.zeros(room.x.size)
+    for i in room.off.tolist():
+        errors[i] = _one_sided(M, C, room.free, i, float(gradient[i]))
+    free = np.hstack([room.free, np.eye(room.x.size)[:, errors > 0]])
+    inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
+    return errors, inverse @ C @ inverse
 
 
-def _one_sided(M: Doubles, C: Doubles, on: npt.NDArray[np.bool_], i: int, gradient: float) -> float:
-    """Error of a light that is off: how far noise alone could have kept it from being on.
+def _one_sided(M: Doubles, C: Doubles, free: Doubles, i: int, gradient: float) -> float:
+    """Error of an unknown that is off: how far noise alone could have kept it from being on.
 
-    Were it free it would have the weight u < 0 with some standard deviation s, so it may be
-    on by SIDES · s − |u|.
+    Were it free it would have the value u < 0 with some standard deviation s, so it may be
+    on by SIDES · s − |u|. free: (k, m), what the others may do.
     """
-    others = np.flatnonzero(on)
-    answer = -pseudo_inverse(M[np.ix_(others, others)]) @ M[others, i]
-    stiffness = M[i, i] + M[i, others] @ answer
+    along = -free @ (pseudo_inverse(free.T @ M @ free) @ (free.T @ M[:, i]))
+    along[i] = 1
+    stiffness = M[i] @ along
     if stiffness <= SINGULAR * M[i, i]:
         return 0.0  # the others do all that it could do
-    along = np.zeros(on.size)
-    along[i], along[others] = 1, answer
     wanted = -max(gradient, 0.0) / stiffness
     spread = float(np.sqrt(np.maximum(along @ C @ along, 0.0))) / stiffness
     return max(0.0, float(spread + wanted / SIDES))

@@ -1,13 +1,27 @@
-"""M and b in the unknowns that constraints leave."""
+"""M and b in the unknowns that constraints leave, and the optimum of what they make.
 
+With w = C x + w₀ the problem is M' = Σ_c C_cᵀ M_c C_c and b' = Σ_c C_cᵀ (b_c − M_c w₀_c), one for
+every set of channels that the unknowns couple. Where nothing is asked C is the identity: three
+problems in the lights themselves.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Indices
-from lightpaint.lighting.algebra.optimum import Cap
-from lightpaint.lighting.constraints.reduction import Reduction, Unknown, channel_groups
+from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra.optimum import Cap, Method, Optimum, minimise, minimise_each
+from lightpaint.lighting.algebra.quadratic import moved_along
+from lightpaint.lighting.algebra.threads import side_by_side
+from lightpaint.lighting.constraints.reduction import Block, Knob, Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
+
+#: Pull of what reaches nothing in one channel towards its start, beside its other channels.
+FAINT = 1e-8
+
+#: Distance from a bound, beside the light's other values, that is round-off of a start.
+NEAR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -15,62 +29,254 @@ class ReducedProblem:
     """½ xᵀM x − bᵀx in the unknowns `its` of a reduction, of the channels it couples."""
 
     channels: list[int]
-    its: list[int]
+    its: Indices
     M: Doubles
     b: Doubles
     lower: Doubles
     upper: Doubles
     caps: tuple[Cap, ...]
 
-
-def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
-    """One problem for every set of channels that the unknowns couple.
-
-    With w = C x + w₀ it is M' = Σ_c C_cᵀ M_c C_c and b' = Σ_c C_cᵀ (b_c − M_c w₀_c).
-    """
-    made = []
-    for channels in channel_groups(reduction):
-        its = [k for k, x in enumerate(reduction.unknowns) if _touches(x, channels)]
-        M, b = np.zeros((len(its), len(its))), np.zeros(len(its))
-        for c in channels:
-            here, lights, values, first = _entries(reduction, its, c)
-            if not here.size:
-                continue
-            left = equations.b[c] - equations.M[c] @ reduction.held[:, c]
-            whole = equations.M[c][np.ix_(lights, lights)] * values[:, None] * values
-            # Most columns are of one light: the sum over those of several is a short one.
-            M[np.ix_(here, here)] += np.add.reduceat(np.add.reduceat(whole, first, 0), first, 1)
-            b[here] += np.add.reduceat(left[lights] * values, first)
-        place = {i: k for k, i in enumerate(its)}
+    def of(self, here: Indices) -> "ReducedProblem":
+        """The problem of some of its unknowns, (k,) places among them, while the others are 0."""
+        place = {int(k): j for j, k in enumerate(here)}
         caps = tuple(
             replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
-            for cap in reduction.caps
+            for cap in self.caps
             if cap.unknowns[0] in place
         )
-        lower = np.array([reduction.unknowns[i].lower for i in its])
-        upper = np.array([reduction.unknowns[i].upper for i in its])
-        made.append(ReducedProblem(channels, its, M, b, lower, upper, caps))
+        return ReducedProblem(
+            self.channels,
+            self.its[here],
+            self.M[np.ix_(here, here)],
+            self.b[here],
+            self.lower[here],
+            self.upper[here],
+            caps,
+        )
+
+
+@dataclass(frozen=True)
+class ReducedOptimum:
+    """The best weights under a reduction, and what shows that they are.
+
+    x, multipliers: of its unknowns; cap_multipliers: of its caps. All as of `Optimum`, of half
+    the objective.
+    weights: (n, 3), C x + w₀. kkt_residual, tolerance: (3,), the largest violation of the
+    optimality conditions, after scaling, and what it was to come down to. sweeps: (3,).
+    reached: (n,), whether what moves a light reaches anything; what is held was not left to.
+    """
+
+    x: Doubles
+    multipliers: Doubles
+    cap_multipliers: Doubles
+    weights: Doubles
+    kkt_residual: Doubles
+    tolerance: Doubles
+    sweeps: tuple[int, int, int]
+    reached: Bools
+
+    @property
+    def converged(self) -> bool:
+        """Whether every channel met its tolerance."""
+        return bool((self.kkt_residual <= self.tolerance).all())
+
+
+def solve_reduced(
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    x: Doubles | None = None,
+    method: Method = "polished",
+    tolerance: float = 1e-12,
+    max_sweeps: int = 20_000,
+) -> ReducedOptimum:
+    """Minimise the objective over what `reduction` leaves.
+
+    start: (n, 3), weights to begin with; lights that reach nothing stay as near to them as the
+    constraints allow. x: the unknowns to begin with, where they are known; else those nearest to
+    `start`. method, tolerance, max_sweeps: see `minimise`.
+    """
+    lit = equations.reached
+    reached = np.ones(len(lit), dtype=bool)
+    for knob in reduction.knobs:
+        reached[list(knob.lights)] = lit[list(knob.lights)].any()
+    x = nearest(reduction, start, reached) if x is None else x.copy()
+    multipliers = np.zeros(x.size)
+    cap_multipliers = np.zeros(len(reduction.caps))
+    cap_at = {cap.unknowns[0]: k for k, cap in enumerate(reduction.caps)}
+    residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
+    parts = problems(equations, reduction, lit=lit, start=start)
+    optima = _optima(parts, x, method=method, tolerance=tolerance, max_sweeps=max_sweeps)
+    for problem, optimum in zip(parts, optima, strict=True):
+        x[problem.its], multipliers[problem.its] = optimum.x, optimum.multipliers
+        for cap, multiplier in zip(problem.caps, optimum.cap_multipliers, strict=True):
+            cap_multipliers[cap_at[int(problem.its[cap.unknowns[0]])]] = multiplier
+        for c in problem.channels:
+            residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
+            tolerances[c] = optimum.tolerance
+    return ReducedOptimum(
+        x,
+        multipliers,
+        cap_multipliers,
+        reduction.weights(x),
+        residuals,
+        tolerances,
+        (sweeps[0], sweeps[1], sweeps[2]),
+        reached,
+    )
+
+
+def problems(
+    equations: NormalEquations,
+    reduction: Reduction,
+    *,
+    lit: Bools | None = None,
+    start: Doubles | None = None,
+) -> list[ReducedProblem]:
+    """One problem for every set of channels that the unknowns couple.
+
+    lit, start: (n, 3), what reaches something that counts, and weights: an unknown of several
+    channels of which a light reaches some is drawn to its start in the others, faintly.
+    """
+    M, b = equations.M, equations.b
+    if lit is not None and start is not None and not lit.all():
+        is_coupled = len(reduction.channel_groups) < 3
+        M, b = _in_the_dark(equations, lit, start, is_coupled=is_coupled)
+    if reduction.held.any():
+        b = b - np.einsum("cij,jc->ci", M, reduction.held)
+    made = []
+    for block in reduction.blocks:
+        lower, upper = reduction.lower[block.its], reduction.upper[block.its]
+        own_M, own_b = _of_block(M, b, block)
+        made.append(
+            ReducedProblem(block.channels, block.its, own_M, own_b, lower, upper, block.caps)
+        )
     return made
 
 
-def _entries(
-    reduction: Reduction, its: list[int], c: int
-) -> tuple[Indices, Indices, Doubles, Indices]:
-    """What is not 0 in C_c, column by column.
+def _of_block(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Doubles]:
+    """M' and b' in the unknowns of a block."""
+    if block.is_plain:
+        [c], lights = block.channels, block.entries[0].lights
+        if block.is_in_order and lights.size == b.shape[1]:
+            return M[c], b[c]
+        return M[c][lights[:, None], lights], b[c, lights]
+    made_M, made_b = np.zeros((block.its.size, block.its.size)), np.zeros(block.its.size)
+    for c, e in zip(block.channels, block.entries, strict=True):
+        part = M[c][e.lights[:, None], e.lights] * e.values[:, None] * e.values
+        right = b[c, e.lights] * e.values
+        if e.lights.size > e.here.size:
+            # Most columns are of one light: the sum over those of several is a short one.
+            part = np.add.reduceat(np.add.reduceat(part, e.first, 0), e.first, 1)
+            right = np.add.reduceat(right, e.first)
+        made_M[e.here[:, None], e.here] += part
+        made_b[e.here] += right
+    return made_M, made_b
 
-    Returns the columns that there are, of each entry its light and value, and where among
-    these each column begins.
+
+def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
+    """The x (k,) whose emissions are nearest to `start`, (n, 3), within what each knob allows.
+
+    reached: (n,). Where a light does reach something, a luminance at its limit is good enough.
     """
-    entries = [
-        (k, light, rgb[c])
-        for k, i in enumerate(its)
-        for light, rgb in reduction.unknowns[i].columns
-        if rgb[c]
-    ]
-    columns, lights = (np.array([entry[j] for entry in entries], dtype=np.intp) for j in (0, 1))
-    here, first = np.unique(columns, return_index=True)
-    return here, lights, np.array([value for _, _, value in entries], dtype=np.float64), first
+    x = np.zeros(len(reduction.unknowns))
+    for kind in reduction.kinds:
+        low, high = reduction.lower[kind.places], reduction.upper[kind.places]
+        wanted = np.einsum("kue,ke->ku", kind.columns, start[kind.lights].reshape(len(low), -1))
+        if kind.is_orthogonal:
+            its = wanted / np.square(kind.columns).sum(axis=2)
+        else:
+            squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
+            begin = np.clip(0, low, high)
+            found = minimise_each(squares, wanted, lower=low, upper=high, start=begin)
+            its = np.stack([optimum.x for optimum in found])
+        x[kind.places] = _within(its, low, high)
+    for stack in reduction.stacks:
+        a, its, now = stack.coefficients, stack.its, (stack.coefficients * x[stack.its]).sum(axis=1)
+        wanted = np.minimum(np.maximum(now, stack.lower), stack.upper)
+        out = now != wanted
+        low, high = reduction.lower[its[out]], reduction.upper[its[out]]
+        x[its[out]] = moved_along(a[out], x[its[out]], low, high, wanted[out])
+        for k in stack.knobs[out]:
+            knob = reduction.knobs[k]
+            if not (knob.is_free or reached[knob.lights[0]]):
+                x[list(reduction.places[k])] = _limited(knob, start)
+    return x
 
 
-def _touches(unknown: Unknown, channels: list[int]) -> bool:
-    return any(rgb[c] for _, rgb in unknown.columns for c in channels)
+def _limited(knob: Knob, start: Doubles) -> Doubles:
+    """The x of a light with a limit of luminance whose emission is nearest to `start`."""
+    assert knob.limit is not None
+    C = np.array([unknown.columns[0][1] for unknown in knob.unknowns])
+    lower = np.array([unknown.lower for unknown in knob.unknowns])
+    upper = np.array([unknown.upper for unknown in knob.unknowns])
+    cap = Cap(tuple(range(len(C))), *knob.limit)
+    right = C @ start[knob.lights[0]]
+    return _within(minimise(C @ C.T, right, lower=lower, upper=upper, caps=(cap,)).x, lower, upper)
+
+
+def _within(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
+    """x, (k,) or one knob a row, within its bounds, and at one that only round-off parts it from.
+
+    What is at a bound has a multiplier.
+    """
+    near = NEAR * np.abs(x).max(axis=-1, keepdims=True, initial=0)
+    x = np.where(np.abs(x - lower) <= near, lower, np.maximum(x, lower))
+    return np.asarray(np.where(np.abs(x - upper) <= near, upper, np.minimum(x, upper)))
+
+
+def _optima(
+    parts: Sequence[ReducedProblem],
+    x: Doubles,
+    *,
+    method: Method,
+    tolerance: float,
+    max_sweeps: int,
+) -> list[Optimum]:
+    """The optimum of each, begun at its part of x; together where they are of one kind."""
+    if len({p.its.size for p in parts}) == 1 and not any(p.caps for p in parts):
+        return minimise_each(
+            np.stack([p.M for p in parts]),
+            np.stack([p.b for p in parts]),
+            lower=np.stack([p.lower for p in parts]),
+            upper=np.stack([p.upper for p in parts]),
+            start=np.stack([x[p.its] for p in parts]),
+            method=method,
+            tolerance=tolerance,
+            max_sweeps=max_sweeps,
+        )
+
+    def solve(problem: ReducedProblem) -> Optimum:
+        return minimise(
+            problem.M,
+            problem.b,
+            lower=problem.lower,
+            upper=problem.upper,
+            caps=problem.caps,
+            start=x[problem.its],
+            method=method,
+            tolerance=tolerance,
+            max_sweeps=max_sweeps,
+        )
+
+    return side_by_side(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
+
+
+def _in_the_dark(
+    equations: NormalEquations, lit: Bools, start: Doubles, *, is_coupled: bool
+) -> tuple[Doubles, Doubles]:
+    """M and b with nothing in them of lights that reach nothing in a channel: these stay.
+
+    is_coupled: whether unknowns span channels. A light that reaches something in one is then
+    drawn to its start in the others.
+    """
+    M = equations.M * (lit.T[:, :, None] & lit.T[:, None, :])
+    b = equations.b * lit.T
+    if not is_coupled:
+        return M, b
+    power = np.einsum("cii->ic", equations.M).max(axis=1)
+    for k, c in np.argwhere(lit.any(axis=1, keepdims=True) & ~lit):
+        M[c, k, k] = FAINT * power[k]
+        b[c, k] = FAINT * power[k] * start[k, c]
+    return M, b

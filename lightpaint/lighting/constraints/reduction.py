@@ -6,31 +6,27 @@ and moves to the right-hand side. Limits are bounds on x, or on its luminance. S
 asked for, the problem stays one convex quadratic.
 """
 
-import difflib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
-from typing import Any
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.basis import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.algebra.optimum import Cap
-from lightpaint.lighting.constraints.constraints import (
-    Constraints,
-    Level,
-    LightConstraint,
-    Lock,
-    Tie,
-    is_pattern,
-    overlaid,
+from lightpaint.lighting.algebra.quadratic import Cap
+from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
+from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, Lock, Tie
+from lightpaint.lighting.constraints.limits import (
+    ROUND_OFF,
+    check_grey,
+    check_room,
+    dimmer_limits,
+    mix_limits,
 )
-
-#: Share by which a lower limit may exceed an upper one before they contradict: round-off.
-ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -42,32 +38,251 @@ class Unknown:
     upper: float = np.inf
 
 
-@dataclass
+@dataclass(frozen=True)
+class Knob:
+    """What turns by itself: a light, or several on one dimmer.
+
+    limit: coefficients, least and most of a sum over its unknowns, if one is limited.
+    """
+
+    lights: tuple[int, ...]
+    unknowns: tuple[Unknown, ...]
+    limit: tuple[tuple[float, ...], float, float] | None = None
+
+    @cached_property
+    def is_free(self) -> bool:
+        """Whether it is a light of three channels, each by itself."""
+        return len(self.unknowns) == 3 and all(
+            len(u.columns) == 1 and (u.columns[0][1] == axis).all()
+            for u, axis in zip(self.unknowns, np.eye(3), strict=True)
+        )
+
+    def off(self) -> "Knob":
+        """It at 0."""
+        return replace(
+            self, unknowns=tuple(replace(u, lower=0.0, upper=0.0) for u in self.unknowns)
+        )
+
+    @classmethod
+    def of_any_colour(cls, light: int, *, is_scalar: bool = False) -> "Knob":
+        """A light of which nothing is asked."""
+        colours = np.ones((1, 3)) if is_scalar else np.eye(3)
+        return cls((light,), tuple(Unknown(((light, rgb),)) for rgb in colours))
+
+
+@dataclass(frozen=True)
+class Entries:
+    """What is not 0 in C_c, the part of C in one channel, column by column.
+
+    here: (j,), the columns that there are. lights, values: (e,), of each entry. first: (j,), where
+    among these each column begins.
+    """
+
+    here: Indices
+    lights: Indices
+    values: Doubles
+    first: Indices
+
+
+@dataclass(frozen=True)
+class Block:
+    """Channels that unknowns couple, which x these are, their entries by channel, and their caps.
+
+    The unknowns of the caps are numbered within the block.
+    """
+
+    channels: list[int]
+    its: Indices
+    entries: tuple[Entries, ...]
+    caps: tuple[Cap, ...]
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether its unknowns are weights of lights in one channel, as they are."""
+        [first, *more] = self.entries
+        return not more and bool((first.values == 1).all()) and first.lights.size == self.its.size
+
+    @cached_property
+    def is_in_order(self) -> bool:
+        """Whether these are the first lights, one after the other."""
+        lights = self.entries[0].lights
+        return bool((lights == np.arange(lights.size)).all())
+
+
+@dataclass(frozen=True)
+class Kind:
+    """K knobs of as many unknowns, u, and lights, l, each.
+
+    places: (k, u), which x they are. lights: (k, l). columns: (k, u, 3 l), their emissions.
+    """
+
+    places: Indices
+    lights: Indices
+    columns: Doubles
+
+    @cached_property
+    def is_orthogonal(self) -> bool:
+        """Whether the unknowns of a knob do not share channels: each is nearest by itself."""
+        return bool((((self.columns != 0).sum(axis=1)) <= 1).all())
+
+    @classmethod
+    def of(cls, reduction: "Reduction", knobs: Sequence[int]) -> "Kind":
+        """Of these, by number."""
+        some = [reduction.knobs[k] for k in knobs]
+        columns = np.zeros((len(some), len(some[0].unknowns), len(some[0].lights), 3))
+        for k, knob in enumerate(some):
+            for j, unknown in enumerate(knob.unknowns):
+                for light, rgb in unknown.columns:
+                    columns[k, j, knob.lights.index(light)] = rgb
+        return cls(
+            np.array([reduction.places[k] for k in knobs], dtype=np.intp),
+            np.array([knob.lights for knob in some], dtype=np.intp),
+            columns.reshape(*columns.shape[:2], -1),
+        )
+
+
+@dataclass(frozen=True)
+class Stack:
+    """K knobs of as many unknowns, u, each with a sum that is limited.
+
+    knobs, lower, upper: (k,). its, coefficients: (k, u).
+    """
+
+    knobs: Indices
+    its: Indices
+    coefficients: Doubles
+    lower: Doubles
+    upper: Doubles
+
+    @classmethod
+    def of(cls, reduction: "Reduction", size: int) -> "Stack":
+        """Those of this size."""
+        some = [
+            (k, knob.limit)
+            for k, knob in enumerate(reduction.knobs)
+            if knob.limit is not None and len(knob.unknowns) == size
+        ]
+        return cls(
+            np.array([k for k, _ in some], dtype=np.intp),
+            np.array([reduction.places[k] for k, _ in some], dtype=np.intp),
+            np.array([limit[0] for _, limit in some]),
+            np.array([limit[1] for _, limit in some]),
+            np.array([limit[2] for _, limit in some]),
+        )
+
+
+@dataclass(frozen=True)
 class Reduction:
     """What is left to solve for.
 
-    held: (n, 3), w₀: the emission of lights without an unknown; 0 for the others.
-    unknowns: in order; caps: limits on sums of them.
-    knobs: (lights, unknowns) of what turns by itself: a light, or several on one dimmer.
+    held: (n, 3), w₀: the emission of lights without a knob; 0 for the others.
     labels: for each light what is asked of it in few words; "" for nothing.
+    knobs: their unknowns one after the other are the x.
     """
 
     held: Doubles
-    labels: list[str]
-    unknowns: list[Unknown] = field(default_factory=list)
-    caps: list[Cap] = field(default_factory=list)
-    knobs: list[tuple[tuple[int, ...], tuple[int, ...]]] = field(default_factory=list)
+    labels: tuple[str, ...]
+    knobs: tuple[Knob, ...]
 
-    def add(self, unknowns: Sequence[Unknown], limits: tuple[Doubles, float, float] | None) -> None:
-        """A knob. limits: (coefficients, least, most) of a sum over its unknowns."""
-        first = len(self.unknowns)
-        its = tuple(range(first, first + len(unknowns)))
-        self.unknowns += unknowns
-        lights = tuple(dict.fromkeys(light for x in unknowns for light, _ in x.columns))
-        self.knobs.append((lights, its))
-        if limits is not None:
-            coefficients, least, most = limits
-            self.caps.append(Cap(its, tuple(map(float, coefficients)), least, most))
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """All x in their order."""
+        return tuple(x for knob in self.knobs for x in knob.unknowns)
+
+    @cached_property
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """Which of the x are a knob's, for each."""
+        ends = np.cumsum([0, *(len(knob.unknowns) for knob in self.knobs)]).tolist()
+        return tuple(tuple(range(first, last)) for first, last in pairwise(ends))
+
+    @cached_property
+    def caps(self) -> tuple[Cap, ...]:
+        """Limits on sums of x."""
+        return tuple(
+            Cap(its, *knob.limit)
+            for its, knob in zip(self.places, self.knobs, strict=True)
+            if knob.limit is not None
+        )
+
+    @cached_property
+    def lower(self) -> Doubles:
+        """(k,), the least that each x may be."""
+        return np.array([x.lower for x in self.unknowns])
+
+    @cached_property
+    def upper(self) -> Doubles:
+        """(k,), the most."""
+        return np.array([x.upper for x in self.unknowns])
+
+    @cached_property
+    def columns(self) -> tuple[Indices, Indices, Doubles]:
+        """C by what is in it: unknown, light and (3,) emission of each entry, unknowns in order."""
+        entries = [(k, i, rgb) for k, x in enumerate(self.unknowns) for i, rgb in x.columns]
+        return (
+            np.array([k for k, _, _ in entries], dtype=np.intp),
+            np.array([i for _, i, _ in entries], dtype=np.intp),
+            np.array([rgb for _, _, rgb in entries], dtype=np.float64).reshape(-1, 3),
+        )
+
+    @cached_property
+    def stacks(self) -> tuple[Stack, ...]:
+        """The limited knobs by how many unknowns they have."""
+        sizes = {len(knob.unknowns) for knob in self.knobs if knob.limit is not None}
+        return tuple(Stack.of(self, size) for size in sorted(sizes))
+
+    @cached_property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The knobs by how many unknowns and lights they have."""
+        found: dict[tuple[int, int], list[int]] = {}
+        for k, knob in enumerate(self.knobs):
+            found.setdefault((len(knob.unknowns), len(knob.lights)), []).append(k)
+        return tuple(Kind.of(self, its) for its in found.values())
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """A block for every set of channels that the unknowns couple."""
+        unknown, light, rgb = self.columns
+        made = []
+        for channels in self.channel_groups:
+            its = np.unique(unknown[(rgb[:, channels] != 0).any(axis=1)])
+            place = np.zeros(len(self.unknowns), dtype=np.intp)
+            place[its] = np.arange(its.size)
+            entries = []
+            for c in channels:
+                there = rgb[:, c] != 0
+                here, first = np.unique(place[unknown[there]], return_index=True)
+                entries.append(Entries(here, light[there], rgb[there, c], first))
+            within = set(its.tolist())
+            caps = tuple(
+                replace(cap, unknowns=tuple(int(place[i]) for i in cap.unknowns))
+                for cap in self.caps
+                if cap.unknowns[0] in within
+            )
+            made.append(Block(channels, its, tuple(entries), caps))
+        return tuple(made)
+
+    def weights(self, x: Doubles) -> Doubles:
+        """w = C x + w₀, (n, 3)."""
+        unknown, light, rgb = self.columns
+        w = self.held.copy()
+        np.add.at(w, light, x[unknown, None] * rgb)
+        return w
+
+    @cached_property
+    def channel_groups(self) -> list[list[int]]:
+        """Channels that one problem couples; apart where no unknown and no limit joins them."""
+        unknown, _, rgb = self.columns
+        touched: Bools = np.zeros((len(self.unknowns) + len(self.caps), 3), dtype=bool)
+        np.logical_or.at(touched, unknown, rgb != 0)
+        for k, cap in enumerate(self.caps):
+            touched[len(self.unknowns) + k] = touched[list(cap.unknowns)].any(axis=0)
+        groups = [{0}, {1}, {2}]
+        for row in np.unique(touched, axis=0):
+            channels = set(np.flatnonzero(row).tolist())
+            meeting = [group for group in groups if group & channels]
+            groups = [group for group in groups if not group & channels]
+            groups.append(set().union(*meeting))
+        return sorted(sorted(group) for group in groups if group)
 
 
 def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
@@ -76,45 +291,58 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
     Raises ConstraintError for a light that is not there, and for what cannot be had: a
     colour of a light that has only a dimmer, a light on two dimmers, limits without room.
     """
-    asked = _of_each_light(constraints, lights)
+    asked = of_each_light(constraints, lights)
     labels = ["" if one is None else one.label for one in asked]
-    reduction = Reduction(np.zeros((len(lights), 3)), labels)
-    tied = _tied(constraints, lights)
+    tied, held, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
     for k, (light, one) in enumerate(zip(lights, asked, strict=True)):
         if light.is_fixed:
-            reduction.held[k] = 1
+            held[k] = 1
         elif k in tied:
             tie, members = tied[k]
+            names = ", ".join(lights[i].name for i in members)
+            labels[k] = ", ".join(filter(None, [f"tied ({names})", labels[k]]))
             if k == members[0]:
-                _add_tie(reduction, tie, members, lights, asked)
+                knobs.append(_tie(tie, members, names, lights, asked))
         elif one is not None and (one.off or one.lock is not None):
-            reduction.held[k] = 0 if one.lock is None else _locked(light, one.lock, one.where)
+            held[k] = 0 if one.lock is None else _locked(light, one.lock, one.where)
+        elif one is None:
+            knobs.append(Knob.of_any_colour(k, is_scalar=light.is_scalar))
+        elif light.is_scalar or (one.primaries is not None and len(one.primaries) == 1):
+            knobs.append(Knob((k,), (_dimmer(k, light, one),)))
         else:
-            _add_light(reduction, k, light, one)
-    return reduction
+            knobs.append(_mix(k, light, one))
+    return Reduction(held, tuple(labels), tuple(knobs))
 
 
-def _add_light(
-    reduction: Reduction, k: int, light: BasisLight, asked: LightConstraint | None
-) -> None:
-    one = asked or LightConstraint()
-    if light.is_scalar or (one.primaries is not None and len(one.primaries) == 1):
-        reduction.add([_dimmer(k, light, one)], None)
-        return
+def only(reduction: Reduction, chosen: Collection[int]) -> Reduction:
+    """`reduction` with the knobs that are not chosen at 0."""
+    labels, knobs = [*reduction.labels], [*reduction.knobs]
+    for k, knob in enumerate(knobs):
+        if k not in chosen:
+            knobs[k] = knob.off()
+            for light in knob.lights:
+                labels[light] = ", ".join(filter(None, [labels[light], "left out"]))
+    return replace(reduction, labels=tuple(labels), knobs=tuple(knobs))
+
+
+def _mix(k: int, light: BasisLight, one: LightConstraint) -> Knob:
+    """A light of several primaries, of which each is dimmed by itself."""
     colours = np.eye(3) if one.primaries is None else np.array(one.primaries)
-    lower, upper, least, most = _mix_limits(one, light, len(colours))
+    lower, upper, least, most = mix_limits(one, light, len(colours))
     unknowns = [
-        Unknown(((k, colours[j]),), float(lower[j]), float(upper[j])) for j in range(len(colours))
+        Unknown(((k, rgb),), float(low), float(high))
+        for rgb, low, high in zip(colours, lower, upper, strict=True)
     ]
     coefficients = np.asarray(luminance(colours), np.float64)
-    is_limited = least > 0 or np.isfinite(most)
     darkest, brightest = float(coefficients @ lower), float(coefficients @ upper)
-    _check_room(one, light, max(least, darkest), most)
-    _check_room(one, light, least, min(most, brightest))
+    check_room(one, light, max(least, darkest), most)
+    check_room(one, light, least, min(most, brightest))
+    if least == 0 and np.isinf(most):
+        return Knob((k,), tuple(unknowns))
     # Round-off may have parted ends that are the same.
     most = max(most, darkest)
     least = min(least, most, brightest)
-    reduction.add(unknowns, (coefficients, least, most) if is_limited else None)
+    return Knob((k,), tuple(unknowns), (tuple(map(float, coefficients)), least, most))
 
 
 def _dimmer(k: int, light: BasisLight, one: LightConstraint) -> Unknown:
@@ -125,22 +353,21 @@ def _dimmer(k: int, light: BasisLight, one: LightConstraint) -> Unknown:
             "use lock, limits, tie or off"
         )
     direction = np.ones(3) if one.primaries is None else np.array(one.primaries[0])
-    _check_grey(one, light)
-    lower, upper = _dimmer_limits(one, direction, light)
-    _check_room(one, light, lower, upper)
+    check_grey(one, light)
+    lower, upper = dimmer_limits(one, direction, light)
+    check_room(one, light, lower, upper)
     # Round-off may have parted ends that are the same.
     return Unknown(((k, direction),), min(lower, upper), upper)
 
 
-def _add_tie(
-    reduction: Reduction,
+def _tie(
     tie: Tie,
     members: Sequence[int],
+    names: str,
     lights: Sequence[BasisLight],
     asked: Sequence[LightConstraint | None],
-) -> None:
+) -> Knob:
     """One unknown for all members; at 1 they have their present luminances."""
-    names = ", ".join(lights[k].name for k in members)
     columns, lower, upper = [], 0.0, np.inf
     for k in members:
         light, one = lights[k], asked[k] or LightConstraint()
@@ -162,17 +389,16 @@ def _add_tie(
                 "dimmed as a whole"
             )
         direction = present if color is None else np.array(color) * float(luminance(present))
-        _check_grey(one, light)
-        least, most = _dimmer_limits(one, direction, light)
+        check_grey(one, light)
+        least, most = dimmer_limits(one, direction, light)
         lower, upper = max(lower, least), min(upper, most)
         columns.append((k, direction))
-        reduction.labels[k] = ", ".join(filter(None, [f"tied ({names})", one.label]))
     if lower > upper * (1 + ROUND_OFF):
         raise ConstraintError(
             f"{tie.where}: the limits of {names} contradict each other on one dimmer: one light "
             f"asks for at least {lower:.4g} times the present, another for at most {upper:.4g}"
         )
-    reduction.add([Unknown(tuple(columns), min(lower, upper), upper)], None)
+    return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))
 
 
 def _locked(light: BasisLight, lock: Lock, where: str) -> Doubles:
@@ -199,162 +425,3 @@ def _locked(light: BasisLight, lock: Lock, where: str) -> Doubles:
         assert not isinstance(level.amount, tuple)
         amount = level.amount * (now if level.is_share else 1.0)
     return np.asarray(color * amount)
-
-
-def _dimmer_limits(
-    asked: LightConstraint, direction: Doubles, light: BasisLight
-) -> tuple[float, float]:
-    """Bounds on x for an emission of x times `direction`."""
-    lower, upper = 0.0, np.inf
-    for level, is_least in ((asked.least, True), (asked.most, False)):
-        if level is None:
-            continue
-        if isinstance(level.amount, tuple):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                bounds = np.array(level.amount) / direction
-            # What has none of a channel keeps to any upper limit there, and to no lower one.
-            bounds = np.where(direction > 0, bounds, np.inf)
-            if is_least:
-                bounds = np.where((direction == 0) & (np.array(level.amount) == 0), 0, bounds)
-            bound = float(bounds.max() if is_least else bounds.min())
-        else:
-            bound = _luminance(level, light, asked) / float(luminance(direction))
-        lower, upper = (max(lower, bound), upper) if is_least else (lower, min(upper, bound))
-    return lower, upper
-
-
-def _mix_limits(
-    asked: LightConstraint, light: BasisLight, count: int
-) -> tuple[Doubles, Doubles, float, float]:
-    """Bounds on the unknowns, and on the luminance of their sum."""
-    lower, upper = np.zeros(count), np.full(count, np.inf)
-    least, most = 0.0, np.inf
-    for level, is_least in ((asked.least, True), (asked.most, False)):
-        if level is None:
-            continue
-        if not isinstance(level.amount, tuple):
-            value = _luminance(level, light, asked)
-            least, most = (value, most) if is_least else (least, value)
-        elif asked.primaries is not None:
-            raise ConstraintError(
-                f"{asked.where}.limits has {level} for a light that mixes primaries: give a "
-                "luminance like 2.5 or a share like 40%"
-            )
-        elif is_least:
-            lower = np.array(level.amount)
-        else:
-            upper = np.array(level.amount)
-    _check_room(asked, light, lower, upper)
-    return lower, upper, least, most
-
-
-def _luminance(level: Level, light: BasisLight, asked: LightConstraint) -> float:
-    assert not isinstance(level.amount, tuple)
-    if not level.is_share:
-        return level.amount
-    now = float(luminance(np.array(light.emission)))
-    if now == 0:
-        raise ConstraintError(
-            f"{asked.where}.limits has {level} of the present, and {light.name!r} is off at "
-            "present: give a number"
-        )
-    return level.amount * now
-
-
-def _check_grey(asked: LightConstraint, light: BasisLight) -> None:
-    for level in (asked.least, asked.most):
-        if light.is_scalar and level is not None and isinstance(level.amount, tuple):
-            raise ConstraintError(
-                f"{asked.where}.limits has {level}, and {light.name!r} can only be dimmed as a "
-                "whole: give one number"
-            )
-
-
-def _check_room(asked: LightConstraint, light: BasisLight, lower: Any, upper: Any) -> None:
-    if (np.asarray(lower) > np.asarray(upper) * (1 + ROUND_OFF)).any() or np.isinf(lower).any():
-        raise ConstraintError(
-            f"{asked.where} asks of {light.name!r} for {asked.label}, which leaves it no emission "
-            "at all: widen the limits"
-        )
-
-
-def _of_each_light(
-    constraints: Constraints, lights: Sequence[BasisLight]
-) -> list[LightConstraint | None]:
-    """All that is asked of each light, patterns below names."""
-    asked: list[Mapping[str, Any]] = [{} for _ in lights]
-    where = ["" for _ in lights]
-    for name, wish, origin in constraints.lights:
-        for k in _found(name, lights, origin, only_keeps=wish == {"lock": True}):
-            asked[k] = overlaid(asked[k], wish)
-            where[k] = origin
-    return [
-        LightConstraint.of(a, where=w) if a else None for a, w in zip(asked, where, strict=True)
-    ]
-
-
-def _tied(
-    constraints: Constraints, lights: Sequence[BasisLight]
-) -> dict[int, tuple[Tie, list[int]]]:
-    """The tie of each light that is in one, and its members in their order."""
-    tie_of: dict[int, tuple[Tie, list[int]]] = {}
-    for tie in constraints.ties:
-        members = sorted({k for name in tie.lights for k in _found(name, lights, tie.where)})
-        listed = ", ".join(tie.lights)
-        if len(members) < 2:
-            raise ConstraintError(f"{tie.where}: {listed} is one light: a tie has at least two")
-        for k in members:
-            if k in tie_of:
-                raise ConstraintError(
-                    f"{tie.where}: light {lights[k].name!r} is in two ties, "
-                    f"{', '.join(tie_of[k][0].lights)} and {listed}: it has one dimmer"
-                )
-            tie_of[k] = (tie, members)
-    return tie_of
-
-
-def _found(
-    name: str, lights: Sequence[BasisLight], where: str, *, only_keeps: bool = False
-) -> list[int]:
-    """The light of this name, else all that match it as a pattern."""
-    names = [light.name for light in lights]
-    for k, light in enumerate(lights):
-        if name == light.name and not light.is_fixed:
-            return [k]
-        if name != light.name and name not in light.members:
-            continue
-        if light.is_fixed:
-            if only_keeps:
-                return []  # as it does anyway
-            raise ConstraintError(
-                f"{where}: {name!r} is not among the lights to adjust, and stays as it is: "
-                "choose it with --lights, or ask nothing of it"
-            )
-        if name not in names:
-            raise ConstraintError(
-                f"{where}: {name!r} is part of the light {light.name!r}: ask it of that"
-            )
-    matching = fnmatchcase if is_pattern(name) else str.__eq__
-    found = [k for k, x in enumerate(lights) if not x.is_fixed and matching(x.name, name)]
-    if not found:
-        there = [light.name for light in lights if not light.is_fixed]
-        close = difflib.get_close_matches(name, there, n=1)
-        hint = f"did you mean {close[0]!r}? There" if close else "there"
-        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {', '.join(there)}")
-    return found
-
-
-def channel_groups(reduction: Reduction) -> list[list[int]]:
-    """Channels that one problem couples; apart where no unknown and no cap joins them."""
-    touched = [_channels([x]) for x in reduction.unknowns]
-    touched += [_channels([reduction.unknowns[k] for k in cap.unknowns]) for cap in reduction.caps]
-    groups = [{0}, {1}, {2}]
-    for channels in touched:
-        joined = [group for group in groups if group & channels]
-        groups = [group for group in groups if not group & channels]
-        groups.append(set().union(*joined))
-    return sorted(sorted(group) for group in groups if group)
-
-
-def _channels(unknowns: Iterable[Unknown]) -> set[int]:
-    return {int(c) for x in unknowns for _, rgb in x.columns for c in np.flatnonzero(rgb)}

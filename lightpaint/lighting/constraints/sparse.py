@@ -6,15 +6,13 @@ solve of its lights, so the answer is optimal for the lights it uses.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem
-from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.constraints.reduction import Knob, Reduction
 
 #: Sizes beyond K that are tried, so that people see what a few more lights would bring.
 BEYOND = 2
@@ -27,19 +25,19 @@ class _Trials:
     """Values of the objective, less a constant, with some knobs on and the others at 0."""
 
     def __init__(self, problems: Sequence[ReducedProblem], reduction: Reduction) -> None:
-        self.problems, self.knobs = problems, reduction.knobs
+        self.problems, self.places = problems, reduction.places
         self.known: dict[frozenset[int], float] = {}
 
     def value(self, chosen: Collection[int]) -> float:
         key = frozenset(chosen)
         if key not in self.known:
-            on = {k for knob in key for k in self.knobs[knob][1]}
+            on = {k for knob in key for k in self.places[knob]}
             self.known[key] = sum(_value(problem, on) for problem in self.problems)
         return self.known[key]
 
     def added(self, chosen: frozenset[int]) -> frozenset[int]:
         """`chosen` and the knob that helps most."""
-        rest = [k for k in range(len(self.knobs)) if k not in chosen]
+        rest = [k for k in range(len(self.places)) if k not in chosen]
         return chosen | {min(rest, key=lambda k: self.value(chosen | {k}))}
 
     def exchanged(self, chosen: frozenset[int], kept: Collection[int]) -> frozenset[int]:
@@ -49,7 +47,7 @@ class _Trials:
             trials = [
                 chosen - {old} | {new}
                 for old in chosen.difference(kept)
-                for new in range(len(self.knobs))
+                for new in range(len(self.places))
                 if new not in chosen
             ]
             best = min(trials, key=self.value, default=chosen)
@@ -66,7 +64,7 @@ def best_knobs(
     Several lights on one dimmer count as one. Knobs with a lower limit above 0 are always on.
     Raises ConstraintError if these are more.
     """
-    kept = frozenset(k for k, (_, its) in enumerate(reduction.knobs) if _is_on(reduction, its))
+    kept = frozenset(k for k, knob in enumerate(reduction.knobs) if _is_on(knob))
     if len(kept) > count:
         raise ConstraintError(
             f"sparse is {count}, but {len(kept)} lights have a lower limit above 0: allow as many"
@@ -80,33 +78,14 @@ def best_knobs(
     return path
 
 
-def only(reduction: Reduction, chosen: Collection[int]) -> Reduction:
-    """`reduction` with the knobs that are not chosen at 0."""
-    unknowns, labels, caps = [*reduction.unknowns], [*reduction.labels], [*reduction.caps]
-    for k, (lights, its) in enumerate(reduction.knobs):
-        if k not in chosen:
-            for i in its:
-                unknowns[i] = replace(unknowns[i], lower=0.0, upper=0.0)
-            for light in lights:
-                labels[light] = ", ".join(filter(None, [labels[light], "left out"]))
-    return replace(reduction, unknowns=unknowns, labels=labels, caps=caps)
-
-
-def _is_on(reduction: Reduction, its: Sequence[int]) -> bool:
-    bounded = any(reduction.unknowns[i].lower > 0 for i in its)
-    return bounded or any(cap.lower > 0 and cap.unknowns[0] in its for cap in reduction.caps)
+def _is_on(knob: Knob) -> bool:
+    """Whether a lower limit keeps it from being off."""
+    return any(x.lower > 0 for x in knob.unknowns) or (knob.limit is not None and knob.limit[1] > 0)
 
 
 def _value(problem: ReducedProblem, on: Collection[int]) -> float:
     """min xᵀM x − 2 bᵀx over the unknowns that are on."""
-    here = np.array([k for k, i in enumerate(problem.its) if i in on], dtype=int)
-    place = {int(k): j for j, k in enumerate(here)}
-    caps = [
-        replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
-        for cap in problem.caps
-        if cap.unknowns[0] in place
-    ]
-    M: Doubles = problem.M[np.ix_(here, here)]
-    b = problem.b[here]
-    x = minimise(M, b, lower=problem.lower[here], upper=problem.upper[here], caps=caps).x
-    return float(x @ M @ x - 2 * b @ x)
+    here = np.array([k for k, i in enumerate(problem.its.tolist()) if i in on], dtype=np.intp)
+    p = problem.of(here)
+    x = minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps).x
+    return float(x @ p.M @ x - 2 * p.b @ x)

@@ -85,6 +85,6 @@ def test_two_lights_at_one_place_are_named_in_spite_of_noise():
     seen = np.zeros((16, 16), dtype=bool)
     basis = Basis(lights, images, noise[1].astype(np.float32), seen, origin)
     target = Target("t", basis.mix(np.ones((3, 3))), np.ones((16, 16), np.float32), False)
-    [found] = ambiguities(basis, solve(basis, target))
+    [found] = ambiguities(solve(basis, target))
     assert found.names == ("a", "c")
     assert not found.is_mix

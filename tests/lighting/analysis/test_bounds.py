@@ -163,7 +163,7 @@ def _solved(make_basis: Any, seed: int) -> Any:
     wishes, ties, asked = _random(rng, basis)
     constraints = Constraints.of(wishes, tie=ties)
     solution = solve(basis, target, constraints=constraints)
-    assert solution.quality.converged
+    assert solution.certificate.converged
     return basis, target, solution, asked
 
 
@@ -174,7 +174,7 @@ def test_each_gain_is_that_of_the_problem_without_that_one_bound(
     basis, target, solution, asked = _solved(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
-    bounds, left_out = release.bounds_of(basis, solution)
+    bounds, left_out = release.bounds_of(solution)
     assert left_out == 0
     assert [b.gain for b in bounds] == sorted((b.gain for b in bounds), reverse=True)
     before, scale = _best(R, q, asked), q @ q
@@ -231,7 +231,7 @@ def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed
     basis, target, solution, asked = _solved(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
-    bounds, _ = release.bounds_of(basis, solution)
+    bounds, _ = release.bounds_of(solution)
     for bound in bounds:
         assert len(bound.multiplier) == {"emission": 3, "luminance": 1}.get(
             bound.per, len(bound.lights)
@@ -261,7 +261,7 @@ def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
         basis, target, solution, _ = _solved(make_basis, seed)
         R, q = _reduced(basis, target)
         allowed = 1e-12 * (q @ q) / STEP + 4 * STEP * np.square(R).sum(axis=0).max() * 6
-        for bound in release.bounds_of(basis, solution)[0]:
+        for bound in release.bounds_of(solution)[0]:
             size = max(np.abs(bound.multiplier)) / allowed
             sizes.setdefault(bound.kind, []).append(size)
     assert set(sizes) == {"zero", "lock", "off", "tie", "limits", "colour"}
@@ -279,13 +279,13 @@ def test_a_limit_of_luminance(make_basis: Any, seed: int, is_least: bool) -> Non
     def objective(limit: float) -> tuple[float, Any]:
         asked = {"l1": {"limits": {"min" if is_least else "max": limit}}}
         solution = solve(basis, target, constraints=Constraints.of(asked))
-        return sum(solution.quality.objective), solution
+        return sum(solution.certificate.objective), solution
 
     before, solution = objective(level)
     if level == 0:
         return
-    [bound] = (b for b in release.bounds_of(basis, solution)[0] if b.kind == "limits")
-    free = sum(solve(basis, target).quality.objective)
+    [bound] = (b for b in release.bounds_of(solution)[0] if b.kind == "limits")
+    free = sum(solve(basis, target).certificate.objective)
     norm2 = float(solution.equations.target_norm2.sum())
     assert bound.gain == pytest.approx(before - free, abs=SAME * norm2)
     assert bound.per == "luminance"
@@ -310,7 +310,7 @@ def test_lights_that_sparse_leaves_out(make_basis: Any, seed: int) -> None:
     asked[0] = Asked((0,), _on(6, 0, ends), np.zeros(2), np.full(2, np.inf), np.zeros(18))
     on = [k for k in range(6) if w[k].any()]
     before = _best(R, q, [asked[k] for k in on])
-    bounds = [b for b in release.bounds_of(basis, solution)[0] if b.kind == "left out"]
+    bounds = [b for b in release.bounds_of(solution)[0] if b.kind == "left out"]
     # Each as what else is asked of it allows: l0 is still white.
     gains = {k: before - _best(R, q, [asked[j] for j in (*on, k)]) for k in set(range(6)) - set(on)}
     told = {basis.names.index(b.lights[0]): b for b in bounds}
@@ -328,8 +328,8 @@ def test_with_a_pull_the_gain_is_of_the_miss_alone(make_basis: Any, seed: int) -
     off = Constraints.of({"l1": {"off": True}}, prefer_current=0.02)
     solution = solve(basis, target, constraints=off)
     without = solve(basis, target, constraints=Constraints.of(prefer_current=0.02))
-    gain = sum(solution.quality.objective) - sum(without.quality.objective)
-    found = [b for b in release.bounds_of(basis, solution)[0] if b.kind == "off"]
+    gain = sum(solution.certificate.objective) - sum(without.certificate.objective)
+    found = [b for b in release.bounds_of(solution)[0] if b.kind == "off"]
     norm2 = float(solution.equations.target_norm2.sum())
     for bound in found:
         assert bound.gain == pytest.approx(gain, abs=SAME * norm2)
@@ -343,9 +343,9 @@ def test_a_kept_light_stands_in_the_way_under_constraints_too(make_basis: Any) -
     held_back = replace(basis, lights=(kept, *basis.lights[1:]))
     wish = {"l1": {"color": "3200K"}}
     solution = solve(held_back, target, constraints=Constraints.of(wish))
-    [bound] = (b for b in release.bounds_of(held_back, solution)[0] if b.kind == "kept")
+    [bound] = (b for b in release.bounds_of(solution)[0] if b.kind == "kept")
     free = solve(basis, target, constraints=Constraints.of(wish))
-    gain = sum(solution.quality.objective) - sum(free.quality.objective)
+    gain = sum(solution.certificate.objective) - sum(free.certificate.objective)
     assert bound.gain == pytest.approx(gain, rel=1e-8)
 
 
@@ -353,7 +353,7 @@ def test_the_scene_with_twelve_lights_has_all_of_its_bounds(make_basis: Any) -> 
     basis, target = _problem(make_basis, 1, 12)
     wish = {"l?": {"color": "3200K"}, "l11": {"limits": {"max": 0.01}}, "l10": {"off": True}}
     solution = solve(basis, target, constraints=Constraints.of(wish))
-    bounds, left_out = release.bounds_of(basis, solution)
+    bounds, left_out = release.bounds_of(solution)
     assert left_out == 0
     active = [light.name for light in solution.lighting.lights if light.is_active]
     assert set(active) == {b.lights[0] for b in bounds if b.kind != "zero"}
@@ -365,10 +365,10 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
     basis, target = _problem(make_basis, 2)
     wish = {"l*": {"off": True}, "l5": {"lock": 0.5}}
     solution = solve(basis, target, constraints=Constraints.of(wish))
-    every, none = release.bounds_of(basis, solution)
+    every, none = release.bounds_of(solution)
     assert none == 0
     monkeypatch.setattr(release, "RELEASED", 2)
-    found = diagnose(basis, target, solution)
+    found = diagnose(solution)
     assert len(found.bounds) == 2
     assert found.bounds_left_out == len(every) - 2
     assert set(found.bounds) <= set(every)
@@ -378,9 +378,9 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
 def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
     """By moving one light alone nothing is gained that moving all would not gain."""
     basis, _, solution, _ = _solved(make_basis, seed)
-    answer = release._answer(basis, solution, solution.solved)
+    answer = release._answer(solution, solution.problem.solved)
     norm2 = float(solution.equations.target_norm2.sum())
-    gains = {(b.lights, b.kind): b.gain for b in release.bounds_of(basis, solution)[0]}
+    gains = {(b.lights, b.kind): b.gain for b in release.bounds_of(solution)[0]}
     for h in held.all_held(answer):
         names = tuple(basis.names[k] for k in h.lights)
         if (names, h.kind) in gains and len(names) == 1:
@@ -388,12 +388,12 @@ def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
 
 
 def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None:
-    basis, target, solution, _ = _solved(make_basis, 7)
-    found = diagnose(basis, target, solution)
+    _basis, _target, solution, _ = _solved(make_basis, 7)
+    found = diagnose(solution)
     assert found.bounds
     path = tmp_path / "lighting.json"
     write_lighting(path, with_diagnosis(solution, found).lighting)
-    assert read_lighting(path).quality.bounds == found.bounds  # type: ignore[union-attr]
+    assert read_lighting(path).certificate.bounds == found.bounds  # type: ignore[union-attr]
     data = json.loads(path.read_text(encoding="utf-8"))
     assert set(data["solve"]["bounds"][0]) == {
         "lights", "kind", "held_by", "gain", "multiplier", "per",
@@ -401,7 +401,7 @@ def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None
     # An older file has none; one that was edited is refused in one line.
     write_lighting(path, solution.lighting)
     assert "bounds" not in json.loads(path.read_text(encoding="utf-8"))["solve"]
-    assert read_lighting(path).quality.bounds == ()  # type: ignore[union-attr]
+    assert read_lighting(path).certificate.bounds == ()  # type: ignore[union-attr]
     for key, value in (("kind", "fate"), ("lights", "l1"), ("gain", "x"), ("multiplier", 3)):
         broken = json.loads(json.dumps(data))
         broken["solve"]["bounds"][0][key] = value

@@ -30,7 +30,7 @@ def _halves() -> Any:
 
 
 def _diagnosis(basis: Any, target: Target) -> Any:
-    return diagnose(basis, target, solve(basis, target))
+    return diagnose(solve(basis, target))
 
 
 def test_a_mix_of_the_lights_misses_nothing(make_basis: Any):
@@ -121,12 +121,12 @@ def test_the_parts_add_up(make_basis: Any, seed: int, n: int, is_scalar: bool):
     importance[0, 0] = 1
     target = _target(rng.random((*SIZE, 3)) * rng.random(3), importance)
     solution = solve(basis, target)
-    found = diagnose(basis, target, solution)
+    found = diagnose(solution)
     parts = (found.unreachable, found.forbidden, found.noise, found.ignored)
     assert min(parts) >= 0
     assert sum(parts[:3]) == pytest.approx(found.total, rel=1e-12)
     # As the solve counts it, and as the pixels do, in float64 over float32.
-    assert found.total == pytest.approx(sum(solution.quality.objective), rel=1e-5)
+    assert found.total == pytest.approx(sum(solution.certificate.objective), rel=1e-5)
     D = importance[..., None]
     separate = (D * (found.unreachable_map**2 + found.forbidden_map**2)).sum()
     assert separate == pytest.approx(found.total, rel=1e-5)

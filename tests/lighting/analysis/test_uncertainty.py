@@ -72,7 +72,7 @@ def test_intervals_hold_the_answer_without_noise(
     for seed in range(SEEDS):
         images, halves = _noisy(clean, sigma, np.random.default_rng(seed))
         basis = _with_scalar(make_basis(images=images, half_differences=halves), *dimmed)
-        found = error_bars(basis, solve(basis, target))
+        found = error_bars(solve(basis, target))
         low, high = found.interval
         held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
         missed.append(np.square(found.weights - truth).mean())
@@ -93,7 +93,7 @@ def test_one_light_by_hand(make_basis: Any):
     basis = make_basis(images=image, half_differences=half)
     painted = rng.random((*SIZE, 3))
     solution = solve(basis, _target(painted))
-    found = error_bars(basis, solution)
+    found = error_bars(solution)
     M, w = np.square(image[0]).sum((0, 1)), found.weights[0]
     residual = painted - w * image[0]
     gradient = half[0] * residual - image[0] * w * half[0]
@@ -106,17 +106,17 @@ def test_one_light_by_hand(make_basis: Any):
         found.objective_noise, (np.square(w) * np.square(half[0])).sum((0, 1)), rtol=1e-4
     )
     # Without all of the noise the answer moves by just that bias.
-    corrected = correct_noise(basis, solution, share=1.0)
+    corrected = correct_noise(solution, share=1.0)
     np.testing.assert_allclose(
         corrected.lighting.weights_for(basis)[0], w + found.bias[0], rtol=1e-4
     )
-    np.testing.assert_allclose(error_bars(basis, corrected).bias, 0, atol=1e-5)
+    np.testing.assert_allclose(error_bars(corrected).bias, 0, atol=1e-5)
 
 
 def test_without_noise_nothing_is_uncertain(make_basis: Any):
     basis = make_basis(4, SIZE)
     solution = solve(basis, _painted(_pools()))
-    found = error_bars(basis, solution)
+    found = error_bars(solution)
     assert found.scatter.max() == 0
     np.testing.assert_allclose(found.bias, 0, atol=1e-5)
     errors = [x.standard_error for x in with_error_bars(solution, found).lighting.lights]
@@ -133,7 +133,7 @@ def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
     lights = (replace(basis.lights[0], is_fixed=True), *basis.lights[1:])
     basis = replace(basis, lights=lights)
     solution = solve(basis, _target(clean[0] + 0.5 * clean[1]))
-    found = error_bars(basis, solution)
+    found = error_bars(solution)
     assert not found.standard_error[[0, 2]].any()
     assert found.standard_error[1].all()
     told = with_error_bars(solution, found).lighting
@@ -159,15 +159,15 @@ def test_a_refinement_comes_closer(make_basis: Any, mixed_sigma: float):
         mix = np.einsum("nc,nhwc->hwc", weights, clean)
         image, half = _noisy(mix, mixed_sigma, rng)
         mixed = Estimate(image.astype(np.float32), half.astype(np.float32))
-        refined = refine(basis, plain, mixed)
-        assert refined.refinement is not None
-        shares.append(refined.refinement.share)
-        found = {"plain": plain, "corrected": correct_noise(basis, plain), "refined": refined}
+        refined = refine(plain, mixed)
+        assert refined.problem.refinement is not None
+        shares.append(refined.problem.refinement.share)
+        found = {"plain": plain, "corrected": correct_noise(plain), "refined": refined}
         for name, solution in found.items():
             w = solution.lighting.weights_for(basis)
             value = best.equations.objective(w) - best.equations.objective(truth)
             excess[name].append(float(value.sum()))
-        low, high = error_bars(basis, refined).interval
+        low, high = error_bars(refined).interval
         held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
     mean = {name: np.mean(values) for name, values in excess.items()}
     assert mean["corrected"] < 0.9 * mean["plain"]
@@ -181,7 +181,7 @@ def test_the_render_of_the_mix_has_the_size_of_the_basis(make_basis: Any):
     solution = solve(basis, _painted(_pools()))
     small = np.zeros((12, 12, 3), np.float32)
     with pytest.raises(SizeError, match="render of the mix is 12x12 but the basis is 24x24"):
-        refine(basis, solution, Estimate(small, small))
+        refine(solution, Estimate(small, small))
 
 
 def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
@@ -190,18 +190,18 @@ def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
     basis = replace(basis, origin=replace(basis.origin, halves=(0, 0)))
     solution = solve(basis, _painted(_pools()))
     image = 1.3 * basis.mix(solution.lighting.weights_for(basis))
-    assert error_bars(basis, solution) is None
+    assert error_bars(solution) is None
     with pytest.raises(BasisError, match="says nothing of its noise"):
-        refine(basis, solution, Estimate(image, 0.05 * image))
+        refine(solution, Estimate(image, 0.05 * image))
     with pytest.raises(BasisError, match="says nothing of its noise"):
-        correct_noise(basis, solution)
+        correct_noise(solution)
 
 
 def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
     basis = make_basis(4, SIZE)
     solution = solve(basis, _painted(_pools()))
     image = basis.mix(solution.lighting.weights_for(basis))
-    again = refine(basis, solution, Estimate(image, 0 * image))
+    again = refine(solution, Estimate(image, 0 * image))
     weights = partial(Basis.mix, basis)
     np.testing.assert_allclose(
         weights(again.lighting.weights_for(basis)), image, rtol=1e-4, atol=1e-5
@@ -241,7 +241,7 @@ def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
         )
         solution = solve(basis, target, constraints=constraints)
         solved.append(solution.lighting.weights_for(basis))
-        errors.append(error_bars(basis, solution).scatter)
+        errors.append(error_bars(solution).scatter)
     spread, told = np.std(solved, axis=0, ddof=1), np.sqrt(np.mean(np.square(errors), axis=0))
     held = spread < 1e-9
     # Round-off of what does not move.
@@ -297,7 +297,7 @@ def test_what_one_unknown_moves_in_several_channels_errs_together(make_basis: An
     stiffness = np.einsum("kic,icjd,ljd->kl", to, M, to)
     steps = np.linalg.solve(stiffness, np.einsum("kic,pic->kp", to, push))
     expected = np.sqrt(np.square(np.einsum("kic,kp->icp", to, steps)).sum(axis=-1))
-    np.testing.assert_allclose(error_bars(basis, solution).scatter, expected, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(error_bars(solution).scatter, expected, rtol=1e-4, atol=1e-9)
 
 
 #: As `SPANNING`, where the answer moves by more than one unknown's own channel, and where not.
@@ -352,7 +352,7 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
         )
 
     shares = np.linspace(0, 1, 9)
-    chosen = correct_noise(basis, solution).noise_removed
+    chosen = correct_noise(solution).problem.noise_removed
     assert chosen == shares[np.argmin([excess(s) for s in shares])]
 
     render = 0.3 * rng.normal(size=(*SIZE, 1)) * painted
@@ -362,5 +362,5 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
         for x in (np.einsum("kic,ipc,pc->kp", to, f, y) for y in (noise, render[counted]))
     )
     ours = lacking @ np.linalg.solve(M, lacking) + known
-    refined = refine(basis, solution, mixed)
-    assert refined.refinement.share == pytest.approx(ours / (ours + rendered), rel=1e-4)
+    refined = refine(solution, mixed)
+    assert refined.problem.refinement.share == pytest.approx(ours / (ours + rendered), rel=1e-4)

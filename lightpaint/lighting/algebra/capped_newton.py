@@ -1,0 +1,64 @@
+"""`clipped_newton` under caps: the step of what is free, with the caps that hold as equations.
+
+Which caps hold is guessed anew at each step, as which bounds do: one that is exceeded is held, one
+that would have to push is let go. It may go in circles, or leave the caps on its way; what it
+finds is certified, and where that fails nothing is lost but time.
+"""
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.lighting.algebra.clipped_newton import RIDGE
+from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
+
+#: Steps after which it is left to methods that cannot go in circles.
+MAX_STEPS = 20
+
+
+def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Doubles, float, int]:
+    """From x, (n,), to the optimum: (x, KKT residual, steps). Of no use above `tolerance`."""
+    multipliers = q.cap_multipliers(x, q.gradient(x))
+    at_lower, at_upper = q.caps_met(x)
+    at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
+    for step in range(MAX_STEPS + 1):
+        gradient = q.gradient(x)
+        left = gradient - multipliers @ q.A
+        value = q.A @ x
+        over = np.maximum(value - q.cap_upper, q.cap_lower - value).max()
+        residual = max(kkt_residual(left, x, q.size, q.lower, q.upper), float(over) / q.size)
+        if residual <= tolerance or step == MAX_STEPS:
+            break
+        free = ~(((x <= q.lower) & (left > 0)) | ((x >= q.upper) & (left < 0)))
+        held = np.flatnonzero((at_lower | at_upper) & (q.A[:, free] > 0).any(axis=1))
+        goal = np.where(at_lower, q.cap_lower, q.cap_upper)[held]
+        move, pushes = _newton(q, gradient, np.flatnonzero(free), held, goal - value[held])
+        x = np.clip(x + move, q.lower, q.upper)
+        multipliers = np.zeros(len(q.groups))
+        multipliers[held] = pushes
+        # Only what pushes inwards goes on to hold, and what is exceeded begins to.
+        at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
+        value, room = q.A @ x, 64 * EPSILON * (q.A @ np.abs(x))
+        at_lower |= value < q.cap_lower - room
+        at_upper |= (value > q.cap_upper + room) & ~at_lower
+        multipliers = np.where(at_lower | at_upper, multipliers, 0)
+    return x, residual, step
+
+
+def _newton(
+    q: Quadratic, gradient: Doubles, free: Indices, held: Indices, short: Doubles
+) -> tuple[Doubles, Doubles]:
+    """The step to the optimum of what is free, (n,), and what held caps take per unit, (h,).
+
+    short: (h,), by how much the sums of these are to change.
+    """
+    f, k = free.size, held.size
+    move = np.zeros(q.n)
+    matrix, right = np.zeros((f + k, f + k)), np.zeros(f + k)
+    matrix[:f, :f] = q.M[free][:, free]
+    matrix.flat[: f * (f + k) : f + k + 1] += RIDGE * np.sqrt(f)
+    A = q.A[held][:, free]
+    matrix[f:, :f], matrix[:f, f:] = A, -A.T
+    right[:f], right[f:] = -gradient[free], short
+    solved = np.linalg.solve(matrix, right) if f else right
+    move[free] = solved[:f]
+    return move, np.asarray(solved[f:])

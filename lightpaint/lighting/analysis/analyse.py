@@ -1,0 +1,47 @@
+"""All that is asked of an answer, once: how sure it is, why it is not closer, and at what cost."""
+
+from dataclasses import dataclass, replace
+
+from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
+from lightpaint.lighting.analysis.costs import without_constraints
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose, with_diagnosis
+from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
+from lightpaint.lighting.solution import Solution
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What is known of an answer, or of the answer to one of several views.
+
+    solution: with its errors and with what holds its lights in its certificate.
+    uncertainty: how sure the lights are, None where nothing is known of the noise. diagnosis: why
+    the painting is not met. ambiguities: lights that it cannot tell apart, where nothing is asked
+    of them. unconstrained: the best without what is asked, None where nothing is, or of one view
+    of several.
+    """
+
+    solution: Solution
+    uncertainty: Uncertainty | None
+    diagnosis: Diagnosis
+    ambiguities: tuple[Ambiguity, ...]
+    unconstrained: Solution | None
+
+
+def analyse(solution: Solution) -> tuple[Analysis, ...]:
+    """An analysis for each view."""
+    uncertainty = error_bars(solution)
+    solution = with_error_bars(solution, uncertainty)
+    alike = () if solution.problem.constraints else ambiguities(solution)
+    found = []
+    for view in solution.views:
+        diagnosis = diagnose(view)
+        told = with_diagnosis(view, diagnosis)
+        found.append(Analysis(told, uncertainty, diagnosis, alike, without_constraints(view)))
+    return tuple(found)
+
+
+def with_bounds(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
+    """The answer to all views with what was found of it, for lighting.json."""
+    first = analyses[0]
+    told = with_error_bars(solution, first.uncertainty)
+    return replace(with_diagnosis(told, first.diagnosis))

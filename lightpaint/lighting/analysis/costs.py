@@ -1,0 +1,21 @@
+"""What the constraints cost the picture: the best that the lights could do without them."""
+
+from dataclasses import replace
+
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+
+
+def without_constraints(solution: Solution) -> Solution | None:
+    """The best lighting if nothing were asked of the lights; None where nothing is.
+
+    Nor for one of several views, whose lighting answers the others too.
+    """
+    problem = solution.problem
+    if not problem.constraints or solution.whole is not None:
+        return None
+    free = reduce_to(Constraints(), solution.basis.lights)
+    anew = replace(problem, constraints=Constraints(), reduction=free, full=free, method="polished")
+    return solution_of(anew, start=solution.weights)

@@ -1,0 +1,222 @@
+"""The painting as the solve takes it, and while it is painted on (Eq 7-9)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.view import View
+from lightpaint.errors import TargetError
+from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.tiles import TiledEquations
+from lightpaint.lighting.views import Views
+from lightpaint.target.target import Target
+
+Region = tuple[slice, slice]
+
+
+def at_its_word(
+    image: Floats, importance: Floats, *, seen: Bools, current: Floats | None, unpainted: float
+) -> Squares:
+    """The squares that a painting stands for, of any part of its pixels.
+
+    image: (h, w, 3); importance: (h, w), a; seen: (h, w), where the camera sees an emitter;
+    current: (h, w, 3), the present look, needed only for unpainted > 0: the weight of what is not
+    painted against it. A pixel then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖²,
+    which is one residual of weight a + unpainted (1 − a) against the weighted mean of both images.
+    """
+    a = importance.astype(np.float64)[..., None]
+    psi = image.astype(np.float64)
+    if current is None:
+        return Squares(psi, a, np.zeros_like(a))
+    rest = np.where(seen[..., None], 0, unpainted * np.maximum(1 - a, 0))
+    total = a + rest
+    counted = np.where(total > 0, total, 1)
+    mixed = (a * psi + rest * current) / counted
+    return Squares(mixed, total, np.where(total > 0, 1 - a / counted, 0))
+
+
+def what_counts(target: Target, seen: Bools) -> Target:
+    """`target` whose importance says it all.
+
+    Pixels in which an emitter is seen directly count nothing unless somebody painted them:
+    at unit emission they would outshine everything the light falls on. Raises TargetError if
+    nothing is left.
+    """
+    if not target.everything:
+        return target
+    importance = np.where(seen, np.float32(0), target.importance)
+    if not importance.any():
+        raise TargetError(
+            f"target {target.name}: the camera sees an emitter in every pixel, so none "
+            "counts; give a mask of those that should"
+        )
+    return replace(target, importance=importance, everything=False)
+
+
+def present_look(basis: Basis, unpainted: float) -> Floats | None:
+    """(h, w, 3), what unpainted pixels are held to; None if nothing is."""
+    if unpainted < 0 or not np.isfinite(unpainted):
+        raise TargetError(f"unpainted is a weight >= 0, not {unpainted:g}")
+    return basis.mix(basis.present_weights) if unpainted > 0 else None
+
+
+def squares_of(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squares:
+    """The linear problem of one painting, taken at its word, of the size of the basis."""
+    counted = what_counts(target, basis.emitters_seen)
+    return at_its_word(
+        counted.image,
+        counted.importance,
+        seen=basis.emitters_seen,
+        current=present_look(basis, unpainted),
+        unpainted=unpainted,
+    )
+
+
+def joint_squares(views: Views, *, unpainted: float) -> Squares:
+    """All paintings, each taken at its word, as one problem."""
+    each = [
+        squares_of(basis, target, unpainted=unpainted)
+        for basis, target in zip(views.bases, views.targets, strict=True)
+    ]
+    return Squares(
+        views.join([word.image for word in each]),
+        views.join([word.weight for word in each]),
+        views.join([word.share for word in each]),
+    )
+
+
+def loss_of(
+    word: Squares,
+    at_least: Bools,
+    view: View | None,
+    *,
+    painted: Callable[[], Doubles],
+    current: Callable[[], Floats],
+) -> Loss:
+    """What a picture costs: `word` itself where it says all.
+
+    at_least: (h, w, 3), where brighter is as good. painted, current: Ψ and the present look, asked
+    for where they are needed.
+    """
+    if view is None and not (at_least.any() and at_least[word.weight[..., 0] > 0].any()):
+        return word
+    return PaintingLoss(
+        painted=painted(),
+        importance=word.weight[..., 0],
+        share=word.share[..., 0],
+        current=current(),
+        at_least=at_least,
+        view=view,
+    )
+
+
+def brighter_will_do(views: Views) -> Bools:
+    """Where something brighter than the painting is as good, of all views."""
+    nowhere = [np.zeros((*basis.size, 3), bool) for basis in views.bases]
+    given = [target.at_least for target in views.targets]
+    return views.join([n if a is None else a for a, n in zip(given, nowhere, strict=True)])
+
+
+def painted_light(views: Views) -> Doubles:
+    """Ψ of all views in float64."""
+    return views.join([target.image.astype(np.float64) for target in views.targets])
+
+
+class Painting:
+    """Targets that are painted on, with the sums over tiles that follow the brush.
+
+    Updated in place: the arrays of `word` and of the targets are its own.
+    """
+
+    def __init__(self, whole: Basis, views: Views, *, unpainted: float) -> None:
+        self.strokes = 0
+        self.unpainted = unpainted
+        self.whole = whole
+        self.views = replace(views, targets=tuple(_own(target) for target in views.targets))
+        self.at_least = brighter_will_do(self.views)
+        self.light = painted_light(self.views)
+        self.looks = [present_look(basis, unpainted) for basis in views.bases]
+        self.word = joint_squares(self.views, unpainted=unpainted)
+        self.tiles = [
+            TiledEquations(
+                basis.images, views.part(self.word.image, k), views.part(self.word.weight, k)
+            )
+            for k, basis in enumerate(views.bases)
+        ]
+
+    @cached_property
+    def current(self) -> Floats:
+        """The present look, of all views."""
+        return self.whole.mix(self.whole.present_weights)
+
+    def loss(self, word: Squares, view: View | None) -> Loss:
+        """What a picture costs, with `word` for its squares."""
+        light, current = lambda: self.light, lambda: self.current
+        return loss_of(word, self.at_least, view, painted=light, current=current)
+
+    @property
+    def equations(self) -> NormalEquations:
+        """M, b and ‖Ψ‖² of all views as they are now."""
+        first, *others = (tiles.equations for tiles in self.tiles)
+        for other in others:
+            first += other
+        return first
+
+    def paint(
+        self,
+        k: int,
+        region: Region,
+        image: npt.ArrayLike | None,
+        importance: npt.ArrayLike | None,
+        at_least: npt.ArrayLike | None,
+    ) -> None:
+        """Paint over a rectangle of view k. Raises ValueError, and changes nothing, for misfits."""
+        target, basis, look = self.views.targets[k], self.views.bases[k], self.looks[k]
+        assert target.at_least is not None
+        if importance is not None:
+            given = np.asarray(importance)
+            if not (np.isfinite(given).all() and (given >= 0).all()):
+                raise ValueError("importance is a finite weight >= 0 of each pixel")
+            np.broadcast_to(given, target.importance[region].shape)
+        if image is not None:
+            if not np.isfinite(image).all():
+                raise ValueError("a painting is of finite numbers")
+            np.broadcast_to(image, target.image[region].shape)
+        if at_least is not None:
+            target.at_least[region] = at_least
+            self.views.part(self.at_least, k)[region] = at_least
+        if image is not None:
+            target.image[region] = image
+            self.views.part(self.light, k)[region] = target.image[region]
+        if importance is not None:
+            target.importance[region] = importance
+        part = at_its_word(
+            target.image[region],
+            target.importance[region],
+            seen=basis.emitters_seen[region],
+            current=None if look is None else look[region],
+            unpainted=self.unpainted,
+        )
+        for name in ("image", "weight", "share"):
+            self.views.part(getattr(self.word, name), k)[region] = getattr(part, name)
+        # A stroke of colour leaves M as it is.
+        weight = None if importance is None else part.weight
+        self.tiles[k].update(region, part.image, weight)
+        self.strokes += 1
+
+
+def _own(target: Target) -> Target:
+    """A copy whose arrays may be written to."""
+    nowhere = np.zeros(target.image.shape, bool)
+    return replace(
+        target,
+        image=target.image.copy(),
+        importance=target.importance.copy(),
+        at_least=nowhere if target.at_least is None else target.at_least.copy(),
+    )

@@ -1,0 +1,254 @@
+"""What is to be solved: which pictures are to come close to what, by which lights, held how."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.view import View
+from lightpaint.errors import ConstraintError, TargetError
+from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
+from lightpaint.lighting.loss import Loss, Squares
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.painting import (
+    Painting,
+    brighter_will_do,
+    joint_squares,
+    loss_of,
+    painted_light,
+    what_counts,
+)
+from lightpaint.lighting.reweighted import predicted
+from lightpaint.lighting.views import Views, joint_basis
+from lightpaint.target.target import Target
+
+#: What is compared with the painting: light, or what a display shows of it.
+Space = Literal["linear", "display"]
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What is known of the noise in the last step to an answer (see analysis/refine.py).
+
+    before: (n, 3), the weights that it went from.
+    noise: (h, w, 3), half difference of the prediction there, as far as it decided the step.
+    lacking: (3, n), what is still to be expected to lack in the gradient.
+    share: of the step that the render of the mix decided, 0 to 1; the basis did the rest.
+    """
+
+    before: Doubles
+    noise: Floats
+    lacking: Doubles
+    share: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A loss over the pictures that a basis can make, and what the lights may do.
+
+    basis: of all views together; views: basis and target of each (views.py).
+    loss: what a picture costs. squares: the linear problem that stands for it, the loss itself
+    where that is one; before a solve has found better, the painting taken at its word.
+    equations: M and b of these squares, of the basis as it is.
+    reduction: what constraints leave to solve for; full: the same with all lights that `sparse`
+    has not chosen.
+    start: (n, 3), the weights to begin with: lights that reach nothing keep them.
+    unpainted: weight of what is not painted, against the current look.
+    noise_removed: the part of the noise in `equations` that is not in `corrected`, where some was
+    taken out; refinement: the last step by which an answer was improved, if one was.
+    painting: where strokes go, once there are some; strokes: how many there had been.
+    """
+
+    basis: Basis
+    views: Views
+    loss: Loss
+    squares: Squares
+    equations: NormalEquations
+    constraints: Constraints
+    reduction: Reduction
+    full: Reduction
+    start: Doubles
+    unpainted: float = 0.0
+    method: Method = "polished"
+    corrected: NormalEquations | None = None
+    noise_removed: float = 0.0
+    refinement: Refinement | None = None
+    painting: Painting | None = None
+    strokes: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        basis: Basis | Sequence[Basis],
+        target: Target | Sequence[Target],
+        *,
+        constraints: Constraints | None = None,
+        unpainted: float = 0.0,
+        start: Doubles | None = None,
+        method: Method = "polished",
+        view: View | None = None,
+    ) -> "Problem":
+        """Of one view, or of several: their bases and targets in the same order. As of `solve`."""
+        bases = [basis] if isinstance(basis, Basis) else list(basis)
+        targets = [target] if isinstance(target, Target) else _listed(target)
+        if not (constraints is None or isinstance(constraints, Constraints)):
+            raise ConstraintError(
+                f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
+            )
+        asked = constraints or Constraints()
+        whole, parts = joint_basis(bases)
+        fitted = [
+            what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
+            for its, one in zip(targets, parts, strict=True)
+        ]
+        views = Views(parts, tuple(fitted))
+        word = joint_squares(views, unpainted=unpainted)
+        loss = loss_of(
+            word,
+            brighter_will_do(views),
+            view,
+            painted=lambda: painted_light(views),
+            current=lambda: whole.mix(whole.present_weights),
+        )
+        reduction = reduce_to(asked, whole.lights)
+        return cls(
+            basis=whole,
+            views=views,
+            loss=loss,
+            squares=word,
+            equations=NormalEquations.of(whole, word.image, word.weight),
+            constraints=asked,
+            reduction=reduction,
+            full=reduction,
+            start=whole.present_weights if start is None else start,
+            unpainted=unpainted,
+            method=method,
+        )
+
+    @property
+    def name(self) -> str:
+        """What was painted, for people."""
+        return " + ".join(target.name for target in self.views.targets)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether its squares are all there is to its loss."""
+        return isinstance(self.loss, Squares)
+
+    @property
+    def space(self) -> Space:
+        """In which the prediction is brought close to the painting."""
+        return "linear" if self.loss.view is None else "display"
+
+    @property
+    def solved(self) -> NormalEquations:
+        """The equations that the weights are to solve, noise taken out where that was asked."""
+        return self.equations if self.corrected is None else self.corrected
+
+    @cached_property
+    def pull_strength(self) -> float:
+        """That of the pull to the present, of light as bright as the view makes it."""
+        view = self.loss.view
+        return self.constraints.prefer_current * (1.0 if view is None else 4.0**view.stops)
+
+    @cached_property
+    def pull(self) -> NormalEquations | None:
+        """What the pull to the present adds, if it is asked for.
+
+        It is strength · Σᵢ ‖Φᵢ‖² (wᵢ − presentᵢ)², ‖·‖ over the whole picture. The scale is
+        absolute: it does not depend on what is painted, and in units of w it asks the same of
+        every light. Pixels in which an emitter is seen do not count.
+        """
+        if not self.pull_strength:
+            return None
+        power, present = self.pull_strength * self.basis.power, self.basis.present_weights
+        M = np.einsum("ic,ij->cij", power, np.eye(len(power)))
+        return NormalEquations(M, (power * present).T, (power * present**2).sum(axis=0))
+
+    def pulled(self, equations: NormalEquations) -> NormalEquations:
+        """`equations` with the pull to the present, if there is one."""
+        return equations if self.pull is None else equations + self.pull
+
+    @property
+    def norm2(self) -> Doubles:
+        """(3,), what a black picture would miss, to hold the objective against."""
+        return self.equations.target_norm2 if self.is_linear else self.loss.norm2
+
+    def objective(self, weights: Doubles) -> Doubles:
+        """(3,), what weights (n, 3) miss."""
+        if self.is_linear:
+            return self.equations.objective(weights)
+        return self.loss.objective(predicted(self.basis, weights))
+
+    def of_view(self, k: int) -> "Problem":
+        """The problem of view k alone: its pixels of the same squares."""
+        if len(self.views) == 1:
+            return self
+
+        def part(joint: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return self.views.part(joint, k)
+
+        basis, squares = self.views.bases[k], self.squares.cut(part)
+        return replace(
+            self,
+            basis=basis,
+            views=Views((basis,), (self.views.targets[k],)),
+            loss=squares if self.is_linear else self.loss.cut(part),
+            squares=squares,
+            equations=NormalEquations.of(basis, squares.image, squares.weight),
+            corrected=None,
+            painting=None,
+        )
+
+    def painted(
+        self,
+        region: tuple[slice, slice],
+        image: npt.ArrayLike | None = None,
+        importance: npt.ArrayLike | None = None,
+        *,
+        at_least: npt.ArrayLike | None = None,
+        view: int = 0,
+    ) -> "Problem":
+        """This problem after a stroke: what is given replaces the painting within a rectangle.
+
+        region: slices of rows and columns of a view. image: (rows, columns, 3) linear, or one
+        colour; importance: (rows, columns) or one number; at_least: (rows, columns, 3), whether
+        brighter is as good. The equations are updated tile by tile (Eq 7-9), and are to the last
+        bit those that painting in another order would have led to.
+
+        The pixels move on to the problem that is returned; this one keeps its equations, and
+        cannot be painted on again. Raises ValueError for what does not fit the region.
+        """
+        painting = self.painting
+        if painting is None:
+            painting = Painting(self.basis, self.views, unpainted=self.unpainted)
+        elif painting.strokes != self.strokes:
+            raise ValueError("this problem was painted on already: go on from what that returned")
+        painting.paint(view, region, image, importance, at_least)
+        word = replace(painting.word)
+        return replace(
+            self,
+            views=painting.views,
+            loss=painting.loss(word, self.loss.view),
+            squares=word,
+            equations=painting.equations,
+            reduction=self.full,
+            corrected=None,
+            noise_removed=0.0,
+            refinement=None,
+            painting=painting,
+            strokes=painting.strokes,
+        )
+
+
+def _listed(targets: Any) -> list[Target]:
+    if isinstance(targets, Sequence) and targets and all(isinstance(t, Target) for t in targets):
+        return list(targets)
+    raise TargetError(f"the target is a {type(targets).__name__}: give what read_target returns")
