@@ -123,7 +123,7 @@ class Reader:
             template = read_template(path.parent)
             return template.view, template.scene, template.content, template.sensor
         if self.kind == "basis":
-            from lightpaint.basis.basis import read_basis, read_origin
+            from lightpaint.basis.file import read_basis, read_origin
 
             basis = read_basis(path)
             assert read_origin(path) == (basis.origin, basis.size, len(basis.lights))

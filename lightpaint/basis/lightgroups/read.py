@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import FORMAT_KEY, Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.file import FORMAT_KEY
 from lightpaint.basis.lightgroups.beauty import (
     LayerSum,
     beauty_among,

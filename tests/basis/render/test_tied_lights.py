@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import SEPARATE, is_of, render_basis
 from lightpaint.basis.render.separate import BLACK, WHITE
