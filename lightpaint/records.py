@@ -121,7 +121,7 @@ def _meant(kind: Any) -> str:
     """What an annotation asks for, in words."""
     outer, inner = get_origin(kind), get_args(kind)
     if outer is Literal:
-        return f"one of {', '.join(map(repr, inner))}"
+        return ("one of " if inner[1:] else "") + ", ".join(map(repr, inner))
     if outer is UnionType:
         return _meant(inner[0])
     if outer is tuple:
