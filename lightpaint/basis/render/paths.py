@@ -83,7 +83,7 @@ def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, ma
     # fmt: off
     ray = mi.Ray3f(ray)                         # Ray that is followed
     throughput = mi.Spectrum(1)                 # Share of the light at its end that comes back
-    eta = mi.Float(1)                           # Product of the relative indices of refraction passed
+    eta = mi.Float(1)                           # Product of the indices of refraction passed
     depth = mi.UInt32(0)                        # Vertices behind the camera so far
     active = max_depth > 0                      # Paths that go on
     pi = _first_hit(scene, ray, hide_emitters)  # What the ray meets
@@ -92,7 +92,6 @@ def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, ma
     previous_delta = mi.Bool(True)              # Whether nothing but the surface could choose it
     previous_cell = mi.UInt32(0)                # Cell of the guide that the vertex lies in
     # fmt: on
-    context = mi.BSDFContext()
 
     while active:
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
@@ -103,21 +102,19 @@ def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, ma
         if dr.hint(hide_emitters, mode="scalar"):
             hit &= depth > 0
         by_choice = hit & ~previous_delta
-        emitter_pdf = _pdf_of_choice(scene, guide, si, emitter, previous, previous_cell, by_choice)
+        pdf = _pdf_of_choice(scene, guide, si, emitter, previous, previous_cell, by_choice)
         emission = emitter.eval(si, hit & (previous_pdf > 0))
-        mis = _mis(previous_pdf, emitter_pdf)
-        planes.add(emitter, weight * throughput * emission * mis, hit)
+        planes.add(emitter, weight * throughput * emission * _mis(previous_pdf, pdf), hit)
         planes.note_seen(hit & (depth == 0))
 
-        # Next-event estimation: an emitter is asked for its light, from surfaces that scatter
-        # into more than single directions.
+        # Next-event estimation: an emitter is asked for its light.
         active_next = active & (depth + 1 < max_depth) & si.is_valid()
         bsdf = si.bsdf(ray)
         smooth = active_next & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         asked = _ask_emitter(scene, sampler, numbers, guide, si, depth, smooth)
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, depth)
         bsdf_value, bsdf_pdf, sample, bsdf_weight = bsdf.eval_pdf_sample(
-            context, si, si.to_local(asked.ds.d), lobe, direction, active_next
+            mi.BSDFContext(), si, si.to_local(asked.ds.d), lobe, direction, active_next
         )
         mis = dr.select(asked.ds.delta, 1, _mis(asked.ds.pdf, bsdf_pdf))
         contribution = weight * throughput * bsdf_value * asked.radiance * mis
@@ -134,14 +131,7 @@ def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, ma
         previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         previous_cell = mi.UInt32(asked.cell)
         depth[si.is_valid()] += 1
-
-        # Russian roulette looks at the surfaces alone, never at emission: the paths, and with
-        # them every plane, stay the same whatever the lights do.
-        strongest = dr.max(throughput)
-        survival = dr.minimum(strongest * dr.square(eta), 0.95)
-        roulette = depth >= rr_depth
-        throughput[roulette] *= dr.rcp(survival)
-        active = active_next & (~roulette | (fate < survival)) & (strongest != 0)
+        active = _roulette(throughput, eta, depth >= rr_depth, fate, active_next)
         pi = scene.ray_intersect_preliminary(ray, False, active)
 
 
@@ -193,6 +183,18 @@ def _numbers_of_surface(sampler, numbers, depth):
         return sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
     lobe_and_fate = numbers.at_vertex(depth, 1)
     return lobe_and_fate.x, numbers.at_vertex(depth, 2), lobe_and_fate.y
+
+
+def _roulette(throughput, eta, roulette, fate, active):
+    """Which paths go on; those that Russian roulette spares carry more in `throughput` for it.
+
+    It looks at the surfaces alone, never at emission: the paths, and with them every plane, stay
+    the same whatever the lights do.
+    """
+    strongest = dr.max(throughput)
+    survival = dr.minimum(strongest * dr.square(eta), 0.95)
+    throughput[roulette] *= dr.rcp(survival)
+    return active & (~roulette | (fate < survival)) & (strongest != 0)
 
 
 def _mis(pdf_a, pdf_b):
