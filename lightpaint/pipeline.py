@@ -402,7 +402,7 @@ def render_template(
         scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
     ).image
     surfaces = render_surfaces(scene, seed=seed, progress=progress)
-    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.view)}")
+    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.film)}")
     lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
     template = Template(
         look,

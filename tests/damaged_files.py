@@ -137,7 +137,7 @@ class Reader:
         from lightpaint.scene.scene import load_scene
 
         scene = load_scene(path)
-        return scene.view, scene.spp, scene.integrator, scene.emitters
+        return scene.film, scene.spp, scene.integrator, scene.emitters
 
     def agrees(self, path: Path, read: Any) -> bool:
         """Whether what was read is what a plain parser finds in the file."""
