@@ -7,7 +7,7 @@ time, and no reference to one of its emitters may outlive it.
 import gc
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,7 @@ class Scene:
     files: tuple[Path, ...]
     content: str
     lights_file: Path | None
-    _parsed: "ParsedScene" = field(repr=False)
+    _parsed: ParsedScene
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
