@@ -19,7 +19,8 @@ several views. Importing this sets no Mitsuba variant; that
 happens when the first scene is loaded.
 """
 
-from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.view import View

@@ -1,7 +1,5 @@
 """Writing files so that a reader never sees half of one; reading only what is a file."""
 
-import json
-import math
 import os
 import shutil
 import stat
@@ -9,7 +7,6 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from lightpaint.errors import LightpaintError, OutputError
 
@@ -108,54 +105,6 @@ def read_text(path: Path, what: str, error: type[LightpaintError], *, limit: int
         raise error(
             f"{path} is not text in UTF-8: {reason.reason} at byte {reason.start}"
         ) from None
-
-
-def strict_json(text: str) -> Any:
-    """What the JSON in `text` says, and nothing that only Python understands or makes up.
-
-    Raises ValueError for what is no JSON, for NaN and Infinity, for numbers beyond float64, for
-    text that is not Unicode (half of a surrogate pair), for a key that stands twice in an object,
-    and for what is nested too deeply.
-    """
-    try:
-        data = json.loads(
-            text,
-            object_pairs_hook=_without_repeats,
-            parse_constant=_no_number,
-            parse_float=_finite,
-            parse_int=_bounded,
-        )
-        if "\\u" in text:  # the only way by which half a pair gets into decoded text
-            json.dumps(data, ensure_ascii=False).encode()
-    except RecursionError:
-        raise ValueError("it is nested too deeply") from None
-    except UnicodeEncodeError as error:
-        raise ValueError(f"it has text that is not Unicode: {error.reason}") from None
-    return data
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    # JSON itself would silently keep the last of two of one name.
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        raise ValueError(f"a name stands twice among {', '.join(key for key, _ in pairs)}")
-    return found
-
-
-def _no_number(text: str) -> Any:
-    raise ValueError(f"{text} is no number in JSON")
-
-
-def _finite(text: str) -> float:
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f"{text} is too large")
-    return number
-
-
-def _bounded(text: str) -> int:
-    _finite(text)
-    return int(text)
 
 
 def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis, read_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.obtain import check_same_view, obtain_basis
 from lightpaint.basis.render.render import basis_lights, render_basis
@@ -371,7 +372,7 @@ def render_template(
         scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
     ).image
     surfaces = render_surfaces(scene, seed=seed, progress=progress)
-    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.view)}")
+    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.film)}")
     lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
     template = Template(
         look,

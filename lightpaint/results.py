@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import ImageError, OutputError
-from lightpaint.files import write_text
+from lightpaint.files import one_line, write_text
 from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
@@ -15,6 +15,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggest import Suggestion
 from lightpaint.progress import Progress, silent
+from lightpaint.records import read_record, strict_json
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verify import Verification, verify
 from lightpaint.report.comparison import write_comparison
@@ -150,32 +151,34 @@ def verify_result(
         )
     path = folder / "predicted.exr"
     predicted, attributes = read_estimate_with_attributes(path)
-    sensor, solved_spp = _read_view(path, attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(relit_xml, sensor=sensor, use_lights_file=False)
+    seen = _read_view(path, attributes.get(VIEW_KEY, "{}"))
+    relit = load_scene(relit_xml, sensor=seen.sensor, use_lights_file=False)
     return verify(
         predicted,
         relit,
-        spp=solved_spp if spp is None else spp,
+        spp=seen.spp if spp is None else spp,
         seed=seed,
         stream=Stream.SECOND_VERIFICATION,
         progress=progress,
     )
 
 
-def _read_view(path: Path, text: str) -> tuple[str | None, int | None]:
-    """Sensor and samples per pixel that `path` notes under VIEW_KEY; None for what it lacks."""
+@dataclass(frozen=True)
+class _Seen:
+    """What stands under VIEW_KEY; None where nothing does. spp: samples per pixel."""
+
+    sensor: str | None = None
+    spp: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.spp == 0:
+            raise ValueError("spp is a whole number > 0, not 0")
+
+
+def _read_view(path: Path, text: str) -> _Seen:
     try:
-        view = json.loads(text)
-        if not isinstance(view, dict):
-            raise TypeError(f"{view!r} is not an object")
-        sensor, spp = view.get("sensor"), view.get("spp")
-        if not (sensor is None or isinstance(sensor, str)):
-            raise TypeError(f"sensor is a name, not {sensor!r}")
-        # A type and no isinstance: true would pass for the number 1.
-        if not (spp is None or (type(spp) is int and spp > 0)):
-            raise TypeError(f"spp is a whole number > 0, not {spp!r}")
-    except (TypeError, ValueError, RecursionError) as error:
+        return read_record(_Seen, strict_json(text), others=True)
+    except ValueError as error:
         raise ImageError(
-            f"{path} is damaged in its attribute {VIEW_KEY}: {error}; solve again"
+            f"{path} is damaged in its attribute {VIEW_KEY}: {one_line(str(error))}; solve again"
         ) from None
-    return sensor, spp

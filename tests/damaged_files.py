@@ -123,7 +123,7 @@ class Reader:
             template = read_template(path.parent)
             return template.view, template.scene, template.content, template.sensor
         if self.kind == "basis":
-            from lightpaint.basis.basis import read_basis, read_origin
+            from lightpaint.basis.file import read_basis, read_origin
 
             basis = read_basis(path)
             assert read_origin(path) == (basis.origin, basis.size, len(basis.lights))
@@ -137,7 +137,7 @@ class Reader:
         from lightpaint.scene.scene import load_scene
 
         scene = load_scene(path)
-        return scene.view, scene.spp, scene.integrator, scene.emitters
+        return scene.film, scene.spp, scene.integrator, scene.emitters
 
     def agrees(self, path: Path, read: Any) -> bool:
         """Whether what was read is what a plain parser finds in the file."""

@@ -10,7 +10,8 @@ from PIL import Image
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import write_basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.cli import main
 from lightpaint.colour.view import View

@@ -1,42 +1,26 @@
-"""The basis: one image per light at unit emission, and its file.
+"""The basis: one image per light at unit emission."""
 
-On disk a basis is one multi-part OpenEXR file. Part k is named after light k and holds its
-image as R, G, B; other programs can open it as it is. docs/formats.md has the details.
-"""
-
-import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Collection
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import RGB, Floats
-from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
-from lightpaint.errors import BasisError, ImageError
-from lightpaint.files import file_length, one_line, strict_json
-from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
+from lightpaint.arrays import RGB, Bools, Doubles, Floats
+from lightpaint.errors import BasisError
+from lightpaint.screen import Listed, some_of
 from lightpaint.version import __version__
 
-FORMAT = "lightpaint-basis 1"
-FORMAT_KEY = "lightpaint.format"
-ORIGIN_KEY = "lightpaint.origin"
-LIGHT_KEY = "lightpaint.light"
-EMITTERS_SEEN = "emitters seen"
-LEARNED = "learned"
+_Kind = TypeVar("_Kind", bound=np.generic)
 
-#: Longest basis file that is read, in bytes; most samples, longest name and the like in it.
-MAX_BYTES = 2**36
+#: Pixels of all lights that are brought to double precision at a time.
+BLOCK = 2**13
+
+#: Most samples of a pixel, which is beyond any render.
 MAX_SAMPLES = 2**40
-MAX_NAME = 10_000
-
-#: What comes of a header that says something else than it should.
-_DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -79,6 +63,12 @@ class BasisLight:
                 "need three numbers >= 0"
             )
 
+    def __repr__(self) -> str:
+        emission = " ".join(f"{v:.4g}" for v in self.emission)
+        kept = ", kept" if self.is_fixed else ""
+        what = " ".join(filter(None, (self.plugin, self.parameter, emission, self.unit)))
+        return f"BasisLight({self.name!r}, {what}{kept})"
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -98,6 +88,10 @@ class Origin:
     passes: tuple[int, int]
     lightpaint: str = __version__
     each_light: tuple[tuple[int, int, int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        if max(max(own) for own in (self.halves, self.passes, *self.each_light)) > MAX_SAMPLES:
+            raise BasisError(f"{self.halves} samples are more than any render has")
 
     @property
     def spp(self) -> int:
@@ -122,12 +116,13 @@ class Basis:
     lights: tuple[BasisLight, ...]
     images: Floats
     half_differences: Floats
-    emitters_seen: npt.NDArray[np.bool_]
+    emitters_seen: Bools
     origin: Origin
     learned: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.lights)
+        object.__setattr__(self, "lights", Listed(self.lights))
         if self.images.ndim != 4 or self.images.shape[0] != n or self.images.shape[3] != 3:
             shape = self.images.shape
             raise BasisError(f"images of shape {shape} for {n} lights: need (n, h, w, 3)")
@@ -140,7 +135,13 @@ class Basis:
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 
-    @property
+    def __repr__(self) -> str:
+        (height, width), origin = self.size, self.origin
+        samples = f"{origin.spp} spp" if self.knows_noise else "noise unknown"
+        about = f"{len(self.lights)} lights, {width}x{height}, {samples}, of {origin.scene}"
+        return f"Basis({about}: {some_of(self.names, room=400)})"
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the lights, in the order of the images."""
         return tuple(light.name for light in self.lights)
@@ -161,33 +162,45 @@ class Basis:
         """Whether `half_differences` tell the noise: not where nobody knows of any samples."""
         return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
-    @property
-    def present_weights(self) -> npt.NDArray[np.float64]:
+    @cached_property
+    def present_weights(self) -> Doubles:
         """(n, 3) weights of the scene as it is."""
-        return np.array([light.emission for light in self.lights], dtype=np.float64)
-
-    @property
-    def is_fixed(self) -> npt.NDArray[np.bool_]:
-        """(n,), which lights stay as they are, with weight 1."""
-        return np.array([light.is_fixed for light in self.lights], dtype=bool)
+        return _kept(np.array([light.emission for light in self.lights], dtype=np.float64))
 
     @cached_property
-    def power(self) -> npt.NDArray[np.float64]:
+    def is_fixed(self) -> Bools:
+        """(n,), which lights stay as they are, with weight 1."""
+        return _kept(np.array([light.is_fixed for light in self.lights], dtype=bool))
+
+    @cached_property
+    def power(self) -> Doubles:
         """‖Φᵢ‖² over the picture, (n, 3) float64; where an emitter is seen, nothing counts."""
         counted = np.flatnonzero(~self.emitters_seen.ravel())
         rows = self.images.reshape(len(self.lights), -1, 3)
         power = np.zeros((len(self.lights), 3))
-        for start in range(0, counted.size, 2**13):
-            block = rows[:, counted[start : start + 2**13]].astype(np.float64)
+        for start in range(0, counted.size, BLOCK):
+            block = rows[:, counted[start : start + BLOCK]].astype(np.float64)
             power += np.einsum("npc,npc->nc", block, block)
-        return power
+        return _kept(power)
 
-    def mix(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+    @cached_property
+    def totals(self) -> Doubles:
+        """Σ_pixels Φᵢ, (n, 3) float64, over all of the picture."""
+        rows = self.images.reshape(len(self.lights), -1, 3)
+        # A sum over axes this short is slow in NumPy, a product with ones is not; in float64 and
+        # by blocks it is as exact as the sum, and needs no copy of the basis.
+        ones, totals = np.ones(BLOCK), np.zeros((len(self.lights), 3))
+        for start in range(0, rows.shape[1], BLOCK):
+            block = rows[:, start : start + BLOCK].astype(np.float64)
+            totals += ones[: block.shape[1]] @ block
+        return _kept(totals)
+
+    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""
         return mix(self.images, weights)
 
 
-def mix(images: Floats, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
     """Σ w_i Φ_i in float32, without a copy of the images.
 
     images: (n, h, w, 3) float32; weights: (n, 3), one per light and channel. Returns (h, w, 3).
@@ -201,206 +214,14 @@ def mix(images: Floats, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.floa
     return np.asarray(mixed.reshape(height, width, 3), np.float32)
 
 
-def write_basis(path: Path, basis: Basis) -> None:
-    """Write `basis` as a multi-part EXR, whole or not at all."""
-    parts, sums = [], {}
-    for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
-        about = json.dumps(_light_fields(light), ensure_ascii=False)
-        channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
-        parts.append(Part(light.name, channels, {LIGHT_KEY: about}))
-        sums[light.name] = checksum(about, channels)
-    seen = {"Y": basis.emitters_seen.astype(np.float16)}
-    # The format's rule: a part name never repeats, so a light may not take this one.
-    parts.append(Part(_free_name(EMITTERS_SEEN, basis.names), seen))
-    learned = {}
-    if basis.learned is not None:
-        learned = dict(zip(("received", "asked"), basis.learned, strict=True))
-        # A table and no picture; the format wants one display window for all parts.
-        parts.append(Part(_free_name(LEARNED, basis.names), learned, display=basis.size))
-    origin = asdict(basis.origin)
-    if not basis.origin.each_light:
-        del origin["each_light"]  # as in files from before there was any
-    of_origin = json.dumps(origin, ensure_ascii=False)
-    checksums = Checksums(
-        sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
-    )
-    head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
-    parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
-    write_parts(path, parts)
+def _kept(array: npt.NDArray[_Kind]) -> npt.NDArray[_Kind]:
+    """Not to be changed by one of those who share it."""
+    array.flags.writeable = False
+    return array
 
 
-def read_basis(path: Path) -> Basis:
-    """Read what `write_basis` wrote, also where another program has put its parts in another order.
-
-    Raises ImageError if the file is damaged, BasisError if it is not a basis or not as it was
-    written.
-    """
-    path = Path(path)
-    file_length(path, "image file", ImageError, limit=MAX_BYTES)
-    try:
-        parts = read_parts(path)
-        head = next((p.attributes for p in parts if FORMAT_KEY in p.attributes), {})
-        if head.get(FORMAT_KEY) != FORMAT:
-            found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
-            raise BasisError(
-                f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
-                "make one with lightpaint basis"
-            )
-        return _of_parts(parts, head)
-    except BasisError as error:
-        raise BasisError(f"{path} {error}") from error
-    except _DAMAGES as error:
-        raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
-    except MemoryError:
-        raise ImageError(f"{path} takes more memory than there is") from None
-
-
-def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
-    """Raises BasisError, without naming the file, or one of _DAMAGES."""
-    lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
-    others = [p for p in parts if LIGHT_KEY not in p.attributes]
-    seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
-    if not lit or not seen:
-        raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
-    try:
-        lights = [_light(strict_json(p.attributes[LIGHT_KEY])) for p in lit]
-        origin = _origin(strict_json(head[ORIGIN_KEY]))
-        checksums = None
-        if CHECKSUMS_KEY in head:
-            checksums = Checksums.of_text(head[CHECKSUMS_KEY])
-    except (BasisError, ImageError) as error:
-        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    order = list(range(len(lit)))
-    if checksums is not None:
-        order = checksums.in_order([light.name for light in lights])
-        check(checksums.origin, "origin", head[ORIGIN_KEY], {})
-    try:
-        basis = Basis(
-            lights=tuple(lights[k] for k in order),
-            images=_stacked([lit[k] for k in order]),
-            half_differences=_stacked([lit[k] for k in order], HALF_DIFFERENCE),
-            emitters_seen=seen[0] > 0,
-            origin=origin,
-            learned=_learned(others, checksums),
-        )
-    except (BasisError, ImageError) as error:
-        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    if not (np.isfinite(basis.images).all() and np.isfinite(basis.half_differences).all()):
-        raise BasisError("holds values that are not finite: make it again")
-    if checksums is not None:
-        for k, light in enumerate(lights):
-            about, channels = lit[k].attributes[LIGHT_KEY], lit[k].channels
-            check(checksums.lights[light.name], f"light {light.name!r}", about, channels)
-        check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
-    return basis
-
-
-def _stacked(parts: Sequence[Part], layer: str = "") -> Floats:
-    """(n, h, w, 3), without the copies that np.stack of np.stack would make."""
-    stacked = np.empty((len(parts), *parts[0].size, 3), np.float32)
-    for image, part in zip(stacked, parts, strict=True):
-        if part.size != parts[0].size:
-            raise BasisError(f"parts {parts[0].name!r} and {part.name!r} differ in size")
-        prefix = f"{layer}." if layer else ""
-        for k, c in enumerate("RGB"):
-            if prefix + c not in part.channels:
-                raise BasisError(f"no channel {prefix}{c} in part {part.name!r}")
-            image[..., k] = part.channels[prefix + c]
-    return stacked
-
-
-def _learned(others: Sequence[Part], checksums: Checksums | None) -> Floats | None:
-    """The table of what was learned; None for one that is not as it was, which nothing needs."""
-    for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
-        if checksums is not None and checksum("", channels) != checksums.learned:
-            return None
-        return np.stack([channels["received"], channels["asked"]])
-    return None
-
-
-def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
-    """Origin, (height, width) and number of lights of the basis at `path`, without its pixels."""
-    file_length(path, "basis", BasisError, limit=MAX_BYTES)
-    try:
-        headers, size = read_headers(path)
-        lights = sum(LIGHT_KEY in header for header in headers)
-        text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
-        return _origin(strict_json(text)), size, lights
-    except (*_DAMAGES, StopIteration) as error:
-        said = one_line(str(error)) or "it does not say where it comes from"
-        raise BasisError(f"{path} is no basis this version can read: {said}") from error
-
-
-def is_basis_file(path: Path) -> bool:
-    """Whether the name says so: a basis is an EXR, a scene is XML."""
-    return path.suffix.lower() == ".exr"
-
-
-def _origin(data: dict[str, Any]) -> Origin:
-    halves, passes = (_counts(data.pop(key), 2) for key in ("halves", "passes"))
-    each = tuple(_counts(counts, 4) for counts in data.pop("each_light", []))
-    for name, value in data.items():
-        if not isinstance(value, int if name == "seed" else str) or isinstance(value, bool):
-            raise TypeError(f"{name} of the origin is {value!r}")
-    return Origin(
-        halves=(halves[0], halves[1]),
-        passes=(passes[0], passes[1]),
-        each_light=tuple((a, b, p, q) for a, b, p, q in each),
-        **data,
-    )
-
-
-def _counts(values: Any, number: int) -> tuple[int, ...]:
-    if not (
-        isinstance(values, list)
-        and len(values) == number
-        and all(type(v) is int and 0 <= v <= MAX_SAMPLES for v in values)
-    ):
-        raise ValueError(f"{values!r} are not {number} numbers of samples or passes")
-    return tuple(values)
-
-
-def _light_fields(light: BasisLight) -> dict[str, Any]:
-    """What the file says of a light; what goes without saying for one emitter is left out."""
-    data = asdict(light)
-    if light.members == (light.name,):
-        del data["members"]
-    if not light.is_fixed:
-        del data["is_fixed"]
-    if light.unit_flux is None:
-        del data["unit_flux"]
-    return data
-
-
-def _light(data: dict[str, Any]) -> BasisLight:
-    emission = _three(data.pop("emission"))
-    members = data.pop("members", [])
-    flux = data.pop("unit_flux", None)
-    if not isinstance(members, list):
-        raise TypeError(f"members is a list of names, not {members!r}")
-    about = {key: data.pop(key, False) for key in ("is_scalar", "is_fixed")}
-    if not all(isinstance(value, bool) for value in about.values()):
-        raise TypeError(f"{about} are true or false")
-    texts = (*members, *data.values())
-    if not all(isinstance(text, str) and len(text) <= MAX_NAME for text in texts):
-        raise TypeError(f"{texts} are texts of up to {MAX_NAME} characters")
-    return BasisLight(
-        emission=emission,
-        members=tuple(members),
-        unit_flux=None if flux is None else _three(flux),
-        **about,
-        **data,
-    )
-
-
-def _three(values: Any) -> RGB:
-    if not isinstance(values, list) or not all(type(v) in (int, float) for v in values):
-        raise TypeError(f"{values!r} is not a list of three numbers")
-    r, g, b = map(float, values)
-    return r, g, b
-
-
-def _free_name(name: str, taken: tuple[str, ...]) -> str:
+def free_name(name: str, taken: Collection[str]) -> str:
+    """`name`, with underscores added while another has it."""
     while name in taken:
         name += "_"
     return name

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from lightpaint.basis.basis import FORMAT, Basis, Origin, read_basis, read_origin, write_basis
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 
 #: Bytes above which the bases that were not used for longest are deleted.

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import BasisError
-from lightpaint.files import one_line, strict_json
+from lightpaint.files import one_line
+from lightpaint.records import read_record, strict_json
 
 CHECKSUMS_KEY = "lightpaint.checksums"
 
@@ -38,13 +39,8 @@ class Checksums:
 
     @classmethod
     def of_text(cls, text: str) -> "Checksums":
-        """From what `text` gave. Raises ValueError or TypeError for anything else."""
-        made = cls(**strict_json(text))
-        if not isinstance(made.lights, dict):
-            raise TypeError("checksums of lights are to be an object")
-        if not all(isinstance(x, str) for x in (*made.lights.values(), made.origin, made.seen)):
-            raise TypeError("checksums are to be texts")
-        return made
+        """From what `text` gave. Raises ValueError for anything else."""
+        return read_record(cls, strict_json(text))
 
     def in_order(self, names: Sequence[str]) -> list[int]:
         """Which of `names` come first, second, … as the lights were written.

@@ -8,7 +8,7 @@ from typing import Any
 from rich.markup import escape
 
 from lightpaint.basis import cache as bases
-from lightpaint.basis.basis import write_basis
+from lightpaint.basis.file import write_basis
 from lightpaint.cli import tables, terminal
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.options import folders_of, load, render_or_find, view_of

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lightpaint.errors import BackendError
-from lightpaint.scene.variant import INSTALL_LLVM, llvm_candidates, use_variant
+from lightpaint.scene.llvm import INSTALL_LLVM, llvm_candidates
+from lightpaint.scene.variant import use_variant
 from lightpaint.version import __version__
 
 State = Literal["ok", "missing", "info"]

@@ -4,7 +4,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import is_basis_file, read_basis
+from lightpaint.basis.file import is_basis_file, read_basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.cli import tables, terminal

@@ -17,8 +17,9 @@ from lightpaint.report.sentences import (
 )
 from lightpaint.report.verdict import agreement, energy_shares, verdict
 from lightpaint.results import Look
-from lightpaint.scene.emitters import MULTIPLE
-from lightpaint.scene.lights import WHOLE_EMISSION, Emitter, Light
+from lightpaint.scene.emission import MULTIPLE
+from lightpaint.scene.emitters import Emitter
+from lightpaint.scene.lights import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene
 
 

@@ -1,8 +1,7 @@
 """One thing that holds lights back, as data: what it is, and what it costs."""
 
-import math
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 #: What holds: that light is not negative; that a light is not adjusted; what was asked of it.
 Kind = Literal["zero", "kept", "lock", "off", "left out", "tie", "limits", "colour"]
@@ -50,19 +49,3 @@ class Bound:
             "multiplier": list(self.multiplier),
             "per": self.per,
         }
-
-    @classmethod
-    def of_fields(cls, data: dict[str, Any]) -> "Bound":
-        """From what `fields` gave. Raises KeyError, TypeError or ValueError for anything else."""
-        kind, per = data["kind"], data["per"]
-        if kind not in get_args(Kind) or per not in get_args(Per):
-            raise ValueError(f"a bound is of no kind {kind!r}, per {per!r}")
-        names, numbers = data["lights"], data["multiplier"]
-        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
-            raise TypeError(f"lights of a bound is a list of names, not {names!r}")
-        if not isinstance(numbers, list):
-            raise TypeError(f"multiplier of a bound is a list of numbers, not {numbers!r}")
-        multiplier, gain = tuple(float(v) for v in numbers), float(data["gain"])
-        if not all(map(math.isfinite, (gain, *multiplier))):
-            raise ValueError("gain and multiplier of a bound are finite numbers")
-        return cls(tuple(names), kind, str(data["held_by"]), gain, multiplier, per)

@@ -13,12 +13,16 @@ from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis, BasisLight, mix
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.errors import LightingError
-from lightpaint.files import one_line, read_text, strict_json, write_text
+from lightpaint.files import one_line, read_text, write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.bound import Bound
+from lightpaint.records import read_record, strict_json
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
+
+#: Fields of a lighting that stand in its file under their own names.
+READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
 
 
 @dataclass(frozen=True)
@@ -294,17 +298,24 @@ def read_lighting(path: str | Path) -> Lighting:
     if found != FORMAT:
         raise LightingError(f"{path} has the format {one_line(repr(found))}: expected {FORMAT!r}")
     try:
-        return Lighting(
-            lights=tuple(_read_setting(name, d) for name, d in data["lights"].items()),
-            target=_read_text(data, "target"),
-            scene_identity=_read_text(data, "scene_identity"),
-            certificate=_read_certificate(data["solve"]) if "solve" in data else None,
-            cd_per_unit=_read_scale(data["cd_per_unit"]) if "cd_per_unit" in data else None,
-        )
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        about = {key: data[key] for key in READ_AS_THEY_STAND if key in data}
+        lighting = read_record(Lighting, {"lights": [], **about})
+        lights = tuple(_read_setting(name, light) for name, light in data["lights"].items())
+        certificate = None
+        if "solve" in data:
+            its = data["solve"]
+            certificate = read_record(Certificate, its, required=["unreached"], others=True)
+        return replace(lighting, lights=lights, certificate=certificate)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
     except LightingError as error:
         raise LightingError(f"{path}: {one_line(str(error))}") from None
+
+
+def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
+    if data.get("members") == []:
+        raise ValueError("members is a list of names, not empty")
+    return read_record(LightSetting, {**data, "name": name}, others=True)
 
 
 def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -> LightSetting:
@@ -344,93 +355,6 @@ def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
     return known if light.is_fixed else {**known, "photometry": lighting.photometry(light).fields()}
 
 
-def _read_setting(name: str, data: dict[str, Any]) -> LightSetting:
-    members = _read_names(data.get("members", [name]), "members")
-    if not members:
-        raise TypeError("members is a list of names, not empty")
-    return LightSetting(
-        name,
-        _read_text(data, "plugin", required=True),
-        _read_text(data, "parameter", required=True),
-        _read_text(data, "unit", required=True),
-        _read_rgb(data["emission"]),
-        _read_rgb(data["weight"]),
-        _read_bool(data.get("is_fixed", False), "is_fixed"),
-        members,
-        _read_rgb(data["unit_flux"]) if "unit_flux" in data else None,
-        _read_text(data, "constraint"),
-        _read_bool(data.get("is_active", False), "is_active"),
-        _read_rgb(data["standard_error"]) if "standard_error" in data else None,
-    )
-
-
-def _read_certificate(data: dict[str, Any]) -> Certificate:
-    r, g, b = (_read_count(v) for v in data["sweeps"])
-    curve = []
-    for count, missed in data.get("curve", []):
-        if type(missed) not in (int, float):
-            raise TypeError(f"curve has {missed!r} where a number is due")
-        curve.append((_read_count(count), float(missed)))
-    return Certificate(
-        _read_rgb(data["kkt_residual"]),
-        _read_rgb(data["objective"]),
-        _read_rgb(data["relative_objective"]),
-        (r, g, b),
-        _read_bool(data["converged"], "converged"),
-        _read_names(data["unreached"], "unreached"),
-        tuple(curve),
-        tuple(_read_bound(bound) for bound in data.get("bounds", [])),
-        _read_rgb(data["objective_error"]) if "objective_error" in data else None,
-        _read_text(data, "display"),
-        _read_count(data.get("rounds", 1)),
-    )
-
-
-def _read_bound(data: dict[str, Any]) -> Bound:
-    bound = Bound.of_fields(data)
-    if any(data[key] != value for key, value in bound.fields().items()):
-        raise TypeError(f"{data!r} is not a bound")
-    return bound
-
-
-def _read_count(value: Any) -> int:
-    if type(value) is not int or value < 0:
-        raise TypeError(f"{value!r} is not a count")
-    return value
-
-
-def _read_bool(value: Any, key: str) -> bool:
-    if not isinstance(value, bool):
-        raise TypeError(f"{key} is true or false, not {value!r}")
-    return value
-
-
-def _read_names(value: Any, key: str) -> tuple[str, ...]:
-    if not (isinstance(value, list) and all(isinstance(name, str) for name in value)):
-        raise TypeError(f"{key} is a list of names, not {value!r}")
-    return tuple(value)
-
-
 def _rgb(values: Any) -> RGB:
     r, g, b = (float(v) for v in values)
     return r, g, b
-
-
-def _read_text(data: dict[str, Any], key: str, *, required: bool = False) -> str:
-    text = data[key] if required else data.get(key, "")
-    if not isinstance(text, str):
-        raise TypeError(f"{key} is a text, not {text!r}")
-    return text
-
-
-def _read_scale(value: Any) -> float:
-    if type(value) not in (int, float):
-        raise TypeError(f"cd_per_unit is a number, not {value!r}")
-    return float(value)
-
-
-def _read_rgb(values: Any) -> RGB:
-    # float() would also take "1" and true, and a string of three digits for three numbers.
-    if not isinstance(values, list) or not all(type(v) in (int, float) for v in values):
-        raise TypeError(f"{values!r} is not a list of three numbers")
-    return _rgb(values)

@@ -24,11 +24,11 @@ from lightpaint.placement.candidates import Candidates
 from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.xml_edit import tag
-from lightpaint.scene.emitters import PLUGINS
+from lightpaint.scene.emission import PLUGINS
+from lightpaint.scene.film import reductions
 from lightpaint.scene.lights import free_names
 from lightpaint.scene.parsed import Position
 from lightpaint.scene.render import Stream, pass_seed
-from lightpaint.scene.resolution import reductions
 from lightpaint.scene.scene import Scene
 
 #: Suggestions that are made where no number is given.
@@ -152,7 +152,7 @@ def _on_small_film(scene: Scene, basis: Basis) -> Scene:
     height, width = scene.size
     fitting = [
         k
-        for k in reductions(scene.view)
+        for k in reductions(scene.film)
         if whole_factor(basis.size, (height // k, width // k)) is not None
     ]
     if not fitting:

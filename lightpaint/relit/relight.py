@@ -18,8 +18,8 @@ from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, write_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
-from lightpaint.scene.emitters import Scaling
-from lightpaint.scene.lights import Emitter
+from lightpaint.scene.emission import Scaling
+from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
 
 

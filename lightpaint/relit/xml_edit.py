@@ -1,59 +1,17 @@
 """Changing a few elements of an XML file and nothing else.
 
-Positions are byte offsets into the UTF-8 form of the text, byte-order mark included, which
-is how Mitsuba's parser counts; the file's own encoding comes back when it is written. What that
-parser (pugixml) puts up with is read here too: a bare `&` or `<` in an attribute, `--` in a
-comment, white space before the XML declaration.
+Positions are byte offsets into the UTF-8 form of the text (see scene/checks/tokens.py); the file's
+own encoding comes back when it is written.
 """
 
-import codecs
 import re
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from lightpaint.errors import SceneError
-
-_MARKS = {
-    codecs.BOM_UTF8: "utf-8",
-    codecs.BOM_UTF32_LE: "utf-32-le",
-    codecs.BOM_UTF32_BE: "utf-32-be",
-    codecs.BOM_UTF16_LE: "utf-16-le",
-    codecs.BOM_UTF16_BE: "utf-16-be",
-    # Without a mark, by the first character, which is `<`.
-    b"<\0\0\0": "utf-32-le",
-    b"\0\0\0<": "utf-32-be",
-    b"<\0": "utf-16-le",
-    b"\0<": "utf-16-be",
-}
-
-_NAME = rb"[A-Za-z_:\x80-\xff][\w:.\-\x80-\xff]*"
-_QUOTED = rb"""(?:"[^"]*"|'[^']*')"""
-_COMMENT = rb"<!--.*?-->"
-_INSTRUCTION = rb"<\?.*?\?>"  # XML declarations look the same
-_CDATA = rb"<!\[CDATA\[.*?\]\]>"
-#: With declarations inside, one level deep. `(?>` keeps a broken one from being tried forever.
-_DECLARATION = rb"<!(?:%b|[^\"'>])*>" % _QUOTED
-_DOCTYPE = rb"<!DOCTYPE(?>%b|%b|%b|%b|[^<>\"'])*>" % (
-    _QUOTED,
-    _COMMENT,
-    _INSTRUCTION,
-    _DECLARATION,
-)
-_END_TAG = rb"</(?P<closed>%b)\s*>" % _NAME
-_START_TAG = rb"<(?P<tag>%b)(?P<attributes>(?:\s+%b\s*=\s*%b)*)\s*(?P<empty>/?)>" % (
-    _NAME,
-    _NAME,
-    _QUOTED,
-)
-_MARKUP = re.compile(
-    b"|".join([_COMMENT, _INSTRUCTION, _CDATA, _DOCTYPE, _END_TAG, _START_TAG]), re.DOTALL
-)
-_ATTRIBUTE = re.compile(rb"(%b)\s*=\s*(%b)" % (_NAME, _QUOTED))
-_REFERENCE = re.compile(r"&(?:#x([0-9a-fA-F]+)|#([0-9]+)|(lt|gt|amp|quot|apos));")
-_ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
+from lightpaint.scene.checks.tokens import attributes, decoded, encoding_of, line_of, markup
 
 
 @dataclass
@@ -90,7 +48,7 @@ class XmlFile:
 
     def __init__(self, path: Path) -> None:
         raw = path.read_bytes()
-        self._encoding = _encoding(raw)
+        self._encoding = encoding_of(raw)
         try:
             # Like Mitsuba, take any other bytes for UTF-8 as they are.
             self.text = (
@@ -115,7 +73,7 @@ class XmlFile:
 
     def place_of(self, element: Element) -> str:
         """File and line, for error messages."""
-        return f"{self._path}, line {_line(self.text, element.start)}"
+        return f"{self._path}, line {line_of(self.text, element.start)}"
 
     def replace(self, element: Element, text: str) -> None:
         """Put `text` in the place of `element`."""
@@ -167,15 +125,6 @@ def tag(element: str, /, **attributes: str) -> str:
     return f"<{element}{listed}/>"
 
 
-def _encoding(raw: bytes) -> str:
-    """As Mitsuba's parser sees it: Latin-1 is the only declaration that it heeds."""
-    for mark, name in _MARKS.items():
-        if raw.startswith(mark):
-            return name
-    latin = rb"<\?xml[^>]*?encoding\s*=\s*[\"'](?:iso-8859-1|latin1)[\"']"
-    return "latin-1" if re.match(latin, raw, re.IGNORECASE) else "utf-8"
-
-
 def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
     """(root, all elements by offset). What comes behind the root is not looked at.
 
@@ -184,65 +133,36 @@ def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
     elements: dict[int, Element] = {}
     opened: list[Element] = []
     is_old = False
-    for markup in _markup(text):
-        if markup["tag"] is not None:
-            attributes = _attributes(markup["attributes"])
+    for found in markup(text):
+        if found["tag"] is not None:
+            given = attributes(found)
             if not opened:
-                is_old = _is_old(attributes.get("version", ""))
-            name = attributes.get("name", "")
+                is_old = _is_old(given.get("version", ""))
+            name = given.get("name", "")
             element = Element(
-                tag=_decoded(markup["tag"]),
-                attributes=attributes,
+                tag=decoded(found["tag"]),
+                attributes=given,
                 name=_snake_case(name) if is_old else name,
-                start=markup.start(),
-                inner=markup.end(),
+                start=found.start(),
+                inner=found.end(),
             )
             if opened:
                 opened[-1].children.append(element)
             opened.append(element)
             elements[element.start] = element
-        closed = markup["closed"]
-        if closed is not None and (not opened or opened[-1].tag != _decoded(closed)):
+        end = None if found["end"] is None else decoded(found["end"])
+        if end is not None and (not opened or opened[-1].tag != end):
             raise ValueError(
-                f"line {_line(text, markup.start())}: </{_decoded(closed)}> closes "
+                f"line {line_of(text, found.start())}: </{end}> closes "
                 + (_opening(text, opened[-1]) if opened else "nothing")
             )
-        if closed is not None or markup["empty"]:
+        if end is not None or found["empty"]:
             element = opened.pop()
-            element.end = markup.end()
+            element.end = found.end()
             if not opened:
                 return element, elements
     missing = f"{_opening(text, opened[-1])} has no end tag" if opened else "it has no element"
     raise ValueError(missing)
-
-
-def _markup(text: bytes) -> Iterator[re.Match[bytes]]:
-    """Everything in angle brackets, in order; a `<` that opens nothing raises ValueError."""
-    at = text.find(b"<")
-    while at >= 0:
-        found = _MARKUP.match(text, at)
-        if found is None:
-            start = _decoded(text[at : at + 40]).split("\n")[0].strip()
-            raise ValueError(f"line {_line(text, at)}: cannot read {start!r}")
-        yield found
-        at = text.find(b"<", found.end())
-
-
-def _attributes(text: bytes) -> dict[str, str]:
-    """By name, white space made spaces and references resolved; the first of a name counts."""
-    attributes: dict[str, str] = {}
-    for key, quoted in _ATTRIBUTE.findall(text):
-        value = re.sub(r"\r\n|[\r\n\t]", " ", _decoded(quoted[1:-1]))
-        attributes.setdefault(_decoded(key), _REFERENCE.sub(_resolved, value))
-    return attributes
-
-
-def _resolved(reference: re.Match[str]) -> str:
-    hexadecimal, decimal, entity = reference.groups()
-    if entity:
-        return _ENTITIES[entity]
-    code = int(hexadecimal, 16) if hexadecimal else int(decimal)
-    return chr(code) if code <= sys.maxunicode else reference[0]
 
 
 def _is_old(version: str) -> bool:
@@ -256,16 +176,8 @@ def _snake_case(name: str) -> str:
     return re.sub(r"([a-z])([A-Z]+)", lambda m: f"{m[1]}_{m[2].lower()}", name)
 
 
-def _decoded(text: bytes) -> str:
-    return text.decode("utf-8", "replace")
-
-
-def _line(text: bytes, offset: int) -> int:
-    return text.count(b"\n", 0, offset) + 1
-
-
 def _opening(text: bytes, element: Element) -> str:
-    return f"<{element.tag}> of line {_line(text, element.start)}"
+    return f"<{element.tag}> of line {line_of(text, element.start)}"
 
 
 def _indent_before(text: bytes, offset: int) -> str:

@@ -1,8 +1,7 @@
 """report.html: one self-contained page about one result.
 
-The page's frame is report.html.in; what is filled in comes from report_pictures.py and
-report_tables.py. Pictures are data: URIs; nothing is loaded from anywhere, and the page's own
-content policy forbids it.
+The page's frame is page.html.in; what is filled in comes from the other modules here. Pictures
+are data: URIs; nothing is loaded from anywhere, and the page's own content policy forbids it.
 """
 
 from collections.abc import Sequence
@@ -23,16 +22,10 @@ from lightpaint.relit.verify import Verification
 from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.figures import Picture, maps, wipe
+from lightpaint.report.lights_table import amounts_heading, lights_table
 from lightpaint.report.pictures import target_picture, view_of
 from lightpaint.report.suggestion import suggestion_section
-from lightpaint.report.tables import (
-    amounts_heading,
-    fit_table,
-    lights_table,
-    render_table,
-    verification_table,
-    versions,
-)
+from lightpaint.report.tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.verdict import verdict
 from lightpaint.target.target import Target
 

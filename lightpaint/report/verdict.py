@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.normal_equations import BLOCK
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verify import LIMIT, Verification
 
@@ -18,22 +17,9 @@ def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
     Energy is luminance Y summed over all pixels, painted or not: Σ Y(w_i Φ_i) over
     Σ_j Σ Y(w_j Φ_j). The shares sum to 1; where every light is off they are all 0.
     """
-    energy = (_flux(basis.images) * lighting.weights_for(basis)) @ LUMINANCE
+    energy = (basis.totals * lighting.weights_for(basis)) @ LUMINANCE
     total = energy.sum()
     return np.asarray(energy / total if total > 0 else np.zeros_like(energy))
-
-
-def _flux(images: Floats) -> Doubles:
-    """Σ_pixels Φ_i per light and channel, (n, 3) float64. images: (n, h, w, 3)."""
-    rows = images.reshape(len(images), -1, 3)
-    # A sum over axes this short is slow in NumPy, a product with ones is not; in float64 and
-    # by blocks it is as exact as the sum, and needs no copy of the basis.
-    ones = np.ones(BLOCK)
-    flux = np.zeros((len(images), 3))
-    for start in range(0, rows.shape[1], BLOCK):
-        block = rows[:, start : start + BLOCK].astype(np.float64)
-        flux += ones[: block.shape[1]] @ block
-    return flux
 
 
 def relative_residual(solution: Solution) -> float:

@@ -1,8 +1,7 @@
-"""What "one unit" of each kind of light means, and how its present emission is read."""
+"""The emitters of a loaded scene, as Mitsuba has them."""
 
 import math
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -10,110 +9,106 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
-
-#: A light as the scene has it, where its emission is a multiple of that.
-AS_AUTHORED: RGB = (1.0, 1.0, 1.0)
-
-
-class Scaling(Enum):
-    """What in the scene file carries the emission of a light.
-
-    COLOUR: one RGB colour; its unit is white, whatever the scene says.
-    IMAGE: a bitmap, scaled per channel; its unit is the image as authored.
-    FACTORS: numbers that scale the light as a whole, not per channel; unit as authored.
-    """
-
-    COLOUR = "colour"
-    IMAGE = "image"
-    FACTORS = "factors"
-
-
-@dataclass(frozen=True)
-class EmissionKind:
-    """How a light is scaled, by which parameter of its plugin, and the unit of its emission.
-
-    factors: names of the numbers that scale it, for FACTORS.
-    """
-
-    scaling: Scaling
-    parameter: str
-    unit: str
-    factors: tuple[str, ...] = ()
-
-    @property
-    def is_scalar(self) -> bool:
-        """Whether the light has one weight for all channels instead of three."""
-        return self.scaling is Scaling.FACTORS
-
-
-#: Unit of emission of lights that are multiples of what the scene has.
-MULTIPLE = "× as authored"
-
-#: (parameter, unit) of the emitters that are supported; the first is what carries emission.
-PLUGINS = {
-    "area": ("radiance", "W/(m² sr)"),
-    "constant": ("radiance", "W/(m² sr)"),
-    "directional": ("irradiance", "W/m²"),
-    "envmap": ("radiance", "W/(m² sr)"),
-    "point": ("intensity", "W/sr"),
-    "projector": ("irradiance", "W/m²"),
-    "spot": ("intensity", "W/sr"),
-    "sunsky": ("radiance", "W/(m² sr)"),
-}
-
+from lightpaint.scene.emission import (
+    AS_AUTHORED,
+    PLUGINS,
+    EmissionKind,
+    Scaling,
+    emission_kind,
+    read_emission,
+    why_not_adjusted,
+)
+from lightpaint.scene.parsed import ParsedScene
 
 #: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
 NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
 
 
-def emission_kind(emitter: Any, plugin: str) -> EmissionKind | None:
-    """How a loaded emitter is scaled; None where lightpaint cannot scale it."""
-    import mitsuba as mi
+@dataclass(frozen=True)
+class Emitter:
+    """One emitter of a scene.
 
-    if plugin not in PLUGINS:
-        return None
-    parameter, unit = PLUGINS[plugin]
-    keys = set(mi.traverse(emitter).keys())
-    if plugin == "sunsky":
-        return EmissionKind(Scaling.FACTORS, parameter, MULTIPLE, ("sun_scale", "sky_scale"))
-    if plugin == "envmap" or f"{parameter}.data" in keys:
-        return EmissionKind(Scaling.IMAGE, parameter, MULTIPLE)
-    if f"{parameter}.value" in keys:
-        return EmissionKind(Scaling.COLOUR, parameter, unit)
-    if f"{parameter}.scale" in keys:
-        return EmissionKind(Scaling.FACTORS, parameter, MULTIPLE, ("scale",))
-    return None
-
-
-def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
-    """The emission of a loaded Mitsuba emitter, as linear RGB in the unit of `kind`.
-
-    Read from the loaded object and not from the XML text, where a spectrum, a preset or
-    nothing at all may stand. Raises SceneError for values that are no RGB colour.
+    kind: how it is scaled; None where lightpaint cannot.
+    emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
+    file, offset: where its element's `<` stands: index into Scene.files, byte offset.
+    obstacle: why it cannot be solved for, in words behind its name; "" if it can.
+    unit_flux: watts per channel at an emission of 1; None where there is no such number.
     """
-    import mitsuba as mi
 
-    if kind is None or kind.scaling is not Scaling.COLOUR:
-        return AS_AUTHORED
-    value = np.array(mi.traverse(emitter)[f"{kind.parameter}.value"], dtype=float).ravel()
-    if value.size not in (1, 3):
-        raise SceneError(f"light {name!r} has a {kind.parameter} of {value.size} values, not RGB")
-    r, g, b = np.broadcast_to(value, 3).tolist()
-    if not np.isfinite(value).all():
-        raise SceneError(f"light {name!r} has the {kind.parameter} {[r, g, b]}: not finite")
-    return r, g, b
+    name: str
+    plugin: str
+    kind: EmissionKind | None
+    emission: RGB
+    form: str
+    sampling_weight: float
+    node: int
+    file: int
+    offset: int
+    obstacle: str = ""
+    unit_flux: float | None = None
+
+    def __repr__(self) -> str:
+        return f"Emitter({self.name!r}, {self.plugin} {self.form})"
+
+    @property
+    def by_chance(self) -> bool:
+        """Whether only rays that happen to hit it may find it: it is never sampled.
+
+        Meshes painted by an attribute: Mitsuba's sampling of these and the probability that it
+        states for it do not agree, so that a render would depend on the sampling weights, and
+        with them on which other lights are on.
+        """
+        return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
 
 
-def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> str:
-    """What keeps a light from being solved for, in words behind its name; "" if nothing."""
-    if plugin not in PLUGINS:
-        return f"is a {plugin} emitter, which lightpaint cannot scale"
-    if kind is None:
-        parameter = PLUGINS[plugin][0]
-        return f"has a textured {parameter} that is neither a bitmap nor one colour"
-    if min(emission) < 0:
-        return f"has a negative {kind.parameter}, {' '.join(f'{v:g}' for v in emission)}"
-    return ""
+def point_emitter(name: str, node: int, position: tuple[float, float, float]) -> Emitter:
+    """A point light of intensity 1 that stands in no file."""
+    parameter, unit = PLUGINS["point"]
+    x, y, z = position
+    return Emitter(
+        name=name,
+        plugin="point",
+        kind=EmissionKind(Scaling.COLOUR, parameter, unit),
+        emission=AS_AUTHORED,
+        form=f"at ({x:.2f}, {y:.2f}, {z:.2f})",
+        sampling_weight=1.0,
+        node=node,
+        file=0,
+        offset=-1,
+        unit_flux=point_flux(),
+    )
+
+
+def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
+    """The emitters that take part in the scene, in document order."""
+    node_of = {name: node for node, name in parsed.names.items()}
+    found = []
+    for emitter in loaded.emitters():
+        name = emitter.id()
+        if name not in node_of:
+            raise SceneError(f"emitter {name!r} does not stand in {parsed.path} as itself")
+        node = parsed.state.nodes[node_of[name]]
+        plugin = node.props.plugin_name()
+        kind = emission_kind(emitter, plugin)
+        if kind is None:
+            check_rendered(emitter, plugin, name, parsed.integrator().plugin)
+        emission = read_emission(emitter, kind, name)
+        found.append(
+            Emitter(
+                name=name,
+                plugin=plugin,
+                kind=kind,
+                emission=emission,
+                form=describe_form(emitter, plugin),
+                sampling_weight=float(emitter.sampling_weight()),
+                node=node_of[name],
+                file=node.file_index,
+                offset=node.offset - 1,
+                obstacle=why_not_adjusted(plugin, kind, emission),
+                unit_flux=flux_of_unit(emitter, plugin, kind),
+            )
+        )
+    return tuple(sorted(found, key=lambda emitter: emitter.node))
 
 
 def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:

@@ -1,77 +1,16 @@
-"""Emitters as Mitsuba has them, and lights as people adjust them: one emitter, or several.
+"""Lights as people adjust them: one emitter, or several tied together under one weight."""
 
-`choose_lights` turns the one into the other. Everything is in document order; what is not
-adjusted comes last, as one light that is fixed.
-"""
-
-import difflib
 import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
+from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.photometry import point_flux
 from lightpaint.errors import SceneError
-from lightpaint.scene.emitters import AS_AUTHORED, MULTIPLE, PLUGINS, EmissionKind, Scaling
-
-#: Name of the fixed light, with underscores added should another have it.
-REST = "rest"
+from lightpaint.scene.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
+from lightpaint.scene.emitters import Emitter
 
 #: What emission scales in a light that is a multiple of what the scene has.
 WHOLE_EMISSION = "emission"
-
-
-@dataclass(frozen=True)
-class Emitter:
-    """One emitter of a scene.
-
-    kind: how it is scaled; None where lightpaint cannot.
-    emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
-    file, offset: where its element's `<` stands: index into Scene.files, byte offset.
-    obstacle: why it cannot be solved for, in words behind its name; "" if it can.
-    unit_flux: watts per channel at an emission of 1; None where there is no such number.
-    """
-
-    name: str
-    plugin: str
-    kind: EmissionKind | None
-    emission: RGB
-    form: str
-    sampling_weight: float
-    node: int
-    file: int
-    offset: int
-    obstacle: str = ""
-    unit_flux: float | None = None
-
-    @property
-    def by_chance(self) -> bool:
-        """Whether only rays that happen to hit it may find it: it is never sampled.
-
-        Meshes painted by an attribute: Mitsuba's sampling of these and the probability that it
-        states for it do not agree, so that a render would depend on the sampling weights, and
-        with them on which other lights are on.
-        """
-        return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
-
-
-def point_emitter(name: str, node: int, position: tuple[float, float, float]) -> Emitter:
-    """A point light of intensity 1 that stands in no file."""
-    parameter, unit = PLUGINS["point"]
-    x, y, z = position
-    return Emitter(
-        name=name,
-        plugin="point",
-        kind=EmissionKind(Scaling.COLOUR, parameter, unit),
-        emission=AS_AUTHORED,
-        form=f"at ({x:.2f}, {y:.2f}, {z:.2f})",
-        sampling_weight=1.0,
-        node=node,
-        file=0,
-        offset=-1,
-        unit_flux=point_flux(),
-    )
 
 
 def free_names(stem: str, count: int, taken: Collection[str]) -> list[str]:
@@ -98,6 +37,13 @@ class Light:
     emission: RGB
     is_scalar: bool = False
     is_fixed: bool = False
+
+    def __repr__(self) -> str:
+        emission = " ".join(f"{v:.4g}" for v in self.emission)
+        kept = ", kept" if self.is_fixed else ""
+        of = "" if len(self.members) == 1 else f", {len(self.members)} emitters"
+        what = f"{self.plugin} {self.parameter} {emission} {self.unit}"
+        return f"Light({self.name!r}, {what}{of}{kept})"
 
     @property
     def member_names(self) -> tuple[str, ...]:
@@ -178,36 +124,6 @@ def keep(name: str, emitters: Sequence[Emitter]) -> Light:
     return Light(name, tuple(emitters), WHOLE_EMISSION, MULTIPLE, AS_AUTHORED, is_fixed=True)
 
 
-def choose_lights(
-    emitters: Sequence[Emitter],
-    *,
-    scene: str,
-    lights: Iterable[str] | None = None,
-    groups: Mapping[str, Iterable[str]] | None = None,
-) -> tuple[Light, ...]:
-    """The lights of a scene: its emitters, tied by `groups`, of which `lights` are adjusted.
-
-    lights: names or patterns (`window_*`) of lights and groups; None for all.
-    groups: name → names or patterns of its emitters. scene: what errors call the scene.
-
-    What is not chosen, and what cannot be scaled, is kept together in one fixed light.
-    Raises SceneError for names that are not there, that clash or that are taken twice, and
-    if nothing is left to adjust.
-    """
-    group_of = _members_of_groups(emitters, groups or {}, scene)
-    by_light: dict[str, list[Emitter]] = {}
-    for emitter in emitters:
-        if not emitter.obstacle:
-            by_light.setdefault(group_of.get(emitter.name, emitter.name), []).append(emitter)
-    if lights is not None:
-        chosen = _chosen(_listed(lights, "lights"), by_light, group_of, emitters, scene)
-        by_light = {name: members for name, members in by_light.items() if name in chosen}
-    if not by_light:
-        listed = "; ".join(f"{e.name!r} {e.obstacle}" for e in emitters)
-        raise SceneError(f"{scene} has no light that can be solved for: {listed}")
-    return _with_rest([tie(name, members) for name, members in by_light.items()], emitters)
-
-
 def lights_of(
     emitters: Sequence[Emitter], members: Mapping[str, Sequence[str]], fixed: Collection[str]
 ) -> tuple[Light, ...]:
@@ -220,102 +136,53 @@ def lights_of(
     for name, names in members.items():
         its = sorted((by_name[n] for n in names), key=lambda emitter: emitter.node)
         if name not in fixed:
-            _check_adjustable(its)
+            check_adjustable(its)
         lights.append(keep(name, its) if name in fixed else tie(name, its))
     return tuple(sorted(lights, key=lambda light: (light.is_fixed, light.members[0].node)))
 
 
-def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:
-    adjusted = {member.name for light in lights for member in light.members}
-    left = [emitter for emitter in emitters if emitter.name not in adjusted]
-    if not left:
-        return tuple(lights)
-    name, taken = REST, {light.name for light in lights} | {e.name for e in emitters}
-    while name in taken:
-        name += "_"
-    return (*lights, keep(name, left))
+def light_named(name: str, lights: Sequence[Light], *, scene: str) -> Light:
+    """The light called `name`. Raises SceneError if there is none."""
+    for light in lights:
+        if light.name == name:
+            return light
+    raise SceneError(f"{scene} has no light {name!r}: it has {', '.join(x.name for x in lights)}")
 
 
-def _members_of_groups(
-    emitters: Sequence[Emitter], groups: Mapping[str, Iterable[str]], scene: str
-) -> dict[str, str]:
-    """The group of each emitter that is in one."""
-    names = [emitter.name for emitter in emitters]
-    group_of: dict[str, str] = {}
-    for group, patterns in groups.items():
-        if not group:
-            raise SceneError("a group needs a name: write name=a,b,c")
-        listed = _listed(patterns, f"group {group!r}")
-        for pattern in listed:
-            found = _matching(pattern, names, f"group {group!r}", scene)
-            its = [e for e in emitters if e.name in found]
-            if pattern not in names:
-                # A pattern takes what can be taken; a name is meant.
-                its = [e for e in its if not e.obstacle] or its
-            _check_adjustable(its)
-            for name in (emitter.name for emitter in its):
-                other = group_of.setdefault(name, group)
-                if other != group:
-                    raise SceneError(
-                        f"light {name!r} is in two groups, {other!r} and {group!r}: "
-                        "an emitter has one weight; leave one of the groups out, or give it other "
-                        "members (groups of the lights file count too)"
-                    )
-    for group in groups:
-        if group in names and group_of.get(group) is None:
-            raise SceneError(
-                f"group {group!r} has the name of a light that is not in a group: choose another"
-            )
-    return group_of
-
-
-def _chosen(
-    patterns: Sequence[str],
-    by_light: Mapping[str, Sequence[Emitter]],
-    group_of: Mapping[str, str],
+def settings_for(
+    lights: Sequence[Light],
     emitters: Sequence[Emitter],
+    emission: Mapping[str, RGB],
+    *,
     scene: str,
-) -> set[str]:
-    """Names of the lights that the patterns select."""
-    chosen: set[str] = set()
-    for pattern in patterns:
-        if pattern not in by_light:
-            _check_adjustable([emitter for emitter in emitters if emitter.name == pattern])
-            if group := group_of.get(pattern):
-                raise SceneError(
-                    f"light {pattern!r} is part of the group {group!r}: choose that, or leave "
-                    f"{pattern!r} out of it"
-                )
-        chosen |= _matching(pattern, [*by_light], "lights", scene)
-    return chosen
+) -> dict[int, EmitterSetting]:
+    """What emitters are set to, by their nodes, where `emission` is that of lights, by name."""
+    settings: dict[int, EmitterSetting] = {}
+    for name, rgb in emission.items():
+        light = light_named(name, lights, scene=scene)
+        if not light.is_fixed:
+            settings |= {m.node: _setting(m, light.emission_of(m, rgb)) for m in light.members}
+        elif not any(rgb):
+            settings |= {m.node: _setting(m, rgb) for m in light.members}
+        elif tuple(rgb) != AS_AUTHORED:
+            raise SceneError(f"what is kept can be loaded black or as it is, not times {rgb}")
+    own = {emitter.node: emitter.sampling_weight for emitter in emitters}
+    if not any((own | {node: x.sampling_weight for node, x in settings.items()}).values()):
+        # Mitsuba refuses a scene in which no emitter may be sampled.
+        return {node: replace(x, sampling_weight=own[node] or 1.0) for node, x in settings.items()}
+    return settings
 
 
-def _check_adjustable(emitters: Iterable[Emitter]) -> None:
+def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
+    # An emitter the scene keeps switched off is sampled again once it shines.
+    weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.by_chance else 0.0
+    return EmitterSetting(emitter.kind, rgb, weight)
+
+
+def check_adjustable(emitters: Iterable[Emitter]) -> None:
+    """Raise SceneError for the first that cannot be scaled."""
     for emitter in emitters:
         if emitter.obstacle:
             raise SceneError(
                 f"light {emitter.name!r} {emitter.obstacle}, so it can only stay as it is"
             )
-
-
-def _matching(pattern: str, names: Sequence[str], where: str, scene: str) -> set[str]:
-    """The name itself, else all that match it as a pattern. Raises SceneError if none does."""
-    if pattern in names:
-        return {pattern}
-    found = {name for name in names if fnmatchcase(name, pattern)}
-    if not found:
-        close = difflib.get_close_matches(pattern, names, n=1)
-        hint = f"did you mean {close[0]!r}? It" if close else "it"
-        raise SceneError(
-            f"{where}: {scene} has no light {pattern!r}; {hint} has {', '.join(names)}"
-        )
-    return found
-
-
-def _listed(names: Iterable[str], where: str) -> list[str]:
-    """Checked to be a list that names something."""
-    # A text is a list of its letters too, and never what was meant.
-    listed = [names] if isinstance(names, str) else list(names)
-    if not listed or not all(isinstance(name, str) and name for name in listed):
-        raise SceneError(f"{where}: name at least one light, and each by its name")
-    return listed

@@ -1,11 +1,11 @@
 """The lights file: which lights to adjust and which go together, in a TOML beside the scene.
 
 For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What it asks of the
-lights in the solve is not looked at here (see solve/constraints_file.py).
+lights in the solve is not looked at here (see lighting/constraints/file.py).
 """
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,13 +30,31 @@ class LightsFile:
     """What a lights file asks for, as `choose_lights` takes it. path: None if there is none."""
 
     path: Path | None = None
-    lights: tuple[str, ...] | None = None
-    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    lights: Iterable[str] | None = None
+    groups: Mapping[str, Iterable[str]] = field(default_factory=dict)
+
+    def with_more(
+        self, lights: Iterable[str] | None, groups: Mapping[str, Iterable[str]] | None
+    ) -> "LightsFile":
+        """With what was given along with it: `lights` replaces its own, `groups` are added."""
+        groups = groups or {}
+        if lights is None and self.lights is not None:
+            # Who makes a group here and now means to adjust it.
+            lights = (*self.lights, *groups)
+        return LightsFile(self.path, lights, {**self.groups, **groups})
 
 
 def lights_file_beside(scene: Path) -> Path:
     """Where the lights file of `scene` lies if it has one."""
     return scene.with_name(scene.stem + SUFFIX)
+
+
+def lights_file_for(scene: Path, named: str | Path | None, *, beside: bool) -> LightsFile:
+    """What is read for `scene`: the file `named`, else the one beside it, if `beside` allows."""
+    if named is not None:
+        return read_lights_file(Path(named))
+    path = lights_file_beside(scene)
+    return read_lights_file(path) if beside and path.is_file() else LightsFile()
 
 
 def read_lights_file(path: Path) -> LightsFile:

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
-from lightpaint.scene.checks.assets import check_asset
+from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.xml import check_nodes, check_xml
-from lightpaint.scene.emitters import AS_AUTHORED, EmissionKind, Scaling
+from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
+from lightpaint.scene.film import Film
 
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000
@@ -43,57 +43,6 @@ class Integrator:
     samples: tuple[int, int] = (1, 1)
 
 
-@dataclass(frozen=True)
-class EmitterSetting:
-    """What an emitter is set to: emission in the unit of `kind`, and how often it is sampled.
-
-    kind: None for an emitter that cannot be scaled, only taken out: its emission is black.
-    """
-
-    kind: EmissionKind | None
-    emission: RGB
-    sampling_weight: float
-
-
-@dataclass(frozen=True)
-class View:
-    """A sensor and its film: size of the whole and of the crop window within, in pixels."""
-
-    sensor: int
-    size: tuple[int, int]
-    crop_size: tuple[int, int]
-    crop_offset: tuple[int, int]
-
-    @classmethod
-    def of(cls, camera: Any, sensor: int) -> "View":
-        """Of the sensor with that index among the scene's own. All pairs are (x, y)."""
-        film = camera.film()
-        size, crop_size, offset = (
-            (int(pair[0]), int(pair[1]))
-            for pair in (film.size(), film.crop_size(), film.crop_offset())
-        )
-        return cls(sensor, size, crop_size, offset)
-
-    def film(self) -> Any:
-        """A box-filtered RGB float32 film of this size."""
-        import mitsuba as mi
-
-        return mi.load_dict(
-            {
-                "type": "hdrfilm",
-                "width": self.size[0],
-                "height": self.size[1],
-                "crop_width": self.crop_size[0],
-                "crop_height": self.crop_size[1],
-                "crop_offset_x": self.crop_offset[0],
-                "crop_offset_y": self.crop_offset[1],
-                "pixel_format": "rgb",
-                "component_format": "float32",
-                "rfilter": {"type": "box"},
-            }
-        )
-
-
 class ParsedScene:
     """The nodes of a scene XML, by Mitsuba's own parser."""
 
@@ -113,7 +62,10 @@ class ParsedScene:
             # Mitsuba takes properties that were looked at for used, and reports the others.
             check_nodes(path, mi.parser.ParserState(self.state))
             mi.parser.transform_all(self.config, self.state)
-            self._check_assets(mi.parser.ParserState(self.state))
+            has_exr = check_assets(path, mi.parser.ParserState(self.state), self.resolver)
+            # Thrown in one of several threads, what its OpenEXR reader makes of a damaged table of
+            # offsets now and then ends the process.
+            self.config.parallel = self.config.parallel and not has_exr
         if self.state.nodes[0].props.plugin_name() != "scene":
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
         self.files = tuple(Path(str(f)) for f in self.state.files)
@@ -160,10 +112,10 @@ class ParsedScene:
             names[node] = name
         return names
 
-    def instantiate(self, settings: Mapping[int, EmitterSetting], view: View | None = None) -> Any:
+    def instantiate(self, settings: Mapping[int, EmitterSetting], film: Film | None = None) -> Any:
         """Make a `mi.Scene`, its emitters set by node.
 
-        view: the sensor whose film is replaced by `view.film()`; None leaves all as they are.
+        film: put in the place of its sensor's own; None leaves all as they are.
         """
         import mitsuba as mi
 
@@ -174,9 +126,9 @@ class ParsedScene:
         for node, name in zip(self.sensor_nodes, self.sensor_names, strict=True):
             state.nodes[node].props.set_id(name)
         for node, setting in settings.items():
-            self._apply(state, node, setting)
-        if view is not None:
-            props = state.nodes[self.sensor_nodes[view.sensor]].props
+            set_emission(state, node, setting, on_shape=node in self.shape_of)
+        if film is not None:
+            props = state.nodes[self.sensor_nodes[film.sensor]].props
             for key in list(props):
                 reference = mi.Properties.Type.ResolvedReference
                 if (
@@ -184,7 +136,7 @@ class ParsedScene:
                     and state.nodes[props[key].index()].type == mi.ObjectType.Film
                 ):
                     del props[key]
-            props["film"] = view.film()
+            props["film"] = film.load()
         with self._resolving(), mitsuba_errors(self.path):
             return mi.parser.instantiate(self.config, state)
 
@@ -201,7 +153,7 @@ class ParsedScene:
         other = copy(self)
         other.state = mi.parser.ParserState(self.state)
         for node, setting in dark.items():
-            other._apply(other.state, node, setting)
+            set_emission(other.state, node, setting, on_shape=node in self.shape_of)
         other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
         for name, position in positions.items():
             node = mi.parser.SceneNode()
@@ -216,57 +168,9 @@ class ParsedScene:
             other.names[k] = name
         return other
 
-    def _apply(self, state: Any, node: int, setting: EmitterSetting) -> None:
-        import mitsuba as mi
-
-        kind, rgb = setting.kind, setting.emission
-        props = state.nodes[node].props
-        if kind is None:
-            self._darken(state, node)
-        props["sampling_weight"] = setting.sampling_weight
-        if kind is None:
-            pass
-        elif kind.scaling is Scaling.COLOUR:
-            props[kind.parameter] = mi.ScalarColor3f(*rgb)
-        elif kind.scaling is Scaling.FACTORS:
-            # The numbers stand in the emitter itself or in its texture.
-            texture = self.child_named(node, kind.parameter)
-            holder = props if texture is None else state.nodes[texture].props
-            for factor in kind.factors:
-                holder[factor] = float(holder.get(factor, 1.0)) * rgb[0]
-        elif not any(rgb):
-            # Where a bitmap is chosen, a scale stands beside it, but for area lights.
-            if props.plugin_name() == "area":
-                props[kind.parameter] = mi.ScalarColor3f(0)
-            else:
-                props["scale"] = 0.0
-        elif rgb != AS_AUTHORED:
-            raise SceneError(f"an image of light can be loaded black or as it is, not times {rgb}")
-
-    def _darken(self, state: Any, node: int) -> None:
-        """Put a black emitter in the place of one that has no numbers to turn."""
-        import mitsuba as mi
-
-        props = state.nodes[node].props
-        for key in list(props):
-            del props[key]
-        # An emitter stays: without one, the shape would get another surface.
-        on_shape = node in self.shape_of
-        props.set_plugin_name("area" if on_shape else "point")
-        props["radiance" if on_shape else "intensity"] = mi.ScalarColor3f(0)
-
-    def child_named(self, node: int, name: str) -> int | None:
-        """The node that is referenced by `node` under `name`."""
-        import mitsuba as mi
-
-        props = self.state.nodes[node].props
-        if name not in props or props.type(name) != mi.Properties.Type.ResolvedReference:
-            return None
-        return int(props[name].index())
-
     def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
         """(file, whether its values are linear as they stand) of the image that emitter emits."""
-        texture = self.child_named(node, parameter)
+        texture = child_named(self.state, node, parameter)
         props = self.state.nodes[node if texture is None else texture].props
         if "filename" not in props:
             raise SceneError(f"light {self.names[node]!r} emits an image that is in no file")
@@ -317,30 +221,6 @@ class ParsedScene:
                     digest.update(data)
         digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
         return digest.hexdigest()[:32]
-
-    def _check_assets(self, state: Any) -> None:
-        """Raise SceneError for a file that no plugin should be given."""
-        import mitsuba as mi
-
-        seen: set[tuple[Path, str, int]] = set()
-        for node in state.nodes:
-            props = node.props
-            for key in props:
-                if not key.endswith("filename") or props.type(key) != mi.Properties.Type.String:
-                    continue
-                path = Path(str(self.resolver.resolve(props[key])))
-                index = int(props.get("shape_index", 0))
-                asset = (path, props.plugin_name(), index)
-                if path.exists() and asset not in seen:  # what is not there Mitsuba tells of
-                    try:
-                        check_asset(*asset)
-                    except SceneError as error:
-                        raise SceneError(f"{self.path}: {error}") from None
-                    # Thrown in one of several threads, what its OpenEXR reader makes of a damaged
-                    # table of offsets now and then ends the process.
-                    if path.suffix.lower() == ".exr":
-                        self.config.parallel = False
-                seen.add(asset)
 
     def assets(self) -> Iterator[Path]:
         """Files that plugins read: meshes, textures, tables."""

@@ -8,8 +8,7 @@ preview saves pixels before it saves samples.
 from dataclasses import dataclass
 from typing import Literal
 
-from lightpaint.scene.parsed import View
-from lightpaint.scene.resolution import reductions
+from lightpaint.scene.film import Film, reductions
 from lightpaint.scene.scene import Scene
 
 Quality = Literal["preview", "final"]
@@ -22,12 +21,12 @@ class Preset:
     spp: int
     pixels: int | None = None
 
-    def reduction(self, view: View) -> int:
-        """The smallest factor that brings `view` to `pixels`, else the largest there is."""
+    def reduction(self, film: Film) -> int:
+        """The smallest factor that brings `film` to `pixels`, else the largest there is."""
         if self.pixels is None:
             return 1
-        width, height = view.crop_size
-        possible = reductions(view)
+        width, height = film.crop_size
+        possible = reductions(film)
         small = (k for k in possible if width * height <= self.pixels * k * k)
         return next(small, possible[-1])
 
@@ -41,7 +40,7 @@ def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Sc
     Raises SceneError for a resolution that does not divide the film.
     """
     if resolution is None and quality is not None:
-        resolution = f"1/{PRESETS[quality].reduction(scene.view)}"
+        resolution = f"1/{PRESETS[quality].reduction(scene.film)}"
     return scene if resolution is None else scene.reduced(resolution)
 
 

@@ -7,7 +7,7 @@ time, and no reference to one of its emitters may outlive it.
 import gc
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,39 +17,17 @@ from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
 from lightpaint.scene.checks.xml import MAX_XML
-from lightpaint.scene.emitters import (
-    AS_AUTHORED,
-    check_rendered,
-    describe_form,
-    emission_kind,
-    flux_of_unit,
-    read_emission,
-    why_not_adjusted,
-)
-from lightpaint.scene.lights import (
-    REST,
-    Emitter,
-    Light,
-    choose_lights,
-    free_names,
-    lights_of,
-    point_emitter,
-)
-from lightpaint.scene.lights_file import LightsFile, lights_file_beside, read_lights_file
-from lightpaint.scene.parsed import (
-    EmitterSetting,
-    Integrator,
-    ParsedScene,
-    Position,
-    View,
-    mitsuba_errors,
-)
-from lightpaint.scene.resolution import reduced, reduction
+from lightpaint.scene.choice import REST, choose_lights
+from lightpaint.scene.emission import EmitterSetting
+from lightpaint.scene.emitters import Emitter, find_emitters, point_emitter
+from lightpaint.scene.film import Film, check_film, reduced, reduction, sensor_index
+from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
+from lightpaint.scene.lights_file import lights_file_for
+from lightpaint.scene.parsed import Integrator, ParsedScene, Position, mitsuba_errors
 from lightpaint.scene.variant import use_variant
+from lightpaint.screen import Listed, some_of
 
-#: Pixels of a film, its samples per pixel and characters of a name beyond which each is a mistake.
-MAX_PIXELS = 2**28
-MAX_SPP = 2**20
+#: Characters of a name beyond which it is a mistake.
 MAX_NAME = 1000
 
 
@@ -57,7 +35,7 @@ MAX_NAME = 1000
 class Scene:
     """A parsed scene, seen through one of its sensors.
 
-    view: the sensor it is seen through, and its film.
+    film: of the sensor it is seen through.
     spp: samples per pixel the scene itself asks for.
     has_null: whether rays may pass a surface as if it were not there.
     emitters: all of them; lights: what is adjusted, and last what is kept, if anything is.
@@ -68,7 +46,7 @@ class Scene:
 
     path: Path
     parameters: Mapping[str, str]
-    view: View
+    film: Film
     sensor_names: tuple[str, ...]
     spp: int
     integrator: Integrator
@@ -79,7 +57,16 @@ class Scene:
     files: tuple[Path, ...]
     content: str
     lights_file: Path | None
-    _parsed: "ParsedScene" = field(repr=False)
+    _parsed: ParsedScene
+
+    def __post_init__(self) -> None:
+        for name in ("lights", "emitters"):
+            object.__setattr__(self, name, Listed(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        (height, width), names = self.size, [light.name for light in self.lights]
+        about = f"{len(names)} lights, {width}x{height} through {self.sensor_names[self.sensor]}"
+        return f"Scene({self.path}, {about}: {some_of(names, room=400)})"
 
     @property
     def identity(self) -> str:
@@ -120,22 +107,17 @@ class Scene:
     @property
     def sensor(self) -> int:
         """Index of the sensor it is seen through."""
-        return self.view.sensor
+        return self.film.sensor
 
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels of the sensor's film, or of its crop window."""
-        width, height = self.view.crop_size
+        width, height = self.film.crop_size
         return height, width
 
     def light(self, name: str) -> Light:
         """The light called `name`. Raises SceneError if there is none."""
-        for light in self.lights:
-            if light.name == name:
-                return light
-        raise SceneError(
-            f"{self.path} has no light {name!r}: it has {', '.join(x.name for x in self.lights)}"
-        )
+        return light_named(name, self.lights, scene=str(self.path))
 
     def reduced(self, resolution: str) -> "Scene":
         """This scene on a smaller film of the same field of view.
@@ -143,7 +125,7 @@ class Scene:
         resolution: `1/4`, or `320x180`: a part of the film that cuts it into whole blocks of
         pixels. Raises SceneError, with sizes that would do, for any other.
         """
-        return replace(self, view=reduced(self.view, reduction(self.view, resolution)))
+        return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 
     def camera(self, loaded: Any) -> Any:
         """The sensor this scene is seen through, in what `load` returned."""
@@ -193,22 +175,8 @@ class Scene:
         all that came from it, before loading another. Lights that are images, and what is
         kept, can only be black or as authored here: other multiples take files (see relight).
         """
-        settings: dict[int, EmitterSetting] = {}
-        for name, rgb in (emission or {}).items():
-            light = self.light(name)
-            if not light.is_fixed:
-                settings |= {m.node: _setting(m, light.emission_of(m, rgb)) for m in light.members}
-            elif not any(rgb):
-                settings |= {m.node: _setting(m, rgb) for m in light.members}
-            elif tuple(rgb) != AS_AUTHORED:
-                raise SceneError(f"what is kept can be loaded black or as it is, not times {rgb}")
-        own = {emitter.node: emitter.sampling_weight for emitter in self.emitters}
-        if not any((own | {node: x.sampling_weight for node, x in settings.items()}).values()):
-            # Mitsuba refuses a scene in which no emitter may be sampled.
-            settings = {
-                node: replace(x, sampling_weight=own[node] or 1.0) for node, x in settings.items()
-            }
-        return self._parsed.instantiate(settings, self.view)
+        settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
+        return self._parsed.instantiate(settings, self.film)
 
     def emitted_image(self, emitter: Emitter) -> Floats:
         """The image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
@@ -258,64 +226,50 @@ def load_scene(
     values = {key: str(value) for key, value in (parameters or {}).items()}
     with mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant)
-    index = _sensor_index(sensor, parsed.sensor_names, path)
-
-    asked = _lights_file(path, lights_file, use_lights_file=use_lights_file)
+    index = sensor_index(sensor, parsed.sensor_names, path)
+    asked = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
     with mitsuba_errors(path):
-        loaded = parsed.instantiate({})
-        emitters = _find_emitters(parsed, loaded)
-        camera = _camera(loaded, parsed.sensor_names[index])
-        view = View.of(camera, index)
-        spp = int(camera.sampler().sample_count())
-        has_null = _has_null_surfaces(loaded)
-        del loaded, camera
-        gc.collect()
-        integrator, content = parsed.integrator(), parsed.content(index)
-    _check_view(path, view, spp)
+        seen = _look_at(parsed, index)
+    check_film(path, seen["film"], seen["spp"])
+    emitters = _checked(path, seen["emitters"])
+    return Scene(
+        path=path,
+        parameters=values,
+        lights=choose_lights(emitters, scene=str(path), lights=asked.lights, groups=asked.groups),
+        lights_file=asked.path,
+        _parsed=parsed,
+        **seen,
+    )
+
+
+def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
+    """What only the loaded scene tells, and the parsed one, as fields of a `Scene`."""
+    loaded = parsed.instantiate({})
+    camera = _camera(loaded, parsed.sensor_names[sensor])
+    seen = {
+        "emitters": find_emitters(parsed, loaded),
+        "film": Film.of(camera, sensor),
+        "spp": int(camera.sampler().sample_count()),
+        "has_null": _has_null_surfaces(loaded),
+    }
+    del loaded, camera
+    gc.collect()
+    return {
+        **seen,
+        "sensor_names": parsed.sensor_names,
+        "integrator": parsed.integrator(),
+        "has_media": parsed.has_media(),
+        "files": parsed.files,
+        "content": parsed.content(sensor),
+    }
+
+
+def _checked(path: Path, emitters: tuple[Emitter, ...]) -> tuple[Emitter, ...]:
     if not emitters:
         raise SceneError(f"{path} has no lights: add at least one emitter")
     if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
         raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
-
-    return Scene(
-        path=path,
-        parameters=values,
-        view=view,
-        sensor_names=parsed.sensor_names,
-        spp=spp,
-        integrator=integrator,
-        has_media=parsed.has_media(),
-        has_null=has_null,
-        emitters=emitters,
-        lights=choose_lights(
-            emitters,
-            scene=str(path),
-            lights=_chosen(asked, lights, groups or {}),
-            groups={**asked.groups, **(groups or {})},
-        ),
-        files=parsed.files,
-        content=content,
-        lights_file=asked.path,
-        _parsed=parsed,
-    )
-
-
-def _check_view(path: Path, view: View, spp: int) -> None:
-    width, height = view.crop_size
-    if min(width, height) < 1:
-        raise SceneError(
-            f"{path} has a film of {width}x{height} pixels: there is nothing to render"
-        )
-    if width * height > MAX_PIXELS:
-        raise SceneError(
-            f"{path} has a film of {width}x{height} pixels: no more than {MAX_PIXELS} can be "
-            "rendered; make its width and height smaller"
-        )
-    if spp > MAX_SPP:
-        raise SceneError(
-            f"{path} asks for {spp} samples per pixel: no more than {MAX_SPP} can be rendered; "
-            "make its sample_count smaller"
-        )
+    return emitters
 
 
 def _camera(loaded: Any, name: str) -> Any:
@@ -327,75 +281,3 @@ def _has_null_surfaces(loaded: Any) -> bool:
 
     bsdfs = (shape.bsdf() for shape in loaded.shapes())
     return any(b is not None and mi.has_flag(b.flags(), mi.BSDFFlags.Null) for b in bsdfs)
-
-
-def _lights_file(scene: Path, named: str | Path | None, *, use_lights_file: bool) -> LightsFile:
-    if named is not None:
-        return read_lights_file(Path(named))
-    beside = lights_file_beside(scene)
-    return read_lights_file(beside) if use_lights_file and beside.is_file() else LightsFile()
-
-
-def _chosen(
-    asked: LightsFile, lights: Iterable[str] | None, groups: Iterable[str]
-) -> Iterable[str] | None:
-    """What to adjust, by the lights file and by what was given along with it."""
-    if lights is not None or asked.lights is None:
-        return lights
-    # Who makes a group here and now means to adjust it.
-    return (*asked.lights, *groups)
-
-
-def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
-    # An emitter the scene keeps switched off is sampled again once it shines.
-    weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.by_chance else 0.0
-    return EmitterSetting(emitter.kind, rgb, weight)
-
-
-def _find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
-    """The emitters that take part in the scene, in document order."""
-    node_of = {name: node for node, name in parsed.names.items()}
-    found = []
-    for emitter in loaded.emitters():
-        name = emitter.id()
-        if name not in node_of:
-            raise SceneError(f"emitter {name!r} does not stand in {parsed.path} as itself")
-        node = parsed.state.nodes[node_of[name]]
-        plugin = node.props.plugin_name()
-        kind = emission_kind(emitter, plugin)
-        if kind is None:
-            check_rendered(emitter, plugin, name, parsed.integrator().plugin)
-        emission = read_emission(emitter, kind, name)
-        found.append(
-            Emitter(
-                name=name,
-                plugin=plugin,
-                kind=kind,
-                emission=emission,
-                form=describe_form(emitter, plugin),
-                sampling_weight=float(emitter.sampling_weight()),
-                node=node_of[name],
-                file=node.file_index,
-                offset=node.offset - 1,
-                obstacle=why_not_adjusted(plugin, kind, emission),
-                unit_flux=flux_of_unit(emitter, plugin, kind),
-            )
-        )
-    return tuple(sorted(found, key=lambda emitter: emitter.node))
-
-
-def _sensor_index(wanted: int | str | None, names: Sequence[str], path: Path) -> int:
-    if not names:
-        raise SceneError(f"{path} has no sensor: add one to look through")
-    if wanted is None:
-        return 0
-    if isinstance(wanted, str) and wanted in names:
-        return names.index(wanted)
-    try:
-        index = int(wanted)
-    except ValueError:
-        index = -1
-    if not 0 <= index < len(names):
-        listed = ", ".join(f"{k} ({name})" for k, name in enumerate(names))
-        raise SceneError(f"{path} has no sensor {wanted!r}: it has {listed}")
-    return index

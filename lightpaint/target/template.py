@@ -3,8 +3,9 @@
 import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -16,15 +17,15 @@ from lightpaint.files import (
     one_line,
     read_text,
     restoring,
-    strict_json,
     write_bytes,
     write_text,
 )
 from lightpaint.images.bitmap import VIEW_KEY
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
 from lightpaint.images.png import png_bytes, write_png_16
+from lightpaint.records import read_record, strict_json
 
-FORMAT = "lightpaint-template 1"
+FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
 #: The files of a template: what says how it was made, what is painted on, what helps.
 ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
@@ -59,6 +60,26 @@ class Template:
     def shown(self) -> Floats:
         """The values in [0, 1] that template.png holds, rounded to its 16 bits."""
         return np.round(self.view.encode(self.image) * 65535) / 65535
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A view transform and its exposure."""
+
+    name: str
+    stops: float
+
+
+@dataclass(frozen=True)
+class _About:
+    """What template.json says. size: (width, height)."""
+
+    format: Literal["lightpaint-template 1"]
+    scene: str
+    content: str
+    sensor: str
+    size: tuple[int, int]
+    view: _Shown
 
 
 def write_template(
@@ -102,14 +123,10 @@ def _thumbnail(look: Floats, view: str) -> bytes:
 
 
 def _about(template: Template) -> str:
-    about = {
-        "format": FORMAT,
-        "scene": template.scene,
-        "content": template.content,
-        "sensor": template.sensor,
-        "size": [template.size[1], template.size[0]],
-        "view": {"name": template.view.name, "stops": template.view.stops},
-    }
+    height, width = template.size
+    shown = _Shown(template.view.name, template.view.stops)
+    of = (template.scene, template.content, template.sensor)
+    about = asdict(_About(FORMAT, *of, (width, height), shown))
     return json.dumps(about, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -132,41 +149,26 @@ def write_look(path: Path, image: Floats, view: View) -> Path:
 def read_template(folder: Path) -> Template:
     """Read what `write_template` wrote. Raises TargetError for anything else."""
     try:
-        data = strict_json(read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT))
-        if data["format"] != FORMAT:
-            raise ValueError(f"its format is {data['format']!r}, expected {FORMAT!r}")
-        names = [data[key] for key in ("scene", "content", "sensor")]
-        view_name, stops = data["view"]["name"], data["view"]["stops"]
-        if not all(isinstance(name, str) for name in (*names, view_name)):
-            raise TypeError("scene, content, sensor and the view's name are to be texts")
-        if type(stops) not in (int, float):
-            raise TypeError(f"the view's stops are to be a number, not {stops!r}")
-        view = View(view_name, float(stops))
-        image = _read_picture(folder / LIGHT, data["size"])
+        text = read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT)
+        about = read_record(_About, strict_json(text), others=True)
+        view = View(about.view.name, about.view.stops)
+        image = _read_picture(folder / LIGHT, about.size)
         albedo = None
         if (folder / ALBEDO).exists():
-            albedo = _read_picture(folder / ALBEDO, data["size"])
-    except (
-        OSError,
-        LookupError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        MemoryError,
-        LightpaintError,
-    ) as error:
+            albedo = _read_picture(folder / ALBEDO, about.size)
+    except (OSError, ValueError, MemoryError, LightpaintError) as error:
+        said = one_line(str(error) or type(error).__name__)
         raise TargetError(
-            f"{folder} is no template: {_one_line(error)}; make one with lightpaint template"
+            f"{folder} is no template: {said}; make one with lightpaint template"
         ) from None
-    scene, content, sensor = names
-    return Template(image, view, scene, content, sensor, albedo)
+    return Template(image, view, about.scene, about.content, about.sensor, albedo)
 
 
-def _read_picture(path: Path, size: list[int]) -> Floats:
+def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
     image = read_parts(path)[0].rgb()
     height, width, _ = image.shape
-    if size != [width, height]:
-        raise ValueError(f"{path.name} is {width}x{height}, but {ABOUT} says {size}")
+    if size != (width, height):
+        raise ValueError(f"{path.name} is {width}x{height}, but {ABOUT} says {size[0]}x{size[1]}")
     if not np.isfinite(image).all():
         raise ValueError(f"{path.name} holds NaN or Inf")
     return image
@@ -197,9 +199,3 @@ def file_names(names: Iterable[str]) -> list[str]:
 
 def _texts(view: View) -> dict[str, str]:
     return {VIEW_KEY: f"{view.name} {view.stops!r}"}
-
-
-def _one_line(error: Exception) -> str:
-    if isinstance(error, KeyError):
-        return one_line(f"{ABOUT} lacks {error}")
-    return one_line(str(error) or type(error).__name__)

@@ -10,16 +10,17 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from lightpaint.basis.basis import (
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.checksums import CHECKSUMS_KEY
+from lightpaint.basis.file import (
     FORMAT_KEY,
     LIGHT_KEY,
     ORIGIN_KEY,
-    Basis,
     is_basis_file,
     read_basis,
+    read_origin,
     write_basis,
 )
-from lightpaint.basis.checksums import CHECKSUMS_KEY
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
@@ -237,3 +238,47 @@ def test_flux_goes_along_where_it_is_known(tmp_path: Path, make_basis: Any):
     basis = replace(made, lights=(known, made.lights[1]))
     write_basis(tmp_path / "f.basis.exr", basis)
     assert read_basis(tmp_path / "f.basis.exr").lights == basis.lights
+
+
+def test_what_is_asked_often_is_computed_once(make_basis: Any) -> None:
+    basis = make_basis(4, (150, 120), seen=np.random.default_rng(1).random((150, 120)) < 0.2)
+    images = basis.images.astype(np.float64)
+    counted = images * ~basis.emitters_seen[..., None]
+    # Sums of 18,000 products in float64, in another order.
+    np.testing.assert_allclose(basis.power, np.square(counted).sum(axis=(1, 2)), rtol=1e-12)
+    np.testing.assert_allclose(basis.totals, images.sum(axis=(1, 2)), rtol=1e-12)
+    np.testing.assert_array_equal(basis.present_weights, [x.emission for x in basis.lights])
+    for kept in ("names", "present_weights", "is_fixed", "power", "totals"):
+        assert getattr(basis, kept) is getattr(basis, kept)
+        assert kept == "names" or not getattr(basis, kept).flags.writeable
+    # Another basis has its own.
+    assert replace(basis, images=basis.images * 2).power[0, 0] == 4 * basis.power[0, 0]
+
+
+def test_a_basis_is_shown_on_one_screen(make_basis: Any) -> None:
+    basis = make_basis(3, (4, 5), names=["key", "fill", "rim"])
+    assert repr(basis) == "Basis(3 lights, 5x4, 64 spp, of scene.xml: key, fill, rim)"
+    many = make_basis(300, (1, 1), names=[f"chandelier_{k}_of_the_great_hall" for k in range(300)])
+    assert len(repr(many)) < 1000
+    assert "chandelier_0" in repr(many)
+    assert "and 28" in repr(many)
+    assert len(repr(many.lights)) < 1000
+    assert repr(many.lights).count("\n") < 25
+    assert "\n … and 29" in repr(many.lights)
+    assert "BasisLight('key', area radiance 0." in repr(basis.lights)
+
+
+def test_more_samples_than_any_render_has(path: Path) -> None:
+    origin = json.loads(read_parts(path)[0].attributes[ORIGIN_KEY])
+    for change in (
+        {"halves": [2**41, 1]},
+        {"passes": [1, 2**41]},
+        {"each_light": [[1, 1, 2**41, 1]] * 3},
+        {"halves": [1, -1]},
+        {"halves": [1, True]},
+        {"each_light": [[1, 1, 1]] * 3},
+    ):
+        _rewrite(path, 0, **{ORIGIN_KEY: json.dumps(origin | change), CHECKSUMS_KEY: None})
+        for read in (read_basis, read_origin):
+            with pytest.raises(BasisError, match=r"a\.basis\.exr"):
+                read(path)

@@ -8,7 +8,7 @@ import pytest
 from renderer import write_room
 
 from lightpaint.basis import cache
-from lightpaint.basis.basis import read_basis
+from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.scene.scene import Scene, load_scene
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, PATH, SAME_SAMPLES, write_room
 
-from lightpaint.basis.basis import Basis, read_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis
 
 VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
 INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from light_groups import channels, interleaved, pictures, write
 
-from lightpaint.basis.basis import write_basis
+from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.cli.sources import GroupSource, light_group_source, read_source
 from lightpaint.errors import BasisError

@@ -15,7 +15,8 @@ from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.view import View
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import Solution, solve
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solve
 from lightpaint.placement.suggest import (
     Suggestion,
     check_suggestible,

@@ -14,7 +14,7 @@ from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verify import verify
-from lightpaint.scene.emitters import MULTIPLE, Scaling
+from lightpaint.scene.emission import MULTIPLE, Scaling
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 

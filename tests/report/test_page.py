@@ -18,8 +18,8 @@ from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verify import compare
 from lightpaint.report.figures import data_uri, thumbnail
+from lightpaint.report.lights_table import hex_color
 from lightpaint.report.page import report_page
-from lightpaint.report.tables import hex_color
 from lightpaint.report.verdict import (
     energy_shares,
     noise_residual,

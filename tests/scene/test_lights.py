@@ -7,8 +7,10 @@ import pytest
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.scene.emitters import MULTIPLE, EmissionKind, Scaling
-from lightpaint.scene.lights import REST, Emitter, Light, choose_lights
+from lightpaint.scene.choice import REST, choose_lights
+from lightpaint.scene.emission import MULTIPLE, EmissionKind, Scaling
+from lightpaint.scene.emitters import Emitter
+from lightpaint.scene.lights import Light
 from lightpaint.scene.lights_file import read_lights_file
 
 AREA = EmissionKind(Scaling.COLOUR, "radiance", "W/(m² sr)")

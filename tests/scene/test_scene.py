@@ -182,3 +182,17 @@ def test_a_process_keeps_its_variant() -> None:
     assert use_variant(backend.variant) is backend
     with pytest.raises(BackendError, match="start a new one"):
         use_variant("scalar_rgb" if backend.variant != "scalar_rgb" else "llvm_ad_rgb")
+
+
+def test_a_scene_is_shown_on_one_screen(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    assert repr(scene) == (
+        f"Scene({scene.path}, 5 lights, 24x20 through camera: "
+        f"{', '.join(light.name for light in scene.lights)})"
+    )
+    assert "Light('bulb', point intensity 0.5 0.6 0.7 W/sr)" in repr(scene.lights)
+    many = scene.lit_by_points([(0.1 * k, 1.0, 0.0) for k in range(300)])
+    for shown in (repr(many), repr(many.lights), repr(many.emitters)):
+        assert len(shown) < 1000
+        assert "candidate_1" in shown or "more" in shown
+    assert "and 2" in repr(many)

@@ -318,10 +318,10 @@ def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
     for bad, words in (
         ("{", "no template"),
         ("[]", "no template"),
-        (good.replace("template 1", "template 9"), "its format is"),
+        (good.replace("template 1", "template 9"), "format is 'lightpaint-template 1', not"),
         (good.replace('"srgb"', '"srgbb"'), "no view transform"),
         (good.replace('"stops": 0.0', '"stops": 1e99'), "out of range"),
-        (good.replace('"sensor": "camera"', '"sensor": 7'), "texts"),
+        (good.replace('"sensor": "camera"', '"sensor": 7'), "sensor is a text"),
     ):
         about.write_text(bad, encoding="utf-8")
         with pytest.raises(TargetError, match=words):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.lightgroups.layers import Layer
+from lightpaint.basis.lightgroups.layers import RenderLayer
 from lightpaint.colour.color import LUMINANCE
 
 #: Share of the beauty that the groups may lack beyond rounding before it counts as missing.
@@ -24,7 +24,7 @@ COARSE = 8
 
 
 def spoken_sum(
-    rest: Floats, whole: Floats, layers: Sequence[Layer], missing: float, exceeding: float
+    rest: Floats, whole: Floats, layers: Sequence[RenderLayer], missing: float, exceeding: float
 ) -> tuple[str, bool]:
     """A sentence on the sum of the groups, and whether what they lack is more than rounding.
 
@@ -58,7 +58,7 @@ def shares(rest: Floats, whole: Floats) -> tuple[float, float]:
     return float((lacking @ LUMINANCE).sum()) / total, float((excess @ LUMINANCE).sum()) / total
 
 
-def rounding(layers: Sequence[Layer]) -> Floats:
+def rounding(layers: Sequence[RenderLayer]) -> Floats:
     """By how much the sum of the layers may be off its true value for rounding, (h, w, 3)."""
     bound: Floats = np.zeros(layers[0].image.shape)
     for layer in layers:
@@ -83,7 +83,7 @@ class LayerSum:
     bound: Floats
 
     @staticmethod
-    def of(layers: Sequence[Layer]) -> "LayerSum":
+    def of(layers: Sequence[RenderLayer]) -> "LayerSum":
         """The sum of at least one layer."""
         total: Floats = np.zeros(layers[0].image.shape)
         with np.errstate(invalid="ignore"):
@@ -91,17 +91,17 @@ class LayerSum:
                 total += layer.image
         return LayerSum(total, rounding(layers))
 
-    def and_also(self, layer: Layer) -> "LayerSum":
+    def and_also(self, layer: RenderLayer) -> "LayerSum":
         """With one more."""
         with np.errstate(invalid="ignore"):
             total = self.total + layer.image
         return LayerSum(total, self.bound + rounding([layer]))
 
-    def lacks(self, beauty: Layer) -> float:
+    def lacks(self, beauty: RenderLayer) -> float:
         """Σ |beauty − total|, where both are finite."""
         return float(_off(beauty.image, self.total).sum())
 
-    def is_of(self, beauty: Layer, *, less_itself: bool = False) -> bool:
+    def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
         """Whether the sum is just that picture, which then is not black.
 
         less_itself: whether the picture is among what was added up, and is to be taken out again.
@@ -116,7 +116,7 @@ class LayerSum:
             and self._excess(beauty, (), less_itself=less_itself) <= most
         )
 
-    def _excess(self, beauty: Layer, where: tuple[slice, ...], *, less_itself: bool) -> float:
+    def _excess(self, beauty: RenderLayer, where: tuple[slice, ...], *, less_itself: bool) -> float:
         """By how much more they are apart than rounding makes them, summed over these pixels."""
         image, bound = beauty.image[where], self.bound[where]
         if less_itself:
@@ -134,7 +134,9 @@ def _off(picture: Floats, total: Floats) -> Floats:
         return np.asarray(np.nan_to_num(np.abs(picture - total), nan=0, posinf=0, neginf=0))
 
 
-def beauty_by_sum(others: Sequence[Layer], lights: Sequence[Layer]) -> Layer | None:
+def beauty_by_sum(
+    others: Sequence[RenderLayer], lights: Sequence[RenderLayer]
+) -> RenderLayer | None:
     """The layer that the lights add up to, where it has a name that nobody knows."""
     if not others or not lights:
         return None
@@ -142,7 +144,7 @@ def beauty_by_sum(others: Sequence[Layer], lights: Sequence[Layer]) -> Layer | N
     return next((layer for layer in others if added.is_of(layer)), None)
 
 
-def beauty_among(layers: Sequence[Layer]) -> Layer | None:
+def beauty_among(layers: Sequence[RenderLayer]) -> RenderLayer | None:
     """The one of the layers that the others add up to."""
     added = LayerSum.of(layers)
     return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)

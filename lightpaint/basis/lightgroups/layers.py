@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.lightgroups.naming import is_known, short_names
+from lightpaint.basis.lightgroups.conventions import is_known
+from lightpaint.basis.lightgroups.naming import short_names
 from lightpaint.colour.primaries import are_same, converted, to_rec709
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import Part, read_parts
@@ -19,8 +20,8 @@ from lightpaint.images.exr_layers import ALPHA_NAMES, channel_named, colour_chan
 
 
 @dataclass(frozen=True)
-class Layer:
-    """Three channels of a file.
+class RenderLayer:
+    """Three channels of a file, as a renderer has written them.
 
     name: what it is chosen by. part, channels: where it stands; part is "" where a file has one.
     others: other names that a pattern may meet it by.
@@ -55,7 +56,7 @@ class Layer:
         return f"{self.file}{f' ({self.name})' if self.name else ''}"
 
 
-def read_layers(path: Path) -> list[Layer]:
+def read_layers(path: Path) -> list[RenderLayer]:
     """The RGB layers of the file or of the files in the folder at `path`, in their order.
 
     In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
@@ -87,7 +88,7 @@ def read_layers(path: Path) -> list[Layer]:
     return layers
 
 
-def _of_folder(folder: Path) -> list[Layer]:
+def _of_folder(folder: Path) -> list[RenderLayer]:
     files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".exr" and f.is_file())
     if not files:
         raise BasisError(f"{folder} holds no .exr file: give the one with the light groups")
@@ -107,7 +108,7 @@ def _of_folder(folder: Path) -> list[Layer]:
     return made
 
 
-def _of_file(path: Path) -> list[Layer]:
+def _of_file(path: Path) -> list[RenderLayer]:
     parts = read_parts(path)
     layers = []
     for part in parts:
@@ -119,7 +120,7 @@ def _of_file(path: Path) -> list[Layer]:
             if len(parts) == 1 and not prefix:
                 others += [path.stem, path.name]  # of a file of one layer, it is that one's name
             layers.append(
-                Layer(
+                RenderLayer(
                     name=part.name if prefix == "" and len(parts) > 1 else prefix,
                     file=path,
                     part=part.name if len(parts) > 1 else "",
@@ -150,5 +151,5 @@ def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str
     return np.stack(planes, axis=-1).astype(kind, copy=False)
 
 
-def _size(layer: Layer) -> str:
+def _size(layer: RenderLayer) -> str:
     return f"{layer.image.shape[1]}x{layer.image.shape[0]}"

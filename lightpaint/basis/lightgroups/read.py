@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import FORMAT_KEY, Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, BasisLight, Origin, free_name
+from lightpaint.basis.file import FORMAT_KEY
 from lightpaint.basis.lightgroups.beauty import (
     LayerSum,
     beauty_among,
@@ -21,8 +22,9 @@ from lightpaint.basis.lightgroups.beauty import (
     shares,
     spoken_sum,
 )
-from lightpaint.basis.lightgroups.layers import Layer, read_layers
-from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers, is_known
+from lightpaint.basis.lightgroups.conventions import is_known
+from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
+from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import read_headers
 
@@ -53,8 +55,8 @@ class LightGroups:
     basis: Basis
     path: Path
     renderer: str
-    layers: tuple[Layer, ...]
-    beauty: Layer | None
+    layers: tuple[RenderLayer, ...]
+    beauty: RenderLayer | None
     missing: float | None
     exceeding: float | None
     holes: npt.NDArray[np.bool_]
@@ -130,13 +132,13 @@ def _files(folder: Path) -> list[Path]:
         raise BasisError(f"cannot read {folder}: {error.strerror or error}") from None
 
 
-def _helps(layer: Layer, lights: Sequence[Layer], beauty: Layer) -> bool:
+def _helps(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
     """Whether the lights come closer to the beauty with that layer."""
     added = LayerSum.of(lights)
     return added.and_also(layer).lacks(beauty) < added.lacks(beauty)
 
 
-def _choose(path: Path, layers: dict[str, Layer], pattern: str | None) -> Choice:
+def _choose(path: Path, layers: dict[str, RenderLayer], pattern: str | None) -> Choice:
     by_file: dict[Path, int] = {}
     for layer in layers.values():
         by_file[layer.file] = by_file.get(layer.file, 0) + 1
@@ -147,7 +149,11 @@ def _choose(path: Path, layers: dict[str, Layer], pattern: str | None) -> Choice
 
 
 def _light_groups(
-    path: Path, choice: Choice, names: list[str], lights: list[Layer], beauty: Layer | None
+    path: Path,
+    choice: Choice,
+    names: list[str],
+    lights: list[RenderLayer],
+    beauty: RenderLayer | None,
 ) -> LightGroups:
     if not lights:
         raise BasisError(f"{path} has no light group beside its beauty {beauty and beauty.name!r}")
@@ -181,7 +187,7 @@ def _light_groups(
 
 
 def _what_is_missing(
-    lights: list[Layer], beauty: Layer | None, holes: npt.NDArray[np.bool_]
+    lights: list[RenderLayer], beauty: RenderLayer | None, holes: npt.NDArray[np.bool_]
 ) -> tuple[Floats | None, float | None, float | None, str]:
     """What the groups lack of the beauty, if that is more than rounding; its shares, in words."""
     if beauty is None:
@@ -197,7 +203,7 @@ def _what_is_missing(
 def _basis(
     path: Path,
     choice: Choice,
-    lights: dict[str, Layer],
+    lights: dict[str, RenderLayer],
     rest: Floats | None,
     holes: npt.NDArray[np.bool_],
 ) -> Basis:
@@ -209,7 +215,9 @@ def _basis(
     for image, layer in zip(images, lights.values(), strict=False):
         image[:] = layer.in_rec709(_filled(layer.image, holes))
     if rest is not None:
-        made.append(_light(_free(REST, [*lights]), "beauty less the groups", "rest", is_fixed=True))
+        made.append(
+            _light(free_name(REST, lights), "beauty less the groups", "rest", is_fixed=True)
+        )
         images[-1] = first.in_rec709(rest)
     return Basis(
         lights=tuple(made),
@@ -243,9 +251,3 @@ def _origin(path: Path, choice: Choice, images: Floats, names: Sequence[str]) ->
 
 def _filled(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
     return np.where(holes[..., None], np.float32(0), image.astype(np.float32))
-
-
-def _free(name: str, taken: Sequence[str]) -> str:
-    while name in taken:
-        name += "_"
-    return name

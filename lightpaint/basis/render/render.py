@@ -163,8 +163,9 @@ def _render_together(
     keeper: Keeper,
     progress: Progress,
 ) -> Basis:
-    """All lights in one path-traced pass after another (see lightgroups.py)."""
-    from lightpaint.basis.render.one_pass import HalfSums, Tracer
+    """All lights in one path-traced pass after another (see one_pass.py)."""
+    from lightpaint.basis.render.half_sums import HalfSums
+    from lightpaint.basis.render.one_pass import Tracer
 
     height, width = scene.size
     sums = HalfSums(len(scene.lights), scene.size) if start is None else HalfSums.of(start)

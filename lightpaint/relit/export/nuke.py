@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.lightgroups.layers import Layer
+from lightpaint.basis.lightgroups.layers import RenderLayer
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.lighting.lighting import Lighting
@@ -62,7 +62,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting) -> str:
     return "\n".join(lines) + "\n"
 
 
-def nuke_layer(layer: Layer) -> str:
+def nuke_layer(layer: RenderLayer) -> str:
     """What Nuke calls a layer of an EXR file; of plain R, G, B in a file of one part, `rgba`.
 
     It takes digits from the front of each piece between dots, makes everything that is no letter
@@ -80,7 +80,7 @@ def quoted(text: str) -> str:
     return '"' + escaped.replace("\r", "").replace("\n", "\\n") + '"'
 
 
-def _read(groups: LightGroups) -> list[Layer]:
+def _read(groups: LightGroups) -> list[RenderLayer]:
     return [*groups.layers, *([groups.beauty] if groups.beauty is not None else [])]
 
 
@@ -100,7 +100,7 @@ def _matrix(matrix: Floats | None, name: str) -> list[str]:
     return _node("ColorMatrix", matrix=f"{{{rows}}}", name=name)
 
 
-def _shuffle(layer: Layer | None, files: Sequence[Path], name: str) -> list[str]:
+def _shuffle(layer: RenderLayer | None, files: Sequence[Path], name: str) -> list[str]:
     assert layer is not None
     read = f"push $R{files.index(layer.file)}"
     return [read, *_node("Shuffle", **{"in": nuke_layer(layer)}, name=name)]

@@ -6,6 +6,7 @@ and take whatever memory a header asks for.
 
 import struct
 from pathlib import Path
+from typing import Any
 
 from lightpaint.errors import ImageError, SceneError
 from lightpaint.files import file_length, one_line
@@ -19,6 +20,30 @@ MAX_ASSET = 2**32
 #: each of the file's, is not decoded.
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 1000
+
+
+def check_assets(scene: Path, state: Any, resolver: Any) -> bool:
+    """Raise SceneError for a file that no plugin of what Mitsuba has parsed should be given.
+
+    Returns whether one of them is an OpenEXR file.
+    """
+    import mitsuba as mi
+
+    seen: set[tuple[Path, str, int]] = set()
+    for node in state.nodes:
+        props = node.props
+        for key in props:
+            if not key.endswith("filename") or props.type(key) != mi.Properties.Type.String:
+                continue
+            path = Path(str(resolver.resolve(props[key])))
+            asset = (path, props.plugin_name(), int(props.get("shape_index", 0)))
+            if path.exists() and asset not in seen:  # what is not there Mitsuba tells of
+                try:
+                    check_asset(*asset)
+                except SceneError as error:
+                    raise SceneError(f"{scene}: {error}") from None
+                seen.add(asset)
+    return any(path.suffix.lower() == ".exr" for path, _, _ in seen)
 
 
 def check_asset(path: Path, plugin: str, index: int = 0) -> None:

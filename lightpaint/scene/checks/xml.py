@@ -2,14 +2,11 @@
 
 Mitsuba's parser follows whatever it is given: elements or references nested until the stack
 overflows, includes and parameters that multiply without end, pipes that never answer. Here the
-same text is gone through with bounds, and each of these is a SceneError of one line. What the
-parser (pugixml) puts up with passes here too: a bare `&` or `<` in an attribute, `--` in a comment.
+same text is gone through with bounds, and each of these is a SceneError of one line.
 """
 
-import codecs
 import os
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +15,7 @@ import numpy as np
 
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length, one_line, read_bytes
+from lightpaint.scene.checks.tokens import attributes, encoding_of, entity_used, line_of, markup
 
 #: Bytes of XML in all, a file that is included twice counting twice.
 MAX_XML = 2**26
@@ -33,34 +31,6 @@ MAX_LOOKED_UP = 10_000_000
 #: Longest value of an attribute once its parameters are put in.
 MAX_VALUE = 2**16
 
-_ENCODINGS = {
-    codecs.BOM_UTF32_LE: "utf-32",
-    codecs.BOM_UTF32_BE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-    b"<\0\0\0": "utf-32-le",
-    b"\0\0\0<": "utf-32-be",
-    b"<\0": "utf-16-le",
-    b"\0<": "utf-16-be",
-}
-NEW_LINE = b"\n"
-_NAME = rb"[A-Za-z_:\x80-\xff][\w:.\-\x80-\xff]*+"
-_QUOTED = rb"""(?:"[^"]*+"|'[^']*+')"""
-_SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"
-#: Of a document type, declarations inside it one level deep.
-_DECLARATION = rb"<!(?:%b|[^\"'>])*+>" % _QUOTED
-_MARKUP = re.compile(
-    rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
-    rb"|(?P<type><!DOCTYPE(?>%b|%b|%b|[^<>\"'])*+>)"
-    rb"|</(?P<end>%b)\s*+>"
-    rb"|<(?P<tag>%b)(?P<attributes>(?:\s++%b\s*+=\s*+%b)*+)\s*+(?P<empty>/?)>"
-    % (_SKIPPED, _QUOTED, _SKIPPED, _DECLARATION, _NAME, _NAME, _NAME, _QUOTED)
-)
-_DECLARED = re.compile(rb"<!ENTITY\s+(%b)" % _NAME)
-_USED = re.compile(rb"&(%b);" % _NAME)
-_ATTRIBUTE = re.compile(rb"(%b)\s*+=\s*+(%b)" % (_NAME, _QUOTED))
-_REFERENCE = re.compile(r"&(?:#x([0-9a-fA-F]{1,8})|#([0-9]{1,8})|(lt|gt|amp|quot|apos));")
-_ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
 #: Elements that change what is read, or where.
 _FOLLOWED = (b"default", b"path", b"include", b"spectrum")
 _OBJECTS = frozenset(
@@ -152,7 +122,7 @@ class _Walk:
             )
         chain = (*chain, path)
         try:
-            data = _decoded(read_bytes(path, "scene file", SceneError, limit=MAX_XML))
+            data = _as_utf8(read_bytes(path, "scene file", SceneError, limit=MAX_XML))
         except SceneError as error:
             lead = f"{chain[-2]}: " if len(chain) > 1 else ""
             raise SceneError(f"{lead}{error}") from None
@@ -170,14 +140,17 @@ class _Walk:
         for found in _markup(path, data):
             if found["tag"] is not None:
                 opened += 1
-                place = f"{path}, line {_line(data, found)}" if opened > MAX_NESTING else ""
-                if place:
-                    raise SceneError(f"{place}: elements are nested more than {MAX_NESTING} deep")
+                if opened > MAX_NESTING:
+                    line = line_of(data, found.start())
+                    raise SceneError(
+                        f"{path}, line {line}: elements are nested more than {MAX_NESTING} deep"
+                    )
                 self._count(found["tag"], chain[0])
                 try:
                     self._element(found, inner, opened, chain)
                 except ValueError as error:
-                    raise SceneError(f"{path}, line {_line(data, found)}: {error}") from None
+                    line = line_of(data, found.start())
+                    raise SceneError(f"{path}, line {line}: {error}") from None
             if found["end"] is not None or found["empty"]:
                 opened -= 1
                 if opened <= depth:
@@ -199,7 +172,10 @@ class _Walk:
         tag = found["tag"]
         if b"$" not in found["attributes"] and tag not in _FOLLOWED:
             return
-        given = self._attributes(found["attributes"])
+        given = {
+            key: self._filled_in(value) if "$" in value else value
+            for key, value in attributes(found).items()
+        }
         if tag == b"default" and given.get("name"):
             self.parameters.setdefault(f"${given['name']}", given.get("value", ""))
             if len(self.parameters) > MAX_PARAMETERS:
@@ -217,17 +193,6 @@ class _Walk:
             if tag == b"include":
                 self.file(file, resolver, depth, chain)
 
-    def _attributes(self, text: bytes) -> dict[str, str]:
-        """By name, references resolved and parameters put in as Mitsuba does it."""
-        given: dict[str, str] = {}
-        for key, quoted in _ATTRIBUTE.findall(text):
-            value = quoted[1:-1].decode("utf-8", "surrogateescape")
-            value = _REFERENCE.sub(_character, value)
-            if "$" in value:
-                value = self._filled_in(value)
-            given.setdefault(key.decode("utf-8", "replace"), value)
-        return given
-
     def _filled_in(self, text: str) -> str:
         self.looked_up += len(self.parameters)
         if self.looked_up > MAX_LOOKED_UP:
@@ -244,48 +209,24 @@ class _Walk:
 
 
 def _markup(path: Path, data: bytes) -> Iterator[re.Match[bytes]]:
-    """Everything in angle brackets, in order. Raises SceneError for what no parser reads."""
-    at = data.find(b"<")
-    while at >= 0:
-        found = _MARKUP.match(data, at)
-        if found is None:
-            start = data[at : at + 40].decode("utf-8", "replace").split("\n")[0]
-            raise SceneError(
-                f"{path}, line {data.count(NEW_LINE, 0, at) + 1}: cannot read "
-                f"{one_line(start)!r} as XML"
-            )
-        if found["type"] is not None and (declared := set(_DECLARED.findall(found["type"]))):
-            used = declared.intersection(_USED.findall(data, found.end()))
-            if used:
-                name = one_line(min(used).decode("utf-8", "replace"))
+    """The tokens of a file. Raises SceneError for what no parser reads."""
+    try:
+        for found in markup(data):
+            if found["type"] is not None and (name := entity_used(data, found)):
                 raise SceneError(
-                    f"{path} uses the entity &{name}; of its document type, which Mitsuba does not "
-                    "read: write out what it stands for"
+                    f"{path} uses the entity &{one_line(name)}; of its document type, which "
+                    "Mitsuba does not read: write out what it stands for"
                 )
-        yield found
-        at = data.find(b"<", found.end())
+            yield found
+    except ValueError as error:
+        raise SceneError(f"{path}, {error}") from None
+
+
+def _as_utf8(raw: bytes) -> bytes:
+    encoding = encoding_of(raw)
+    return raw if encoding == "utf-8" else raw.decode(encoding, "replace").encode()
 
 
 def _resolved(resolver: Any, name: str) -> str:
     # What is no Unicode, and a NUL, is in no name that Mitsuba can say.
     return str(resolver.resolve(name.encode("utf-8", "replace").decode().replace("\0", "?")))
-
-
-def _character(reference: re.Match[str]) -> str:
-    hexadecimal, decimal, entity = reference.groups()
-    if entity:
-        return _ENTITIES[entity]
-    code = int(hexadecimal, 16) if hexadecimal else int(decimal)
-    return chr(code) if code <= sys.maxunicode else reference[0]
-
-
-def _decoded(raw: bytes) -> bytes:
-    """As UTF-8, or whatever has the same markup: Latin-1, and bytes that mean nothing."""
-    for mark, encoding in _ENCODINGS.items():
-        if raw.startswith(mark):
-            return raw.decode(encoding, "replace").encode("utf-8", "replace")
-    return raw
-
-
-def _line(data: bytes, found: re.Match[bytes]) -> int:
-    return data.count(NEW_LINE, 0, found.start()) + 1

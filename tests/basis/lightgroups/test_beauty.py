@@ -8,17 +8,17 @@ import pytest
 from light_groups import pictures
 
 from lightpaint.basis.lightgroups.beauty import LayerSum, beauty_among, beauty_by_sum, rounding
-from lightpaint.basis.lightgroups.layers import Layer
+from lightpaint.basis.lightgroups.layers import RenderLayer
 
 
-def _layers(images: Any, kind: Any = np.float32) -> list[Layer]:
+def _layers(images: Any, kind: Any = np.float32) -> list[RenderLayer]:
     return [
-        Layer(f"l{k}", Path("a.exr"), "", ("R", "G", "B"), (), image.astype(kind))
+        RenderLayer(f"l{k}", Path("a.exr"), "", ("R", "G", "B"), (), image.astype(kind))
         for k, image in enumerate(images)
     ]
 
 
-def _adds_up(beauty: Layer, lights: list[Layer]) -> bool:
+def _adds_up(beauty: RenderLayer, lights: list[RenderLayer]) -> bool:
     """The definition: off by more than rounding, in all, by a 1e-5 of the light."""
     total = sum(layer.image.astype(np.float64) for layer in lights)
     beyond = np.maximum(np.abs(beauty.image - total) - rounding([*lights, beauty]), 0)

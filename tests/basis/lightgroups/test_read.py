@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from light_groups import SIZE, channels, interleaved, multi_part, pictures, write
 
-from lightpaint.basis.basis import read_basis, write_basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.lightgroups.read import LightGroups, is_light_groups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.errors import BasisError, ImageError

@@ -8,7 +8,8 @@ import pytest
 from renderer import same_basis, write_room
 
 import lightpaint.scene.render
-from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from renderer import write_room
 
-from lightpaint.basis.basis import read_basis, write_basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.budget import Budget, Keeper
 from lightpaint.basis.render.render import _render_one_by_one, render_basis
 from lightpaint.progress import silent

@@ -10,7 +10,8 @@ import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_room
 
 import lightpaint.scene.render
-from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import ONE_PASS, SEPARATE, render_basis
 from lightpaint.basis.render.separate import BLACK, WHITE

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.basis import Basis, read_basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import SEPARATE, is_of, render_basis
 from lightpaint.basis.render.separate import BLACK, WHITE
-from lightpaint.scene.emitters import MULTIPLE
+from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.scene import Scene, load_scene
 
 #: A lamp of the kind and the colour of `bulb`.

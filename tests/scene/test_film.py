@@ -9,22 +9,21 @@ from renderer import write_room
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import block_mean, enlarged, whole_factor
-from lightpaint.scene.parsed import View
+from lightpaint.scene.film import Film, reduced, reduction, reductions
 from lightpaint.scene.quality import PRESETS, on_film, samples
 from lightpaint.scene.render import Stream, render
-from lightpaint.scene.resolution import reduced, reduction, reductions
 from lightpaint.scene.scene import load_scene
 
-FULL_HD = View(0, (1920, 1080), (1920, 1080), (0, 0))
-CROPPED = View(0, (640, 360), (320, 180), (80, 60))
+FULL_HD = Film(0, (1920, 1080), (1920, 1080), (0, 0))
+CROPPED = Film(0, (640, 360), (320, 180), (80, 60))
 
 
 def test_a_film_is_cut_into_whole_blocks() -> None:
     assert reduction(FULL_HD, "1/4") == reduction(FULL_HD, "480x270") == 4
-    assert reduced(FULL_HD, 4) == View(0, (480, 270), (480, 270), (0, 0))
+    assert reduced(FULL_HD, 4) == Film(0, (480, 270), (480, 270), (0, 0))
     # The size is that of the image, and the crop window divides as well.
     assert reduction(CROPPED, "160x90") == reduction(CROPPED, "1/2") == 2
-    assert reduced(CROPPED, 20) == View(0, (32, 18), (16, 9), (4, 3))
+    assert reduced(CROPPED, 20) == Film(0, (32, 18), (16, 9), (4, 3))
     assert reductions(CROPPED) == [1, 2, 4, 5, 10, 20]
     assert reduction(CROPPED, "1/1") == 1
 
@@ -45,7 +44,7 @@ def test_what_is_no_resolution_is_said_to_be_none(given: str) -> None:
 
 def test_a_film_of_coprime_sides_has_only_its_full_size() -> None:
     with pytest.raises(SceneError, match="only its full size"):
-        reduction(View(0, (31, 20), (31, 20), (0, 0)), "1/2")
+        reduction(Film(0, (31, 20), (31, 20), (0, 0)), "1/2")
 
 
 def test_factors_and_blocks() -> None:
@@ -60,8 +59,8 @@ def test_factors_and_blocks() -> None:
 def test_presets_take_the_smallest_reduction_that_is_small_enough(tmp_path: Path) -> None:
     preview, final = PRESETS["preview"], PRESETS["final"]
     assert preview.reduction(FULL_HD) == 8
-    assert preview.reduction(View(0, (128, 128), (128, 128), (0, 0))) == 1
-    assert preview.reduction(View(0, (1366, 768), (1366, 768), (0, 0))) == 2
+    assert preview.reduction(Film(0, (128, 128), (128, 128), (0, 0))) == 1
+    assert preview.reduction(Film(0, (1366, 768), (1366, 768), (0, 0))) == 2
     assert final.reduction(FULL_HD) == 1
     scene = load_scene(write_room(tmp_path), parameters={"width": 4000})
     assert on_film(scene, None, None) is scene

@@ -1,0 +1,181 @@
+"""The file of a basis: one multi-part OpenEXR file that other programs can open as it is.
+
+Part k is named after light k and holds its image as R, G, B; docs/formats.md has the details.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis, BasisLight, Origin, free_name
+from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.files import file_length, one_line
+from lightpaint.images.estimate import HALF_DIFFERENCE
+from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
+from lightpaint.records import read_record, strict_json
+
+FORMAT = "lightpaint-basis 1"
+FORMAT_KEY = "lightpaint.format"
+ORIGIN_KEY = "lightpaint.origin"
+LIGHT_KEY = "lightpaint.light"
+EMITTERS_SEEN = "emitters seen"
+LEARNED = "learned"
+
+#: Longest basis file that is read, in bytes.
+MAX_BYTES = 2**36
+
+#: What comes of a header that says something else than it should.
+_DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
+
+
+def write_basis(path: Path, basis: Basis) -> None:
+    """Write `basis` as a multi-part EXR, whole or not at all."""
+    parts, sums = [], {}
+    for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
+        about = json.dumps(_light_fields(light), ensure_ascii=False)
+        channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
+        parts.append(Part(light.name, channels, {LIGHT_KEY: about}))
+        sums[light.name] = checksum(about, channels)
+    seen = {"Y": basis.emitters_seen.astype(np.float16)}
+    # The format's rule: a part name never repeats, so a light may not take this one.
+    parts.append(Part(free_name(EMITTERS_SEEN, basis.names), seen))
+    learned = {}
+    if basis.learned is not None:
+        learned = dict(zip(("received", "asked"), basis.learned, strict=True))
+        # A table and no picture; the format wants one display window for all parts.
+        parts.append(Part(free_name(LEARNED, basis.names), learned, display=basis.size))
+    origin = asdict(basis.origin)
+    if not basis.origin.each_light:
+        del origin["each_light"]  # as in files from before there was any
+    of_origin = json.dumps(origin, ensure_ascii=False)
+    checksums = Checksums(
+        sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
+    )
+    head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
+    parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
+    write_parts(path, parts)
+
+
+def read_basis(path: Path) -> Basis:
+    """Read what `write_basis` wrote, also where another program has put its parts in another order.
+
+    Raises ImageError if the file is damaged, BasisError if it is not a basis or not as it was
+    written.
+    """
+    path = Path(path)
+    file_length(path, "image file", ImageError, limit=MAX_BYTES)
+    try:
+        parts = read_parts(path)
+        head = next((p.attributes for p in parts if FORMAT_KEY in p.attributes), {})
+        if head.get(FORMAT_KEY) != FORMAT:
+            found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
+            raise BasisError(
+                f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
+                "make one with lightpaint basis"
+            )
+        return _of_parts(parts, head)
+    except BasisError as error:
+        raise BasisError(f"{path} {error}") from error
+    except _DAMAGES as error:
+        raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
+    except MemoryError:
+        raise ImageError(f"{path} takes more memory than there is") from None
+
+
+def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
+    """Raises BasisError, without naming the file, or one of _DAMAGES."""
+    lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
+    others = [p for p in parts if LIGHT_KEY not in p.attributes]
+    seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
+    if not lit or not seen:
+        raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
+    try:
+        lights = [read_record(BasisLight, strict_json(p.attributes[LIGHT_KEY])) for p in lit]
+        origin = read_record(Origin, strict_json(head[ORIGIN_KEY]))
+        checksums = None
+        if CHECKSUMS_KEY in head:
+            checksums = Checksums.of_text(head[CHECKSUMS_KEY])
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+    order = list(range(len(lit)))
+    if checksums is not None:
+        order = checksums.in_order([light.name for light in lights])
+        check(checksums.origin, "origin", head[ORIGIN_KEY], {})
+    try:
+        basis = Basis(
+            lights=tuple(lights[k] for k in order),
+            images=_stacked([lit[k] for k in order]),
+            half_differences=_stacked([lit[k] for k in order], HALF_DIFFERENCE),
+            emitters_seen=seen[0] > 0,
+            origin=origin,
+            learned=_learned(others, checksums),
+        )
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+    if not (np.isfinite(basis.images).all() and np.isfinite(basis.half_differences).all()):
+        raise BasisError("holds values that are not finite: make it again")
+    if checksums is not None:
+        for k, light in enumerate(lights):
+            about, channels = lit[k].attributes[LIGHT_KEY], lit[k].channels
+            check(checksums.lights[light.name], f"light {light.name!r}", about, channels)
+        check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
+    return basis
+
+
+def _stacked(parts: Sequence[Part], layer: str = "") -> Floats:
+    """(n, h, w, 3), without the copies that np.stack of np.stack would make."""
+    stacked = np.empty((len(parts), *parts[0].size, 3), np.float32)
+    for image, part in zip(stacked, parts, strict=True):
+        if part.size != parts[0].size:
+            raise BasisError(f"parts {parts[0].name!r} and {part.name!r} differ in size")
+        prefix = f"{layer}." if layer else ""
+        for k, c in enumerate("RGB"):
+            if prefix + c not in part.channels:
+                raise BasisError(f"no channel {prefix}{c} in part {part.name!r}")
+            image[..., k] = part.channels[prefix + c]
+    return stacked
+
+
+def _learned(others: Sequence[Part], checksums: Checksums | None) -> Floats | None:
+    """The table of what was learned; None for one that is not as it was, which nothing needs."""
+    for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
+        if checksums is not None and checksum("", channels) != checksums.learned:
+            return None
+        return np.stack([channels["received"], channels["asked"]])
+    return None
+
+
+def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
+    """Origin, (height, width) and number of lights of the basis at `path`, without its pixels."""
+    file_length(path, "basis", BasisError, limit=MAX_BYTES)
+    try:
+        headers, size = read_headers(path)
+        lights = sum(LIGHT_KEY in header for header in headers)
+        text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
+        return read_record(Origin, strict_json(text)), size, lights
+    except (*_DAMAGES, BasisError, StopIteration) as error:
+        said = one_line(str(error)) or "it does not say where it comes from"
+        raise BasisError(f"{path} is no basis this version can read: {said}") from error
+
+
+def is_basis_file(path: Path) -> bool:
+    """Whether the name says so: a basis is an EXR, a scene is XML."""
+    return path.suffix.lower() == ".exr"
+
+
+def _light_fields(light: BasisLight) -> dict[str, Any]:
+    """What the file says of a light; what goes without saying for one emitter is left out."""
+    data = asdict(light)
+    if light.members == (light.name,):
+        del data["members"]
+    if not light.is_fixed:
+        del data["is_fixed"]
+    if light.unit_flux is None:
+        del data["unit_flux"]
+    return data

@@ -1,0 +1,82 @@
+"""How renderers name the layers of their light groups, and the picture that these add up to."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+#: What stands for the name of the light in a pattern.
+NAME = "{name}"
+
+#: The whole picture, in the words of most renderers; names compare without regard to case.
+BEAUTIES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
+
+#: A light group of this name is all of them.
+ALL = "all"
+
+#: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
+BESIDE = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
+
+#: What joins a name to what stands around it.
+JOINTS = " ._-"
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How one family of renderers names its light groups.
+
+    layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer.
+    beauty: name of the picture that they add up to, before BEAUTIES are tried.
+    beside: layers that add to it too, in some versions and settings (in lower case).
+    light: what the light is called.
+    """
+
+    renderer: str
+    layer: re.Pattern[str]
+    beauty: str = ""
+    beside: tuple[str, ...] = ()
+    light: str = NAME
+
+
+CONVENTIONS = (
+    Convention(
+        "Blender Cycles",
+        re.compile(r"(?:(?P<view>.+)\.)?Combined_(?P<name>.+)"),
+        "{view}Combined",
+    ),
+    Convention("Arnold", re.compile(r"RGBA_(?P<name>.+)"), "RGBA"),
+    Convention("Karma", re.compile(r"C_(?P<name>.+)"), "C"),
+    Convention("RenderMan or Redshift", re.compile(r"(?:[Bb]eauty|Ci)_(?P<name>.+)"), "beauty"),
+    Convention(
+        "LuxCore",
+        re.compile(r"RADIANCE_GROUP_(?P<name>\d+)"),
+        "RGBA",
+        light="group_{name}",
+    ),
+    Convention(
+        "V-Ray or Corona",
+        re.compile(r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
+        "RGBA",
+        beside=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
+    ),
+    Convention(
+        "Octane",
+        re.compile(r"Light(?:[ _]?pass)?[ _](?P<name>\d+)", re.I),
+        "Main",
+        beside=("ambient light", "ambient_light", "sunlight"),
+        light="light_{name}",
+    ),
+)
+
+
+def is_known(name: str) -> bool:
+    """Whether a known renderer calls a light group so."""
+    return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
+
+
+def beauty_among(names: Iterable[str], *, first: str = "") -> str | None:
+    """The one of `names` that is the whole picture: `first`, else by BEAUTIES; None if none is."""
+    by_folded: dict[str, str] = {}
+    for name in names:
+        by_folded.setdefault(name.casefold(), name)
+    wanted = (first.casefold(), *BEAUTIES)
+    return next((by_folded[name] for name in wanted if name in by_folded), None)

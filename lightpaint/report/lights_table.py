@@ -1,0 +1,118 @@
+"""The table of lights in the report, as HTML.
+
+Names of lights come from other people's files and are escaped here.
+"""
+
+from html import escape
+
+import numpy as np
+
+from lightpaint.arrays import RGB
+from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.colour.color import luminance, rgb_to_hex
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.photometry import Photometry
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import LightSetting
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.figures import data_uri, thumbnail
+from lightpaint.report.sentences import relative_errors, spoken_error
+from lightpaint.report.verdict import energy_shares
+
+
+def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:
+    """One row per light, in document order."""
+    errors = None if uncertainty is None else relative_errors(uncertainty)
+    shares = energy_shares(basis, solution.lighting)
+    settings = {light.name: light for light in solution.lighting.lights}
+    unreached, rows = solution.certificate.unreached, []
+    for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
+        share = shares[k]
+        picture, stops = thumbnail(image, basis.emitters_seen)
+        name, setting = escape(light.name), settings[light.name]
+        error = "" if errors is None else spoken_error(setting, float(errors[k]))
+        error = f"<small>{error}</small>" if error else ""
+        what = f"What {name} lights alone, shown at {stops:+.1f} stops"
+        rows.append(
+            f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
+            f'width="{picture.shape[1]}" height="{picture.shape[0]}" alt="{what}" '
+            f'title="{what}"></td>'
+            f'<th scope="row">{name}<small>{escape(light.plugin)}'
+            f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
+            f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
+            f"<td>{change(light, setting, unreached)}{error}{_asked(setting)}</td>"
+            f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
+            f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
+        )
+    return "".join(rows)
+
+
+def amounts_heading(solution: Solution) -> str:
+    """What stands in the column of fluxes: lumen where the scene has a scale, else no unit."""
+    if solution.lighting.cd_per_unit is None:
+        return "flux<br>(relative)"
+    return "output"
+
+
+def _emission_cells(light: BasisLight, setting: LightSetting, seen: Photometry) -> str:
+    """Colour, emission before and after, their unit, and what an eye makes of it."""
+    if light.is_fixed:
+        return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td><td></td>'
+    return (
+        f'<td class="colour">{_swatch(setting.emission, seen)}</td>'
+        f'<td class="rgb">{_rgb(light.emission)}</td>'
+        f'<td class="rgb">{_rgb(setting.emission)}</td>'
+        f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
+        f'<td class="rgb">{_amounts(seen)}</td>'
+    )
+
+
+def change(light: BasisLight, setting: LightSetting, unreached: tuple[str, ...]) -> str:
+    """In words or as a ratio of luminance, what happens to a light."""
+    before = float(luminance(np.array(light.emission)))
+    after = float(luminance(np.array(setting.emission)))
+    if light.is_fixed:
+        return "kept as it is"
+    if light.name in unreached:
+        return "unchanged: reaches nothing painted"
+    if after == 0:
+        return "off" if before > 0 else "stays off"
+    if before == 0:
+        return "was off, now on"
+    stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
+    return f"×{after / before:.3g}<small>{stops}</small>"
+
+
+def _asked(setting: LightSetting) -> str:
+    """What was asked of a light, and whether that holds it."""
+    holds = " (holds it)" if setting.is_active else ""
+    return f"<small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
+
+
+def hex_color(emission: RGB) -> str | None:
+    """Colour of a light as #rrggbb, its brightest channel at full; None if it is off."""
+    return rgb_to_hex(np.array(emission)) if any(emission) else None
+
+
+def _swatch(emission: RGB, seen: Photometry) -> str:
+    """The colour of a light; of one whose own is not known, that of its factor."""
+    color = seen.hex or hex_color(emission)
+    if color is None or not any(emission):
+        return '<span class="swatch none"></span><small>off</small>'
+    kelvin = "" if seen.kelvin is None else f"{seen.kelvin:.0f} K"
+    away = "" if seen.duv is None else f"Duv {seen.duv:+.3f}".replace("-", "−")
+    return (
+        f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
+        f"{f'<small>{kelvin}</small><small>{away}</small>' if kelvin else ''}"
+    )
+
+
+def _amounts(seen: Photometry) -> str:
+    """Luminous quantity and flux; without a scale, the flux in proportion."""
+    if seen.luminous is not None or seen.flux_lm is not None:
+        return "<br>".join(filter(None, seen.amounts))
+    return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
+
+
+def _rgb(emission: RGB) -> str:
+    return "<br>".join(f"{v:.4g}" for v in emission) if any(emission) else "off"

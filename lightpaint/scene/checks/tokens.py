@@ -1,0 +1,104 @@
+"""The tokens of an XML file: tags, comments, declarations and what stands in them.
+
+What Mitsuba's parser (pugixml) puts up with is read here too: a bare `&` or `<` in an attribute,
+`--` in a comment, white space before the XML declaration. Positions are byte offsets into the
+UTF-8 form of the text, byte-order mark included, which is how that parser counts.
+"""
+
+import codecs
+import re
+import sys
+from collections.abc import Iterator
+
+from lightpaint.files import one_line
+
+_MARKS = {
+    codecs.BOM_UTF8: "utf-8",
+    codecs.BOM_UTF32_LE: "utf-32-le",
+    codecs.BOM_UTF32_BE: "utf-32-be",
+    codecs.BOM_UTF16_LE: "utf-16-le",
+    codecs.BOM_UTF16_BE: "utf-16-be",
+    # Without a mark, by the first character, which is `<`.
+    b"<\0\0\0": "utf-32-le",
+    b"\0\0\0<": "utf-32-be",
+    b"<\0": "utf-16-le",
+    b"\0<": "utf-16-be",
+}
+_LATIN = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"'](?:iso-8859-1|latin1)[\"']", re.IGNORECASE)
+
+# Possessive (`*+`): what is broken is given up at once instead of being tried forever.
+_NAME = rb"[A-Za-z_:\x80-\xff][\w:.\-\x80-\xff]*+"
+_QUOTED = rb"""(?:"[^"]*+"|'[^']*+')"""
+_SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"  # XML declarations look like instructions
+#: Of a document type, declarations inside it one level deep.
+_DECLARATION = rb"<!(?:%b|[^\"'>])*+>" % _QUOTED
+_MARKUP = re.compile(
+    rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
+    rb"|(?P<type><!DOCTYPE(?>%b|%b|%b|[^<>\"'])*+>)"
+    rb"|</(?P<end>%b)\s*+>"
+    rb"|<(?P<tag>%b)(?P<attributes>(?:\s++%b\s*+=\s*+%b)*+)\s*+(?P<empty>/?)>"
+    % (_SKIPPED, _QUOTED, _SKIPPED, _DECLARATION, _NAME, _NAME, _NAME, _QUOTED)
+)
+_DECLARED = re.compile(rb"<!ENTITY\s+(%b)" % _NAME)
+_USED = re.compile(rb"&(%b);" % _NAME)
+_ATTRIBUTE = re.compile(rb"(%b)\s*+=\s*+(%b)" % (_NAME, _QUOTED))
+_REFERENCE = re.compile(r"&(?:#x0*([0-9a-fA-F]{1,8})|#0*([0-9]{1,8})|(lt|gt|amp|quot|apos));")
+_ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
+
+
+def encoding_of(raw: bytes) -> str:
+    """As Mitsuba's parser sees it: Latin-1 is the only declaration that it heeds."""
+    for mark, name in _MARKS.items():
+        if raw.startswith(mark):
+            return name
+    return "latin-1" if _LATIN.match(raw) else "utf-8"
+
+
+def markup(text: bytes) -> Iterator[re.Match[bytes]]:
+    """Everything in angle brackets, in order; a `<` that opens nothing raises ValueError.
+
+    text: in UTF-8, or nearly. Groups: `tag` with `attributes` and `empty`, its `/`, where an
+    element begins; `end`, the name, where one ends; `type`, all of a document type.
+    """
+    at = text.find(b"<")
+    while at >= 0:
+        found = _MARKUP.match(text, at)
+        if found is None:
+            start = one_line(decoded(text[at : at + 40]).split("\n")[0])
+            raise ValueError(f"line {line_of(text, at)}: cannot read {start!r} as XML")
+        yield found
+        at = text.find(b"<", found.end())
+
+
+def attributes(tag: re.Match[bytes]) -> dict[str, str]:
+    """By name, white space made spaces and references resolved; the first of a name counts."""
+    given: dict[str, str] = {}
+    for key, quoted in _ATTRIBUTE.findall(tag["attributes"]):
+        value = re.sub(r"\r\n|[\r\n\t]", " ", decoded(quoted[1:-1]))
+        given.setdefault(decoded(key), _REFERENCE.sub(_character, value))
+    return given
+
+
+def entity_used(text: bytes, document_type: re.Match[bytes]) -> str | None:
+    """An entity of the document type that is used behind it, the first by name, if one is."""
+    declared = set(_DECLARED.findall(document_type["type"]))
+    used = declared and declared.intersection(_USED.findall(text, document_type.end()))
+    return decoded(min(used)) if used else None
+
+
+def line_of(text: bytes, offset: int) -> int:
+    """Number of the line, from 1."""
+    return text.count(b"\n", 0, offset) + 1
+
+
+def decoded(text: bytes) -> str:
+    """As Unicode; bytes that mean nothing are replaced."""
+    return text.decode("utf-8", "replace")
+
+
+def _character(reference: re.Match[str]) -> str:
+    hexadecimal, decimal, entity = reference.groups()
+    if entity:
+        return _ENTITIES[entity]
+    code = int(hexadecimal, 16) if hexadecimal else int(decimal)
+    return chr(code) if code <= sys.maxunicode else reference[0]

@@ -1,0 +1,133 @@
+"""Which emitters go together and which are adjusted, by names and patterns.
+
+Everything is in document order; what is not adjusted comes last, as one light that is fixed.
+"""
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+
+from lightpaint.errors import SceneError
+from lightpaint.scene.emitters import Emitter
+from lightpaint.scene.lights import Light, check_adjustable, keep, tie
+
+#: Name of the fixed light, with underscores added should another have it.
+REST = "rest"
+
+
+def choose_lights(
+    emitters: Sequence[Emitter],
+    *,
+    scene: str,
+    lights: Iterable[str] | None = None,
+    groups: Mapping[str, Iterable[str]] | None = None,
+) -> tuple[Light, ...]:
+    """The lights of a scene: its emitters, tied by `groups`, of which `lights` are adjusted.
+
+    lights: names or patterns (`window_*`) of lights and groups; None for all.
+    groups: name → names or patterns of its emitters. scene: what errors call the scene.
+
+    What is not chosen, and what cannot be scaled, is kept together in one fixed light.
+    Raises SceneError for names that are not there, that clash or that are taken twice, and
+    if nothing is left to adjust.
+    """
+    group_of = _members_of_groups(emitters, groups or {}, scene)
+    by_light: dict[str, list[Emitter]] = {}
+    for emitter in emitters:
+        if not emitter.obstacle:
+            by_light.setdefault(group_of.get(emitter.name, emitter.name), []).append(emitter)
+    if lights is not None:
+        chosen = _chosen(_listed(lights, "lights"), by_light, group_of, emitters, scene)
+        by_light = {name: members for name, members in by_light.items() if name in chosen}
+    if not by_light:
+        listed = "; ".join(f"{e.name!r} {e.obstacle}" for e in emitters)
+        raise SceneError(f"{scene} has no light that can be solved for: {listed}")
+    return _with_rest([tie(name, members) for name, members in by_light.items()], emitters)
+
+
+def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:
+    adjusted = {member.name for light in lights for member in light.members}
+    left = [emitter for emitter in emitters if emitter.name not in adjusted]
+    if not left:
+        return tuple(lights)
+    name, taken = REST, {light.name for light in lights} | {e.name for e in emitters}
+    while name in taken:
+        name += "_"
+    return (*lights, keep(name, left))
+
+
+def _members_of_groups(
+    emitters: Sequence[Emitter], groups: Mapping[str, Iterable[str]], scene: str
+) -> dict[str, str]:
+    """The group of each emitter that is in one."""
+    names = [emitter.name for emitter in emitters]
+    group_of: dict[str, str] = {}
+    for group, patterns in groups.items():
+        if not group:
+            raise SceneError("a group needs a name: write name=a,b,c")
+        listed = _listed(patterns, f"group {group!r}")
+        for pattern in listed:
+            found = _matching(pattern, names, f"group {group!r}", scene)
+            its = [e for e in emitters if e.name in found]
+            if pattern not in names:
+                # A pattern takes what can be taken; a name is meant.
+                its = [e for e in its if not e.obstacle] or its
+            check_adjustable(its)
+            for name in (emitter.name for emitter in its):
+                other = group_of.setdefault(name, group)
+                if other != group:
+                    raise SceneError(
+                        f"light {name!r} is in two groups, {other!r} and {group!r}: "
+                        "an emitter has one weight; leave one of the groups out, or give it other "
+                        "members (groups of the lights file count too)"
+                    )
+    for group in groups:
+        if group in names and group_of.get(group) is None:
+            raise SceneError(
+                f"group {group!r} has the name of a light that is not in a group: choose another"
+            )
+    return group_of
+
+
+def _chosen(
+    patterns: Sequence[str],
+    by_light: Mapping[str, Sequence[Emitter]],
+    group_of: Mapping[str, str],
+    emitters: Sequence[Emitter],
+    scene: str,
+) -> set[str]:
+    """Names of the lights that the patterns select."""
+    chosen: set[str] = set()
+    for pattern in patterns:
+        if pattern not in by_light:
+            check_adjustable([emitter for emitter in emitters if emitter.name == pattern])
+            if group := group_of.get(pattern):
+                raise SceneError(
+                    f"light {pattern!r} is part of the group {group!r}: choose that, or leave "
+                    f"{pattern!r} out of it"
+                )
+        chosen |= _matching(pattern, [*by_light], "lights", scene)
+    return chosen
+
+
+def _matching(pattern: str, names: Sequence[str], where: str, scene: str) -> set[str]:
+    """The name itself, else all that match it as a pattern. Raises SceneError if none does."""
+    if pattern in names:
+        return {pattern}
+    found = {name for name in names if fnmatchcase(name, pattern)}
+    if not found:
+        close = difflib.get_close_matches(pattern, names, n=1)
+        hint = f"did you mean {close[0]!r}? It" if close else "it"
+        raise SceneError(
+            f"{where}: {scene} has no light {pattern!r}; {hint} has {', '.join(names)}"
+        )
+    return found
+
+
+def _listed(names: Iterable[str], where: str) -> list[str]:
+    """Checked to be a list that names something."""
+    # A text is a list of its letters too, and never what was meant.
+    listed = [names] if isinstance(names, str) else list(names)
+    if not listed or not all(isinstance(name, str) and name for name in listed):
+        raise SceneError(f"{where}: name at least one light, and each by its name")
+    return listed

@@ -1,0 +1,143 @@
+"""The LLVM that Dr.Jit compiles with: looked for, tried out, and named to it.
+
+Dr.Jit looks for LLVM when it is first imported, cannot try twice, and one that is too old
+brings the whole process down. So a library is tried out in a process of its own first.
+"""
+
+import ctypes
+import importlib.metadata
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+OLDEST_LLVM = 17
+INSTALL_LLVM = (
+    "pip install karellen-llvm-core (Linux x86-64), or install LLVM 17 or newer and set "
+    "DRJIT_LIBLLVM_PATH to its libLLVM"
+)
+
+
+@dataclass(frozen=True)
+class Llvm:
+    """A libLLVM that was found. `version` is None if it cannot be used; `problem` says why."""
+
+    path: Path
+    origin: str
+    version: tuple[int, int, int] | None
+    problem: str = ""
+
+
+def prepare_llvm() -> Llvm | None:
+    """Find a usable LLVM and make Dr.Jit take it. None if there is none."""
+    usable = next((c for c in llvm_candidates() if c.version is not None), None)
+    if usable is not None and "drjit" not in sys.modules:
+        _preload_cpp_runtime(usable.path)
+        os.environ["DRJIT_LIBLLVM_PATH"] = str(usable.path)
+    return usable
+
+
+@cache
+def llvm_candidates() -> tuple[Llvm, ...]:
+    """LLVM libraries in the order they are tried, up to the first usable one."""
+    found: list[Llvm] = []
+    seen: set[Path] = set()
+    for path, origin in _llvm_paths():
+        resolved = path.resolve()
+        if resolved in seen:
+            continue
+        seen.add(resolved)
+        found.append(_probe(path, origin))
+        if found[-1].version is not None:
+            break
+    return tuple(found)
+
+
+def _llvm_paths() -> Iterator[tuple[Path, str]]:
+    if named := os.environ.get("DRJIT_LIBLLVM_PATH"):
+        yield Path(named), "DRJIT_LIBLLVM_PATH"
+    try:
+        files = importlib.metadata.files("karellen-llvm-core") or []
+    except importlib.metadata.PackageNotFoundError:
+        files = []
+    for file in sorted(files, key=lambda f: len(f.name)):
+        if file.name.startswith("libLLVM") and ".so" in file.name:
+            yield Path(str(file.locate())).resolve(), "karellen-llvm-core"
+    name = {"Darwin": "libLLVM*.dylib", "Windows": "LLVM-C.dll"}.get(
+        platform.system(), "libLLVM*.so*"
+    )
+    folders = [
+        "/usr/lib/llvm-*/lib",
+        f"/usr/lib/{platform.machine()}-linux-gnu",
+        "/usr/lib64",
+        "/usr/lib",
+        "/usr/local/lib",
+        "/opt/homebrew/opt/llvm*/lib",
+        "/usr/local/opt/llvm*/lib",
+        "C:/Program Files/LLVM/bin",
+    ]
+    for folder in folders:
+        base = Path(folder)
+        root = Path(base.anchor)
+        # Newest first: llvm-19 before llvm-15.
+        for path in sorted(root.glob(str(base.relative_to(root) / name)), reverse=True):
+            yield path, "system"
+
+
+_PROBE = """
+import ctypes, sys
+sys.path[:] = []
+for path in sys.argv[2:]:
+    ctypes.CDLL(path, ctypes.RTLD_LOCAL)
+llvm = ctypes.CDLL(sys.argv[1])
+version = [ctypes.c_uint() for _ in range(3)]
+llvm.LLVMGetVersion(*map(ctypes.byref, version))
+print(*(v.value for v in version))
+"""
+
+
+def _probe(path: Path, origin: str) -> Llvm:
+    """Load `path` in a process of its own and ask for its version."""
+    if not path.exists():
+        return Llvm(path, origin, None, "no such file")
+    runtime = [str(p) for p in _cpp_runtime(path)]
+    try:
+        answer = subprocess.run(
+            [sys.executable, "-I", "-S", "-c", _PROBE, str(path), *runtime],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Llvm(path, origin, None, f"cannot be tried: {error}")
+    if answer.returncode != 0:
+        lines = answer.stderr.strip().splitlines()
+        reason = lines[-1] if lines else f"exit status {answer.returncode}"
+        if "LLVMGetVersion" in reason:
+            reason = f"older than LLVM {OLDEST_LLVM}"
+        return Llvm(path, origin, None, reason)
+    major, minor, patch = (int(v) for v in answer.stdout.split())
+    if major < OLDEST_LLVM:
+        return Llvm(path, origin, None, f"LLVM {major}.{minor}.{patch}, needs {OLDEST_LLVM}")
+    return Llvm(path, origin, (major, minor, patch))
+
+
+def _cpp_runtime(llvm: Path) -> list[Path]:
+    """The C++ runtime that some LLVM packages bring along, in loading order."""
+    names = ["libunwind.so.1", "libc++abi.so.1", "libc++.so.1"]
+    folders = [llvm.parent, *sorted(llvm.parent.glob("*-linux-gnu"))]
+    found = [folder / name for name in names for folder in folders if (folder / name).exists()]
+    return found if len(found) >= len(names) - 1 else []
+
+
+def _preload_cpp_runtime(llvm: Path) -> None:
+    # The package's own link to its runtime appears only at the second start of Python.
+    # RTLD_LOCAL: seen by all, this runtime would take over Mitsuba's exceptions, and every
+    # one of them would end the process.
+    for path in _cpp_runtime(llvm):
+        ctypes.CDLL(str(path), ctypes.RTLD_LOCAL)
