@@ -7,19 +7,16 @@ hexadecimal digits, goes without it; the tests hold it to be the same.
 
 import math
 import re
-import warnings
 from functools import cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import decode_display, encode_display, to_8_bit
+from lightpaint.colour.science import colour_science
 from lightpaint.errors import ColorError
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 #: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -55,7 +52,7 @@ def delta_e(a: Floats, b: Floats) -> Floats:
     a, b: (…, 3) linear Rec.709 at the exposure they are looked at, white = 1. What a display
     cannot show is clipped, as the display would.
     """
-    colour = _colour()
+    colour = colour_science()
 
     def lab(image: Floats) -> Any:
         xyz = colour.RGB_to_XYZ(np.clip(image, 0, 1), "ITU-R BT.709", apply_cctf_decoding=False)
@@ -176,11 +173,3 @@ def _rgb_to_xyz() -> Floats:
     columns = np.array([[x / y, 1, (1 - x - y) / y] for x, y in primaries]).T
     white = np.array([0.3127 / 0.3290, 1, (1 - 0.3127 - 0.3290) / 0.3290])
     return np.asarray(columns * np.linalg.solve(columns, white))
-
-
-def _colour() -> "ModuleType":
-    with warnings.catch_warnings():
-        # It warns about plotting libraries that nothing here needs.
-        warnings.simplefilter("ignore")
-        import colour
-    return cast("ModuleType", colour)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 import OpenImageIO
 
 from lightpaint.colour.icc import Profile, gamma_profile, read_icc, srgb_profile
-from lightpaint.colour.primaries import REC709
+from lightpaint.colour.primaries import is_rec709, primaries_in
 from lightpaint.errors import ImageError
 from lightpaint.images.silence import silenced
 from lightpaint.images.tiff import check_tiff
@@ -33,9 +33,6 @@ MAX_CHUNK = 2**24
 
 #: Text in a PNG that names the view it was shown through.
 VIEW_KEY = "lightpaint.view"
-
-#: CIE xy of red, green, blue and white of Display P3.
-DISPLAY_P3 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290)
 
 #: TIFF's PhotometricInterpretation: what its numbers may be, and what else they are called.
 TIFF_COLOURS = {0: "grey", 1: "grey", 2: "RGB", 3: "palette", 6: "YCbCr"}
@@ -240,8 +237,7 @@ def _png_says(path: Path) -> tuple[str | None, Profile | None]:
         wx, wy, *rgb = (v / 1e5 for v in struct.unpack(">8I", colours))
         primaries = (*rgb, wx, wy)
     encoding = int.from_bytes(gamma, "big") / 1e5
-    is_rec709 = primaries is None or np.allclose(primaries, REC709, rtol=0, atol=1e-3)
-    if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709):
+    if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709(primaries)):
         return shown, None  # how sRGB is written in these chunks
     try:
         return shown, gamma_profile(1 / encoding, primaries)
@@ -273,7 +269,7 @@ def _of_cicp(content: bytes) -> Profile | None:
     if content[:2] == srgb:
         return None
     if content[:2] == display_p3:
-        return srgb_profile("Display P3", DISPLAY_P3)
+        return srgb_profile("Display P3", primaries_in("Display P3"))
     raise ImageError(
         f"declares the colours {content[:2].hex(' ')} (cICP): export it as sRGB or Display P3"
     )

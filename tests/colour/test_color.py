@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.colour.color import (
-    _colour,
     cct_and_duv,
     delta_e,
     hex_to_rgb,
@@ -16,6 +15,7 @@ from lightpaint.colour.color import (
     luminance,
     rgb_to_hex,
 )
+from lightpaint.colour.science import colour_science
 from lightpaint.errors import ColorError
 
 # Linear Rec.709 from the chromaticities of ITU-R BT.709: columns are the primaries' XYZ.
@@ -200,7 +200,7 @@ def test_what_is_no_colour(rgb: Any):
 
 @given(st.floats(25, 1000), st.floats(-0.05, 0.05))
 def test_temperatures_are_those_of_colour_science(mireds: float, duv: float):
-    colour = _colour()
+    colour = colour_science()
     uv = colour.temperature.CCT_to_uv_Ohno2013([1e6 / mireds, duv])
     x, y, z = colour.xy_to_XYZ(colour.UCS_uv_to_xy(uv))
     expected = np.linalg.solve(RGB_TO_XYZ, np.array([x, y, z]))
@@ -213,7 +213,7 @@ def test_temperatures_are_those_of_colour_science(mireds: float, duv: float):
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D50", "D55", "D65", "D75", "E", "FL1", "FL11"])
 def test_temperature_of_illuminants_of_colour_science(name: str):
-    colour = _colour()
+    colour = colour_science()
     x, y = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name]
     uv = colour.UCS_to_uv(colour.XYZ_to_UCS(colour.xy_to_XYZ([x, y])))
     expected = colour.temperature.uv_to_CCT_Ohno2013(uv)
