@@ -110,7 +110,7 @@ def hex_to_rgb(text: str) -> Floats:
 
     Raises ColorError for any other text.
     """
-    # colour.notation.HEX_to_RGB takes any text, and a second to import.
+    # colour.notation.HEX_to_RGB takes #ffaa6 as well, and a second to import.
     found = re.fullmatch(r"#?([0-9a-fA-F]{6}|[0-9a-fA-F]{3})", text.strip())
     if found is None:
         raise ColorError(f"{text!r} is no colour: need six hexadecimal digits, like #ffaa66")
