@@ -15,72 +15,101 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     verify                      Estimate, relit Scene → Verification does it look like that?
 
 `paint_with_light` is all of it in one call; `solve_views` and `paint_views_with_light` take
-several views. Importing this sets no Mitsuba variant; that
-happens when the first scene is loaded.
+several views. Each name is imported when it is first used (PEP 562): importing this loads no
+library. No Mitsuba variant is set before the first scene is loaded.
 """
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis, write_basis
-from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
-from lightpaint.basis.render.render import render_basis
-from lightpaint.colour.view import View
-from lightpaint.errors import LightpaintError
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.png import display_picture
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import read_constraints
-from lightpaint.lighting.lighting import Lighting, combine, read_lighting, write_lighting
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve
-from lightpaint.pipeline import paint_views_with_light, paint_with_light, render_template
-from lightpaint.placement.suggest import Suggestion, suggest_lights
-from lightpaint.relit.export.exports import write_exports
-from lightpaint.relit.relight import relight
-from lightpaint.relit.verify import Verification, verify
-from lightpaint.report.verdict import verdict
-from lightpaint.results import Look
-from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.scene.variant import use_variant
-from lightpaint.settings import Settings
-from lightpaint.target.read import read_target
-from lightpaint.target.target import Target
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from lightpaint.version import __version__
 
-__all__ = [
-    "Basis",
-    "Constraints",
-    "Estimate",
-    "LightGroups",
-    "Lighting",
-    "LightpaintError",
-    "Look",
-    "Scene",
-    "Settings",
-    "Solution",
-    "Suggestion",
-    "Target",
-    "Verification",
-    "View",
-    "__version__",
-    "combine",
-    "display_picture",
-    "load_scene",
-    "paint_views_with_light",
-    "paint_with_light",
-    "read_basis",
-    "read_constraints",
-    "read_light_groups",
-    "read_lighting",
-    "read_target",
-    "relight",
-    "render_basis",
-    "render_template",
-    "solve",
-    "suggest_lights",
-    "use_variant",
-    "verdict",
-    "verify",
-    "write_basis",
-    "write_exports",
-    "write_lighting",
-]
+if TYPE_CHECKING:
+    from lightpaint.basis.basis import Basis as Basis
+    from lightpaint.basis.file import read_basis as read_basis
+    from lightpaint.basis.file import write_basis as write_basis
+    from lightpaint.basis.lightgroups.read import LightGroups as LightGroups
+    from lightpaint.basis.lightgroups.read import read_light_groups as read_light_groups
+    from lightpaint.basis.render.render import render_basis as render_basis
+    from lightpaint.colour.view import View as View
+    from lightpaint.errors import LightpaintError as LightpaintError
+    from lightpaint.images.estimate import Estimate as Estimate
+    from lightpaint.images.png import display_picture as display_picture
+    from lightpaint.lighting.constraints.constraints import Constraints as Constraints
+    from lightpaint.lighting.constraints.file import read_constraints as read_constraints
+    from lightpaint.lighting.lighting import Lighting as Lighting
+    from lightpaint.lighting.lighting import combine as combine
+    from lightpaint.lighting.lighting import read_lighting as read_lighting
+    from lightpaint.lighting.lighting import write_lighting as write_lighting
+    from lightpaint.lighting.solution import Solution as Solution
+    from lightpaint.lighting.solve import solve as solve
+    from lightpaint.pipeline import paint_views_with_light as paint_views_with_light
+    from lightpaint.pipeline import paint_with_light as paint_with_light
+    from lightpaint.pipeline import render_template as render_template
+    from lightpaint.placement.suggest import Suggestion as Suggestion
+    from lightpaint.placement.suggest import suggest_lights as suggest_lights
+    from lightpaint.relit.export.exports import write_exports as write_exports
+    from lightpaint.relit.relight import relight as relight
+    from lightpaint.relit.verify import Verification as Verification
+    from lightpaint.relit.verify import verify as verify
+    from lightpaint.report.verdict import verdict as verdict
+    from lightpaint.results import Look as Look
+    from lightpaint.scene.scene import Scene as Scene
+    from lightpaint.scene.scene import load_scene as load_scene
+    from lightpaint.scene.variant import use_variant as use_variant
+    from lightpaint.settings import Settings as Settings
+    from lightpaint.target.read import read_target as read_target
+    from lightpaint.target.target import Target as Target
+
+#: Public name → its module, below this package: what type checkers read above, for Python.
+_HOMES = {
+    "Basis": "basis.basis",
+    "Constraints": "lighting.constraints.constraints",
+    "Estimate": "images.estimate",
+    "LightGroups": "basis.lightgroups.read",
+    "Lighting": "lighting.lighting",
+    "LightpaintError": "errors",
+    "Look": "results",
+    "Scene": "scene.scene",
+    "Settings": "settings",
+    "Solution": "lighting.solution",
+    "Suggestion": "placement.suggest",
+    "Target": "target.target",
+    "Verification": "relit.verify",
+    "View": "colour.view",
+    "combine": "lighting.lighting",
+    "display_picture": "images.png",
+    "load_scene": "scene.scene",
+    "paint_views_with_light": "pipeline",
+    "paint_with_light": "pipeline",
+    "read_basis": "basis.file",
+    "read_constraints": "lighting.constraints.file",
+    "read_light_groups": "basis.lightgroups.read",
+    "read_lighting": "lighting.lighting",
+    "read_target": "target.read",
+    "relight": "relit.relight",
+    "render_basis": "basis.render.render",
+    "render_template": "pipeline",
+    "solve": "lighting.solve",
+    "suggest_lights": "placement.suggest",
+    "use_variant": "scene.variant",
+    "verdict": "report.verdict",
+    "verify": "relit.verify",
+    "write_basis": "basis.file",
+    "write_exports": "relit.export.exports",
+    "write_lighting": "lighting.lighting",
+}
+
+__all__ = ["__version__", *_HOMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value  # from now on found without asking here
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -1,10 +1,13 @@
 """From the colours that a file declares to linear Rec.709."""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.science import colour_science
 from lightpaint.errors import ImageError
 
 #: CIE xy of red, green, blue and white of Rec.709, the colours of every image here.
@@ -16,56 +19,53 @@ XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 #: Files round the numbers: to three decimals, or to float16.
 ROUNDING = 1e-3
 
-#: CIE xy of red, green, blue and white of those that renderers work in.
+#: The spaces that renderers work in, as files name them and as colour-science does.
 SPACES = {
-    "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
-    "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
-    "lin_rec2020_scene": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
-    "lin_p3d65_scene": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+    "lin_ap1_scene": "ACEScg",
+    "lin_ap0_scene": "ACES2065-1",
+    "lin_rec2020_scene": "ITU-R BT.2020",
+    "lin_p3d65_scene": "P3-D65",
 }
 
-#: Lam's cone responses ("Bradford"), in which a white is adapted to another.
-BRADFORD = np.array([
-    [0.8951, 0.2664, -0.1614],
-    [-0.7502, 1.7135, 0.0367],
-    [0.0389, -0.0685, 1.0296],
-])  # fmt: skip
+
+def primaries_in(space: str) -> tuple[float, ...]:
+    """CIE xy of red, green, blue and white of a space that colour-science knows by this name."""
+    known = colour_science().RGB_COLOURSPACES[space]
+    return tuple(map(float, (*known.primaries.ravel(), *known.whitepoint)))
 
 
-def rgb_to_xyz(primaries: Sequence[float]) -> Floats:
+@lru_cache(64)
+def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
     """(3, 3) matrix from linear RGB of these primaries (SMPTE RP 177) to XYZ, white at Y = 1.
 
-    Raises ImageError where they span no colours.
+    Not to be written to. Raises ImageError where they span no colours.
     """
     xy = np.asarray(primaries, dtype=np.float64).reshape(4, 2)
-    with np.errstate(all="ignore"):
-        *columns, white = np.column_stack([xy, 1 - xy.sum(axis=1)])
-        matrix = np.stack(columns, axis=1)
-        if np.isfinite(matrix).all() and abs(np.linalg.det(matrix)) > 1e-6 and white[1] > 1e-6:
-            scale = np.linalg.solve(matrix, white / white[1])
-            if (np.abs(scale) > 1e-6).all():
-                return matrix * scale
+    with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+        matrix = colour_science().normalised_primary_matrix(xy[:3], xy[3])
+        if xy[3, 1] > 1e-6 and np.linalg.cond(matrix) < 1e6:
+            matrix.setflags(write=False)
+            return np.asarray(matrix)
     raise ImageError(f"declares chromaticities that span no colours: {_listed(xy)}")
 
 
-def adaptation(white: Floats, to: Floats) -> Floats:
-    """(3, 3) matrix that takes XYZ as seen under `white` to how it looks under `to`."""
-    gains = (BRADFORD @ to) / (BRADFORD @ white)
-    return np.asarray(np.linalg.solve(BRADFORD, gains[:, None] * BRADFORD))
+def adaptation(white: Doubles, to: Doubles) -> Doubles:
+    """(3, 3) matrix that takes XYZ as seen under `white` to how it looks under `to` (Bradford)."""
+    adapt = colour_science().adaptation.matrix_chromatic_adaptation_VonKries
+    return np.asarray(adapt(white, to, transform="Bradford"))
 
 
-def to_rec709(primaries: Sequence[float]) -> Floats:
+def to_rec709(primaries: tuple[float, ...]) -> Doubles:
     """(3, 3) matrix from linear RGB of these primaries to linear Rec.709.
 
-    Another white is adapted (Bradford): what is white in the file is white here. XYZ is no RGB
-    space with a white of its own but colours as measured, and taken as it is.
+    Another white is adapted: what is white in the file is white here. XYZ is no RGB space with a
+    white of its own but colours as measured, and taken as it is.
     """
     ours, theirs = rgb_to_xyz(REC709), rgb_to_xyz(primaries)
-    if not np.allclose(primaries, XYZ, rtol=0, atol=ROUNDING):
-        white, to = theirs.sum(axis=1), ours.sum(axis=1)
-        if not np.allclose(primaries[6:], REC709[6:], rtol=0, atol=ROUNDING):
-            theirs = adaptation(white, to) @ theirs
-    return np.linalg.solve(ours, theirs)
+    is_same_white = np.allclose(primaries[6:], REC709[6:], rtol=0, atol=ROUNDING)
+    if not (is_same_white or are_same(primaries, XYZ)):
+        theirs = adaptation(theirs.sum(axis=1), ours.sum(axis=1)) @ theirs
+    return np.asarray(np.linalg.solve(ours, theirs), np.float64)
 
 
 def are_same(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:

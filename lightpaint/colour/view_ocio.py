@@ -38,17 +38,17 @@ def default_name() -> str:
     return f"ocio:{display}/{config.getDefaultView(display)}"
 
 
-def transform(display_and_view: str) -> "OcioTransform":
+def ocio_encoding(display_and_view: str) -> "OcioEncoding":
     """The view `DISPLAY/VIEW` of the configuration. Raises ViewError."""
-    return _transform(display_and_view, os.environ.get("OCIO", ""))
+    return _cached(display_and_view, os.environ.get("OCIO", ""))
 
 
 @cache
-def _transform(display_and_view: str, source: str) -> "OcioTransform":
-    return OcioTransform(display_and_view, source)
+def _cached(display_and_view: str, source: str) -> "OcioEncoding":
+    return OcioEncoding(display_and_view, source)
 
 
-class OcioTransform:
+class OcioEncoding:
     """One display and view. Raises ViewError where there is none, or no way back from it."""
 
     def __init__(self, display_and_view: str, source: str) -> None:

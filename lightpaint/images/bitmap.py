@@ -5,20 +5,17 @@ pixels than MAX_PIXELS. What it would read as something else than it is (CMYK, L
 a Photoshop file without its merged picture) is refused here.
 """
 
-import struct
-import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import OpenImageIO
 
-from lightpaint.colour.icc import Profile, gamma_profile, read_icc, srgb_profile
-from lightpaint.colour.primaries import REC709
+from lightpaint.colour.icc import Profile, read_icc
 from lightpaint.errors import ImageError
+from lightpaint.images.png import read_png_head
+from lightpaint.images.psd import check_psd
 from lightpaint.images.silence import silenced
 from lightpaint.images.tiff import check_tiff
 
@@ -28,20 +25,9 @@ MAX_PIXELS = 2**25
 #: Longest file that is opened, in bytes.
 MAX_FILE = 2**31
 
-#: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
-MAX_CHUNK = 2**24
-
-#: Text in a PNG that names the view it was shown through.
-VIEW_KEY = "lightpaint.view"
-
-#: CIE xy of red, green, blue and white of Display P3.
-DISPLAY_P3 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290)
-
 #: TIFF's PhotometricInterpretation: what its numbers may be, and what else they are called.
 TIFF_COLOURS = {0: "grey", 1: "grey", 2: "RGB", 3: "palette", 6: "YCbCr"}
 TIFF_OTHERS = {4: "a mask", 5: "CMYK", 8: "Lab", 9: "Lab", 10: "Lab", 32844: "LogLuv"}
-PSD_COLOURS = {1: "grey", 3: "RGB"}
-PSD_OTHERS = {0: "black and white", 2: "indexed colours", 4: "CMYK", 7: "multichannel", 9: "Lab"}
 
 
 @dataclass(frozen=True)
@@ -73,9 +59,9 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
     profile: Profile | None = None
     transparency = True
     if kind == "png":
-        shown, profile = _png_says(path)
+        shown, profile = read_png_head(path)
     elif kind == "psd":
-        transparency = _check_psd(path)
+        transparency = check_psd(path, most=MAX_PIXELS)
     elif kind == "tiff":
         check_tiff(path)
     with silenced():
@@ -109,6 +95,8 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
 
 
 def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
+    import OpenImageIO
+
     OpenImageIO.geterror()  # what is left of an earlier one
     plain = OpenImageIO.ImageSpec()
     plain["oiio:UnassociatedAlpha"] = 1  # or it multiplies display values by alpha
@@ -163,120 +151,6 @@ def _check_tiff(spec: Any) -> None:
         raise ImageError(f"holds {named}: convert it to RGB and export it again")
     if (TIFF_COLOURS[colours] == "grey") != (spec.channelnames[0] == "Y"):
         raise ImageError(f"is damaged: {spec.nchannels} channels of {TIFF_COLOURS[colours]}")
-
-
-def _check_psd(path: Path) -> bool:
-    """Refuse Photoshop files of other colours, and those without the merged picture.
-
-    Returns whether a channel beside the colours is transparency, and not a saved selection.
-    """
-    with path.open("rb") as file:
-        head = file.read(26)
-        if len(head) < 26:
-            raise ImageError("is cut off")
-        mode = int.from_bytes(head[24:26], "big")
-        if mode not in PSD_COLOURS:
-            named = PSD_OTHERS.get(mode, f"colours of kind {mode}")
-            raise ImageError(f"holds {named}: convert it to RGB and save it again")
-        height, width = struct.unpack(">II", head[14:22])
-        if height * width > MAX_PIXELS:
-            raise ImageError(f"declares {width}x{height} pixels: too many to read")
-        file.seek(int.from_bytes(file.read(4), "big"), 1)
-        length = int.from_bytes(file.read(4), "big")
-        resources = file.read(min(length, 2**26))
-        file.seek(length - len(resources), 1)
-        length = int.from_bytes(file.read(4), "big")
-        layers = file.read(min(length, 6))
-        file.seek(length - len(layers), 1)
-        _check_packed_rows(file, head)
-    for ident, data in _resources(resources):
-        # VersionInfo: a version, then whether the merged picture is there.
-        if ident == 1057 and len(data) >= 5 and not data[4]:
-            raise ImageError(
-                "has no merged picture: save it with maximised compatibility, or export a PNG"
-            )
-    # The number of layers is negative then.
-    return len(layers) == 6 and layers[4] >= 0x80
-
-
-def _check_packed_rows(file: BinaryIO, head: bytes) -> None:
-    """Refuse rows that are too short for their pixels: the library leaves them out in silence."""
-    if file.read(2) != b"\0\1":
-        return
-    channels, height, width, depth = struct.unpack(">HIIH", head[12:24])
-    table = file.read(2 * channels * height)
-    lengths = np.frombuffer(table[: len(table) // 2 * 2], ">u2")
-    shortest = 2 * -(-width * depth // 8 // 128)
-    if lengths.size < channels * height or (lengths < shortest).any():
-        raise ImageError("is damaged: rows of its merged picture are missing")
-
-
-def _resources(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """(number, content) of each image resource block of a Photoshop file."""
-    at = 0
-    while data[at : at + 4] == b"8BIM" and at + 12 <= len(data):
-        ident = int.from_bytes(data[at + 4 : at + 6], "big")
-        at += 6 + (data[at + 6] // 2 + 1) * 2  # a name, padded to an even length
-        length = int.from_bytes(data[at : at + 4], "big")
-        yield ident, data[at + 4 : at + 4 + length]
-        at += 4 + length + length % 2
-
-
-def _png_says(path: Path) -> tuple[str | None, Profile | None]:
-    """What the small chunks of a PNG say: the view it was made with, and its colours.
-
-    The order is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
-    """
-    chunks = dict(_png_chunks(path))
-    text = chunks.get(b"tEXt", b"")
-    shown = text.partition(b"\0")[2].decode("latin-1") or None
-    if b"cICP" in chunks:
-        return shown, _of_cicp(chunks[b"cICP"])
-    gamma, colours = chunks.get(b"gAMA", b""), chunks.get(b"cHRM", b"")
-    if chunks.keys() & {b"iCCP", b"sRGB"} or len(gamma) != 4:
-        return shown, None
-    primaries = None
-    if len(colours) == 32:
-        wx, wy, *rgb = (v / 1e5 for v in struct.unpack(">8I", colours))
-        primaries = (*rgb, wx, wy)
-    encoding = int.from_bytes(gamma, "big") / 1e5
-    is_rec709 = primaries is None or np.allclose(primaries, REC709, rtol=0, atol=1e-3)
-    if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709):
-        return shown, None  # how sRGB is written in these chunks
-    try:
-        return shown, gamma_profile(1 / encoding, primaries)
-    except ValueError as error:
-        raise ImageError(f"declares colours that make no sense: {error}") from error
-
-
-def _png_chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Type and content of the chunks before the pixels, of which only ours of the texts.
-
-    Raises ImageError where a checksum is wrong: the library would do without that chunk.
-    """
-    with path.open("rb") as file:
-        file.seek(8)
-        while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
-            length = int.from_bytes(head[:4], "big")
-            if length > MAX_CHUNK:
-                raise ImageError("is damaged: a part of its head is too long")
-            content, checksum = file.read(length), file.read(4)
-            if zlib.crc32(content, zlib.crc32(head[4:])) != int.from_bytes(checksum, "big"):
-                raise ImageError("is damaged: a checksum is wrong")
-            if head[4:] != b"tEXt" or content.startswith(VIEW_KEY.encode() + b"\0"):
-                yield head[4:], content
-
-
-def _of_cicp(content: bytes) -> Profile | None:
-    """Coding-independent code points (ITU-T H.273): sRGB and Display P3."""
-    srgb, display_p3 = b"\x01\x0d", b"\x0c\x0d"
-    if content[:2] == srgb:
-        return None
-    if content[:2] == display_p3:
-        return srgb_profile("Display P3", DISPLAY_P3)
-    raise ImageError(
-        f"declares the colours {content[:2].hex(' ')} (cICP): export it as sRGB or Display P3"
-    )
 
 
 def _rgb(spec: Any, pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:

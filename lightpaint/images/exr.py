@@ -17,6 +17,7 @@ import OpenEXR
 from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing
+from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.silence import silenced
 
 #: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
@@ -26,17 +27,6 @@ MAX_COMPRESSION = 64
 
 #: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … on each side.
 CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 0.002128)
-
-#: How other files begin that people take for paintings.
-MAGICS = {
-    b"\x89PNG": "PNG",
-    b"\xff\xd8": "JPEG",
-    b"II*\0": "TIFF",
-    b"MM\0*": "TIFF",
-    b"8BPS": "Photoshop",
-    b"#?": "Radiance HDR",
-    b"PK": "layered (zip)",
-}
 
 
 @dataclass(frozen=True)
@@ -105,27 +95,6 @@ def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
         return [{k: v for k, v in h.items() if isinstance(v, str)} for h in headers], size
 
 
-def head_of(path: Path, length: int) -> bytes:
-    """How an image file begins. Raises ImageError if there is none that can be read."""
-    if path.is_dir():
-        raise ImageError(f"{path} is a folder, not an image file")
-    if not path.is_file():
-        raise ImageError(f"no such image file: {path}")
-    try:
-        with path.open("rb") as file:
-            return file.read(length)
-    except OSError as error:
-        raise ImageError(f"cannot read {path}: {error.strerror}") from error
-
-
-def _check_is_exr(path: Path) -> None:
-    magic = head_of(path, 8)
-    if not magic.startswith(b"\x76\x2f\x31\x01"):
-        found = next((kind for mark, kind in MAGICS.items() if magic.startswith(mark)), None)
-        is_a = f"is a {found} file" if found else "is no OpenEXR file"
-        raise ImageError(f"{path} {is_a}: export it as linear OpenEXR")
-
-
 def read_parts(path: Path) -> list[Part]:
     """All parts of the EXR file at `path`.
 
@@ -134,7 +103,11 @@ def read_parts(path: Path) -> list[Part]:
     deep, or declares more pixels than its length makes likely.
     """
     path = Path(path)
-    _check_is_exr(path)
+    head = head_of(path, 16)
+    if kind_of(head) != "exr":
+        name = name_of(head)
+        is_a = f"is a {name} file" if name else "is no OpenEXR file"
+        raise ImageError(f"{path} {is_a}: export it as linear OpenEXR")
     with silenced():
         try:
             header = OpenEXR.File(str(path), header_only=True)

@@ -12,6 +12,7 @@ from lightpaint.colour.primaries import (
     SPACES,
     converted,
     is_rec709,
+    primaries_in,
     rgb_to_xyz,
     to_rec709,
 )
@@ -172,7 +173,7 @@ def _is_colour(part: Part, prefix: str) -> bool:
     return prefix in colour_channels(part.channels)
 
 
-def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: Sequence[float]) -> Floats:
+def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: tuple[float, ...]) -> Floats:
     """RGB of luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
     red, green, blue = rgb_to_xyz(primaries)[1]
     image = np.empty((*y.shape, 3), np.float32)
@@ -183,7 +184,7 @@ def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: Sequence[float]) 
     return image
 
 
-def _in_rec709(image: Floats, primaries: Sequence[float] | None) -> Floats:
+def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
     return image if primaries is None else converted(image, to_rec709(primaries))
 
 
@@ -202,7 +203,7 @@ def primaries_of(part: Part) -> tuple[float, ...] | None:
             f"is in the colour space {space!r}, but linear Rec.709 is expected: convert it and "
             "export it again"
         )
-    return SPACES[space]
+    return primaries_in(SPACES[space])
 
 
 def _joined(layer: str, name: str) -> str:

@@ -1,9 +1,5 @@
 """A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
 
-import struct
-import tempfile
-import zipfile
-import zlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -15,52 +11,12 @@ from lightpaint.colour.view import View, ViewChoice
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.decode import light_of_floats, light_of_integers, unpremultiply, view_of
-from lightpaint.images.exr import Part, head_of, read_parts
+from lightpaint.images.exr import Part, read_parts
 from lightpaint.images.exr_layers import ALPHA_NAMES, Layer, choose_layer
+from lightpaint.images.kinds import head_of, kind_of, name_of
+from lightpaint.images.layered import LAYERED, layered_kind, read_merged
 
 Mask = npt.NDArray[np.bool_]
-
-#: How the files begin that can be read.
-MAGICS = {
-    b"\x76\x2f\x31\x01": "exr",
-    b"\x89PNG\r\n\x1a\n": "png",
-    b"\xff\xd8\xff": "jpeg",
-    b"II*\0": "tiff",
-    b"MM\0*": "tiff",
-    b"II+\0": "tiff",
-    b"MM\0+": "tiff",
-    b"8BPS\0\x01": "psd",
-    b"PK\x03\x04": "zip",
-}
-
-#: And some that cannot, to name them.
-OTHERS = {
-    b"#?": "Radiance HDR",
-    b"RIFF": "WebP",
-    b"8BPS": "large Photoshop (PSB)",
-    b"gimp xcf": "GIMP",
-    b"GIF8": "GIF",
-    b"BM": "BMP",
-}
-
-#: What a layered zip says it is, and where its merged picture lies.
-ZIPS = {b"image/openraster": "ora", b"application/x-krita": "kra"}
-MERGED = "mergedimage.png"
-
-#: Longest merged picture that is unpacked, in bytes.
-MAX_MERGED = 2**30
-
-#: What reading a damaged archive raises: its places and lengths may be any numbers.
-DAMAGES = (
-    zipfile.BadZipFile,
-    NotImplementedError,
-    RuntimeError,
-    EOFError,
-    ValueError,
-    OverflowError,
-    struct.error,
-    zlib.error,
-)
 
 #: JPEG's rounding keeps white within so many codes of the top.
 JPEG_WHITE = 2
@@ -164,55 +120,17 @@ def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
 def file_kind(path: Path) -> str:
     """Which of the kinds of pictures a file is, by how it begins. Raises ImageError if none."""
     head = head_of(path, 128)
-    for magic, kind in MAGICS.items():
-        if head.startswith(magic):
-            return kind if kind != "zip" else _zip_kind(path, head)
-    found = next((kind for mark, kind in OTHERS.items() if head.startswith(mark)), None)
+    if kind := kind_of(head):
+        return kind if kind != "zip" else layered_kind(path, head)
+    name = name_of(head)
     raise ImageError(
-        f"{path} is {f'a {found} file' if found else 'no picture that can be read'}: export it as "
+        f"{path} is {f'a {name} file' if name else 'no picture that can be read'}: export it as "
         "OpenEXR, or as PNG or TIFF with 16 bits"
     )
 
 
-def _zip_kind(path: Path, head: bytes) -> str:
-    """OpenRaster and Krita name themselves in their first member, which is not compressed."""
-    length = int.from_bytes(head[26:28], "little") + int.from_bytes(head[28:30], "little")
-    said = head[30 + length :]
-    for mark, kind in ZIPS.items():
-        if said.startswith(mark):
-            return kind
-    raise ImageError(f"{path} is a zip archive, but neither of OpenRaster nor of Krita")
-
-
 def _bitmap(path: Path, kind: str) -> Bitmap:
-    if kind not in ZIPS.values():
-        return read_bitmap(path, kind)
-    try:
-        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            member = archive.getinfo(MERGED)
-            if member.file_size > MAX_MERGED:
-                raise ImageError("declares a merged picture that is too large to unpack")
-            merged = Path(folder) / MERGED
-            with archive.open(member) as packed, merged.open("wb") as unpacked:
-                _copy(packed, unpacked, member.file_size)
-            if file_kind(merged) != "png":
-                raise ImageError("has a merged picture that is no PNG")
-            return replace(read_bitmap(merged, "png"), kind=kind)
-    except KeyError:
-        raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
-    except DAMAGES as error:
-        # The archive's own names stand in the message, and may be anything.
-        raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
-
-
-def _copy(source: object, target: object, length: int) -> None:
-    """Copy what the archive declares, and see that it is no more."""
-    copied = 0
-    while chunk := source.read(2**20):  # type: ignore[attr-defined]
-        copied += len(chunk)
-        if copied > length:
-            raise ImageError("is damaged: its merged picture is longer than declared")
-        target.write(chunk)  # type: ignore[attr-defined]
+    return read_merged(path, kind) if kind in LAYERED.values() else read_bitmap(path, kind)
 
 
 def _of_layer(layer: Layer) -> Picture:

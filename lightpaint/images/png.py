@@ -1,20 +1,29 @@
-"""Pictures for people, and PNG files: of 8 bits to look at, of 16 to paint on and read back."""
+"""PNG files: of 8 bits to look at, of 16 to paint on and read back, and what one says of itself."""
 
 import io
-from collections.abc import Mapping
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import OpenImageIO
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
-from lightpaint.errors import OutputError
+from lightpaint.colour.icc import Profile, gamma_profile, srgb_profile
+from lightpaint.colour.primaries import is_rec709, primaries_in
+from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing, write_bytes
+
+#: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
+MAX_CHUNK = 2**24
+
+#: Text in a PNG that names the view it was shown through.
+VIEW_KEY = "lightpaint.view"
 
 
 def write_png_16(
@@ -24,6 +33,8 @@ def write_png_16(
 
     texts: Latin-1, kept in the file.
     """
+    import OpenImageIO
+
     values = np.round(image_display * 65535).astype(np.uint16)
     height, width = values.shape[:2]
     spec = OpenImageIO.ImageSpec(width, height, 1 if values.ndim == 2 else 3, "uint16")
@@ -60,3 +71,59 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
 def write_png(path: Path, image: Floats, *, stops: float = 0.0) -> None:
     """Write a linear image display-encoded as 8-bit sRGB PNG, whole or not at all."""
     write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops))))
+
+
+def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
+    """What the small chunks of a PNG say: the view it was made with, and its colours.
+
+    The order is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
+    """
+    chunks = dict(_chunks(path))
+    text = chunks.get(b"tEXt", b"")
+    shown = text.partition(b"\0")[2].decode("latin-1") or None
+    if b"cICP" in chunks:
+        return shown, _of_cicp(chunks[b"cICP"])
+    gamma, colours = chunks.get(b"gAMA", b""), chunks.get(b"cHRM", b"")
+    if chunks.keys() & {b"iCCP", b"sRGB"} or len(gamma) != 4:
+        return shown, None
+    primaries = None
+    if len(colours) == 32:
+        wx, wy, *rgb = (v / 1e5 for v in struct.unpack(">8I", colours))
+        primaries = (*rgb, wx, wy)
+    encoding = int.from_bytes(gamma, "big") / 1e5
+    if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709(primaries)):
+        return shown, None  # how sRGB is written in these chunks
+    try:
+        return shown, gamma_profile(1 / encoding, primaries)
+    except ValueError as error:
+        raise ImageError(f"declares colours that make no sense: {error}") from error
+
+
+def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
+    """Type and content of the chunks before the pixels, of which only ours of the texts.
+
+    Raises ImageError where a checksum is wrong: the library would do without that chunk.
+    """
+    with path.open("rb") as file:
+        file.seek(8)
+        while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
+            length = int.from_bytes(head[:4], "big")
+            if length > MAX_CHUNK:
+                raise ImageError("is damaged: a part of its head is too long")
+            content, checksum = file.read(length), file.read(4)
+            if zlib.crc32(content, zlib.crc32(head[4:])) != int.from_bytes(checksum, "big"):
+                raise ImageError("is damaged: a checksum is wrong")
+            if head[4:] != b"tEXt" or content.startswith(VIEW_KEY.encode() + b"\0"):
+                yield head[4:], content
+
+
+def _of_cicp(content: bytes) -> Profile | None:
+    """Coding-independent code points (ITU-T H.273): sRGB and Display P3."""
+    srgb, display_p3 = b"\x01\x0d", b"\x0c\x0d"
+    if content[:2] == srgb:
+        return None
+    if content[:2] == display_p3:
+        return srgb_profile("Display P3", primaries_in("Display P3"))
+    raise ImageError(
+        f"declares the colours {content[:2].hex(' ')} (cICP): export it as sRGB or Display P3"
+    )

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, JpegImagePlugin
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import to_8_bit
@@ -90,6 +89,8 @@ def _difference_of_light(picture: Picture, look: Floats, template: Template) -> 
 
 def _compressed_like(path: Path, display: Floats) -> Floats:
     """`display` after the compression that the JPEG at `path` has gone through."""
+    from PIL import Image, JpegImagePlugin
+
     eight = Image.fromarray(to_8_bit(display))
     with Image.open(path) as file:
         tables = getattr(file, "quantization", None)

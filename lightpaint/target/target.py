@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.view import View
@@ -53,8 +52,11 @@ class Target:
                 f"target {self.name}: image {self.image.shape} and at_least {self.at_least.shape} "
                 "differ in size"
             )
-        if not np.isfinite(self.image).all():
-            raise TargetError(f"target {self.name} holds NaN or Inf")
+        if lost := int((~np.isfinite(self.image).all(axis=-1)).sum()):
+            raise TargetError(
+                f"target {self.name} holds NaN or Inf in {lost} of {self.importance.size} pixels: "
+                "make them 0, and their importance too"
+            )
         if not np.isfinite(self.importance).all() or (self.importance < 0).any():
             raise TargetError(
                 f"target {self.name}: importance must be finite and not negative; it is between "
@@ -67,6 +69,49 @@ class Target:
                 f"target {self.name} has importance 0 everywhere, so nothing in it counts: "
                 "paint with some alpha, or give a mask that is not black"
             )
+
+    @classmethod
+    def of(
+        cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = "target"
+    ) -> "Target":
+        """A target from arrays, which are copied as float32.
+
+        image: (h, w, 3) floats, linear Rec.709, finite. importance: (h, w) >= 0, or a mask of
+        bools; without one every pixel counts 1. name: what messages and results call it.
+
+        Raises TargetError or SizeError for what is none.
+        """
+        given = np.asarray(image)
+        if given.ndim != 3 or given.shape[-1] != 3 or not given.size:
+            raise SizeError(
+                f"target {name}: an image of the shape {given.shape}: expected (height, width, 3)"
+            )
+        if given.dtype.kind != "f":
+            raise TargetError(
+                f"target {name}: an image of {given.dtype}: expected floats, linear Rec.709; "
+                "display values of 8 bits are View().decode(image / 255)"
+            )
+        counts = np.ones(given.shape[:2]) if importance is None else np.asarray(importance)
+        if counts.dtype.kind not in "bfui":
+            raise TargetError(f"target {name}: importance of {counts.dtype}: expected numbers")
+        with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, and refused
+            pixels, counts = given.astype(np.float32), counts.astype(np.float32)
+        return cls(name, pixels, counts, everything=importance is None)
+
+    def __repr__(self) -> str:
+        (height, width), counts = self.size, self.importance > 0
+        light = self.image[counts]
+        lines = [
+            f"Target {self.name!r}, {width}x{height}",
+            f"  counts   {100 * counts.mean():.3g} % of the pixels",
+            f"  light    {light.min():.3g} to {light.max():.3g}",
+        ]
+        if self.at_least is not None:
+            brighter = 100 * np.mean(self.at_least.any(axis=-1), where=counts)
+            lines.append(f"  at least {brighter:.3g} % of what counts, or anything brighter")
+        if self.view is not None:
+            lines.append(f"  seen     through {self.view.spoken}")
+        return "\n".join([*lines, *(f"  note     {note}" for note in self.notes)])
 
     @property
     def size(self) -> tuple[int, int]:
@@ -151,6 +196,8 @@ class Target:
 
 def _resampled(planes: Floats, size: tuple[int, int]) -> Floats:
     """(h, w, n) at `size`: means over what a pixel covers; where it grows, interpolated."""
+    from PIL import Image
+
     height, width = size
     shrinks = width <= planes.shape[1]
     kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR

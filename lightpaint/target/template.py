@@ -20,9 +20,8 @@ from lightpaint.files import (
     write_bytes,
     write_text,
 )
-from lightpaint.images.bitmap import VIEW_KEY
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
-from lightpaint.images.png import png_bytes, write_png_16
+from lightpaint.images.png import VIEW_KEY, png_bytes, write_png_16
 from lightpaint.records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from lightpaint.colour.curves import AGX_INSET, MIDDLE_GREY
 from lightpaint.colour.display import decode_display, encode_display
-from lightpaint.colour.view import AGX_INSET, MIDDLE_GREY, View
+from lightpaint.colour.view import View
 from lightpaint.errors import ViewError
 
 BUILT_IN = ["srgb", "linear", "filmic", "agx"]

@@ -41,7 +41,7 @@ def test_image_and_importance_of_different_sizes():
 def test_pixels_must_be_finite(bad: float):
     image = np.ones((3, 3, 3))
     image[1, 1, 1] = bad
-    with pytest.raises(TargetError, match="NaN or Inf"):
+    with pytest.raises(TargetError, match="NaN or Inf in 1 of 9 pixels"):
         _target(image, np.ones((3, 3)))
 
 
@@ -51,6 +51,66 @@ def test_importance_must_be_finite_and_not_negative(bad: float):
     importance[1, 1] = bad
     with pytest.raises(TargetError, match="finite and not negative"):
         _target(np.ones((3, 3, 3)), importance)
+
+
+def test_a_target_of_arrays():
+    image, mask = np.full((3, 4, 3), 0.25), np.zeros((3, 4), bool)
+    mask[1, 2] = True
+    whole, part = Target.of(image), Target.of(image, mask, name="lamp")
+    assert (whole.name, whole.everything, part.name, part.everything) == (
+        *("target", True),
+        *("lamp", False),
+    )
+    for target in (whole, part):
+        assert (target.image.dtype, target.importance.dtype) == (np.float32, np.float32)
+        np.testing.assert_array_equal(target.image, image)
+    np.testing.assert_array_equal(whole.importance, 1)
+    np.testing.assert_array_equal(part.importance, mask)
+    image[:], mask[:] = 7, True  # whoever goes on painting changes no target
+    assert part.image.max() == 0.25
+    assert part.importance.sum() == 1
+
+
+@pytest.mark.parametrize(
+    ("image", "importance", "complaint"),
+    [
+        (np.ones((3, 4)), None, r"\(3, 4\): expected \(height, width, 3\)"),
+        (np.ones((3, 4, 4)), None, r"\(3, 4, 4\)"),
+        (np.ones((0, 4, 3)), None, r"\(0, 4, 3\)"),
+        (np.ones((3, 4, 3), np.uint8), None, "of uint8: expected floats"),
+        (np.ones((3, 4, 3), object), None, "of object: expected floats"),
+        (np.full((3, 4, 3), 1e39), None, "NaN or Inf in 12 of 12 pixels"),  # too much for float32
+        (np.ones((3, 4, 3)), np.ones((4, 3)), "differ in size"),
+        (np.ones((3, 4, 3)), np.ones((3, 4, 1)), "differ in size"),
+        (np.ones((3, 4, 3)), np.full((3, 4), "x"), "expected numbers"),
+        (np.ones((3, 4, 3)), -np.ones((3, 4), int), "not negative"),
+        (np.ones((3, 4, 3)), np.zeros((3, 4), bool), "importance 0 everywhere"),
+    ],
+)
+def test_arrays_that_are_no_target(image: Any, importance: Any, complaint: str):
+    with pytest.raises(TargetError, match=f"^target mine.*{complaint}"):
+        Target.of(image, importance, name="mine")
+
+
+def test_a_target_is_shown_in_a_few_lines():
+    image = np.zeros((1, 8, 3))
+    image[0, 1] = 1, 2, 3
+    target = Target.of(image, [[1, 1, 0, 0, 0, 0, 0, 0]], name="dusk")
+    said = repr(target)
+    assert said.splitlines() == [
+        "Target 'dusk', 8x1",
+        "  counts   25 % of the pixels",
+        "  light    0 to 3",
+    ]
+    target = replace(
+        target, at_least=image == 2, view=View("agx", 1.5), notes=("painted on nothing",)
+    )
+    assert repr(target).splitlines() == [
+        *said.splitlines(),
+        "  at least 50 % of what counts, or anything brighter",
+        "  seen     through agx at +1.5 stops",
+        "  note     painted on nothing",
+    ]
 
 
 def test_something_must_count():

@@ -1,0 +1,48 @@
+"""Which kind of picture a file is, by how it begins: its name says nothing."""
+
+from pathlib import Path
+
+from lightpaint.errors import ImageError
+
+#: How files begin, what people call them, and the kind as which they are read; "" if they are not.
+BEGINNINGS = (
+    (b"\x76\x2f\x31\x01", "OpenEXR", "exr"),
+    (b"\x89PNG\r\n\x1a\n", "PNG", "png"),
+    (b"\xff\xd8\xff", "JPEG", "jpeg"),
+    (b"II*\0", "TIFF", "tiff"),
+    (b"MM\0*", "TIFF", "tiff"),
+    (b"II+\0", "TIFF", "tiff"),
+    (b"MM\0+", "TIFF", "tiff"),
+    (b"8BPS\0\1", "Photoshop", "psd"),
+    (b"PK\x03\x04", "layered (zip)", "zip"),
+    (b"8BPS\0\2", "large Photoshop (PSB)", ""),
+    (b"8BPS", "Photoshop", ""),
+    (b"#?", "Radiance HDR", ""),
+    (b"RIFF", "WebP", ""),
+    (b"gimp xcf", "GIMP", ""),
+    (b"GIF8", "GIF", ""),
+    (b"BM", "BMP", ""),
+)
+
+
+def head_of(path: Path, length: int) -> bytes:
+    """How an image file begins. Raises ImageError if there is none that can be read."""
+    if path.is_dir():
+        raise ImageError(f"{path} is a folder, not an image file")
+    if not path.is_file():
+        raise ImageError(f"no such image file: {path}")
+    try:
+        with path.open("rb") as file:
+            return file.read(length)
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror}") from error
+
+
+def kind_of(head: bytes) -> str:
+    """`exr`, `png`, `jpeg`, `tiff`, `psd` or `zip`; "" for what is not read."""
+    return next((kind for mark, _, kind in BEGINNINGS if head.startswith(mark)), "")
+
+
+def name_of(head: bytes) -> str:
+    """What people call such a file; "" if nobody knows."""
+    return next((name for mark, name, _ in BEGINNINGS if head.startswith(mark)), "")

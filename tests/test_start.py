@@ -1,0 +1,78 @@
+"""What is loaded at the start, and when: the public names and --help wait for no library."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import lightpaint as lp
+
+#: What takes long to load, or needs a part that may be missing.
+LIBRARIES = {
+    *("mitsuba", "drjit", "numpy", "OpenImageIO", "OpenEXR", "PIL", "rich", "colour", "scipy"),
+    *("importlib.metadata", "asyncio", "urllib.request", "json"),
+}
+
+
+def _loaded_by(code: str) -> set[str]:
+    """Modules that a fresh Python has loaded at the end of this code."""
+    code = f"import sys\ntry:\n    {code}\nexcept SystemExit: pass\nprint('\\n', *sys.modules)"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import lightpaint",
+        "import lightpaint as lp; dir(lp); lp.__version__; lp.LightpaintError",
+        *(
+            f"import lightpaint.cli as c; c.main({arguments})"
+            for arguments in (["--help"], ["--version"], ["solve", "--help"])
+        ),
+    ],
+)
+def test_start_loads_no_library(code: str):
+    loaded = _loaded_by(code)
+    assert "lightpaint" in loaded
+    assert loaded & LIBRARIES <= _loaded_by("pass")  # what an editable installation loads itself
+
+
+def test_a_name_loads_its_own_room_and_no_renderer():
+    loaded = _loaded_by("import lightpaint as lp; lp.solve; lp.read_target; lp.display_picture")
+    assert "lightpaint.lighting.solve" in loaded
+    assert not loaded & {"mitsuba", "OpenImageIO", "colour", "rich", "lightpaint.pipeline"}
+
+
+def test_every_public_name_is_there_and_seen_by_type_checkers():
+    assert len(lp.__all__) == len(set(lp.__all__))
+    assert set(lp.__all__) <= set(dir(lp))
+    tree = ast.parse(Path(lp.__file__).read_text(encoding="utf-8"))
+    seen = {}
+    for block in (node for node in tree.body if isinstance(node, ast.If)):
+        for line in block.body:
+            assert isinstance(line, ast.ImportFrom)
+            for name in line.names:
+                assert name.asname == name.name  # which is what makes it public to them
+                seen[name.name] = line.module
+    assert set(seen) == set(lp.__all__) - {"__version__"}
+    for name, module in seen.items():
+        assert getattr(lp, name) is getattr(sys.modules[str(module)], name)
+        # Not by way of a module that only imports it.
+        assert getattr(lp, name).__module__ == module
+
+
+def test_no_name_is_that_of_a_room():
+    import lightpaint.lighting.views as views
+
+    assert views.solve_views is lp.solve_views
+    for name in set(lp.__all__) - {"__version__"}:
+        assert not isinstance(getattr(lp, name), type(lp))
+
+
+def test_what_there_is_none_of():
+    with pytest.raises(AttributeError, match="module 'lightpaint' has no attribute 'relit_scene'"):
+        _ = lp.relit_scene
