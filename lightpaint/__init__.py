@@ -14,8 +14,8 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
 
-`paint_with_light` is all of it in one call; `solve_views` and `paint_views_with_light` take
-several views. Importing this sets no Mitsuba variant; that
+`paint_with_light` is all of it in one call, for one view or several: a `Job`, and a `run` of it;
+`solve_views` takes several views. Importing this sets no Mitsuba variant; that
 happens when the first scene is loaded.
 """
 
@@ -26,21 +26,24 @@ from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.png import display_picture
+from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.lighting.lighting import Lighting, combine, read_lighting, write_lighting
 from lightpaint.lighting.solve import Solution, solve
 from lightpaint.lighting.views import solve_views
-from lightpaint.pipeline import paint_views_with_light, paint_with_light, render_template
+from lightpaint.pipeline import paint_with_light, run
 from lightpaint.placement.suggest import Suggestion, suggest_lights
 from lightpaint.relit.export.exports import write_exports
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verify import Verification, verify
+from lightpaint.renders import render_template
 from lightpaint.report.verdict import verdict
 from lightpaint.results import Look
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.settings import Settings
+from lightpaint.sources import Painting, SceneFile
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
@@ -49,11 +52,14 @@ __all__ = [
     "Basis",
     "Constraints",
     "Estimate",
+    "Job",
     "LightGroups",
     "Lighting",
     "LightpaintError",
     "Look",
+    "Painting",
     "Scene",
+    "SceneFile",
     "Settings",
     "Solution",
     "Suggestion",
@@ -64,7 +70,6 @@ __all__ = [
     "combine",
     "display_picture",
     "load_scene",
-    "paint_views_with_light",
     "paint_with_light",
     "read_basis",
     "read_constraints",
@@ -74,6 +79,7 @@ __all__ = [
     "relight",
     "render_basis",
     "render_template",
+    "run",
     "solve",
     "solve_views",
     "suggest_lights",

@@ -130,7 +130,7 @@ def weighted_problem(
     residual of weight D = a + unpainted (1 − a) against the weighted mean of both images.
     """
     if unpainted < 0 or not np.isfinite(unpainted):
-        raise TargetError(f"--unpainted is a weight >= 0, not {unpainted:g}")
+        raise TargetError(f"unpainted is {unpainted:g}: expected a weight >= 0")
     importance = target.importance.astype(np.float64)
     image = target.image.astype(np.float64)
     if target.everything:

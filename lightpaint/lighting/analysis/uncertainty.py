@@ -173,7 +173,7 @@ def correct_noise(basis: Basis, solution: Solution, *, share: float | None = Non
     if not basis.knows_noise:
         raise BasisError(
             f"{basis.origin.scene} says nothing of its noise, so that none can be corrected: "
-            "leave --correct-noise out, and denoise the layers or render them with more samples"
+            "use noise_correction=False, and denoise the layers or render them with more samples"
         )
     weights = solution.lighting.weights_for(basis)
     noise = noise_sums(basis, solution, weights)
