@@ -22,6 +22,7 @@ from lightpaint.target.read import Paint, read_target
 from lightpaint.target.target import Target
 
 FORMAT = "lightpaint-job 1"
+FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by_sensor")
 
 
 @dataclass(frozen=True)
@@ -134,10 +135,11 @@ def from_json(text: str) -> dict[str, Any]:
         data = strict_json(text)
         if (form := data.pop("format")) != FORMAT:
             raise ValueError(f"its format is {form!r}, not {FORMAT!r}")
+        if unknown := set(data) - set(FIELDS):
+            raise ValueError(f"it has the keys {', '.join(sorted(unknown))}")
         settings, constraints = data["settings"], data["constraints"]
         view = settings["view"] and View(**settings["view"])
         return {
-            **data,
             "folder": Path(data["folder"]),
             "by_sensor": bool(data["by_sensor"]),
             "scenes": tuple(SceneFile(**one) for one in data["scenes"]),
