@@ -14,8 +14,8 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
 
-`paint_with_light` is all of it in one call; `solve_views` and `paint_views_with_light` take
-several views. Each name is imported when it is first used (PEP 562): importing this loads no
+`paint_with_light` is all of it in one call, for one view or several: a `Job`, and a `run` of it.
+Each name is imported when it is first used (PEP 562): importing this loads no
 library. No Mitsuba variant is set before the first scene is loaded.
 """
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
     from lightpaint.images.png import display_picture as display_picture
+    from lightpaint.job import Job as Job
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
     from lightpaint.lighting.constraints.file import read_constraints as read_constraints
     from lightpaint.lighting.lighting import Lighting as Lighting
@@ -43,21 +44,23 @@ if TYPE_CHECKING:
     from lightpaint.lighting.lighting import write_lighting as write_lighting
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
-    from lightpaint.pipeline import paint_views_with_light as paint_views_with_light
     from lightpaint.pipeline import paint_with_light as paint_with_light
-    from lightpaint.pipeline import render_template as render_template
+    from lightpaint.pipeline import run as run
     from lightpaint.placement.suggest import Suggestion as Suggestion
     from lightpaint.placement.suggest import suggest_lights as suggest_lights
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
     from lightpaint.relit.verify import Verification as Verification
     from lightpaint.relit.verify import verify as verify
+    from lightpaint.renders import render_template as render_template
     from lightpaint.report.verdict import verdict as verdict
     from lightpaint.results import Look as Look
     from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene import load_scene as load_scene
     from lightpaint.scene.variant import use_variant as use_variant
     from lightpaint.settings import Settings as Settings
+    from lightpaint.sources import Painting as Painting
+    from lightpaint.sources import SceneFile as SceneFile
     from lightpaint.target.read import read_target as read_target
     from lightpaint.target.target import Target as Target
 
@@ -69,8 +72,11 @@ _HOMES = {
     "LightGroups": "basis.lightgroups.read",
     "Lighting": "lighting.lighting",
     "LightpaintError": "errors",
+    "Job": "job",
     "Look": "results",
+    "Painting": "sources",
     "Scene": "scene.scene",
+    "SceneFile": "sources",
     "Settings": "settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggest",
@@ -80,7 +86,6 @@ _HOMES = {
     "combine": "lighting.lighting",
     "display_picture": "images.png",
     "load_scene": "scene.scene",
-    "paint_views_with_light": "pipeline",
     "paint_with_light": "pipeline",
     "read_basis": "basis.file",
     "read_constraints": "lighting.constraints.file",
@@ -89,7 +94,8 @@ _HOMES = {
     "read_target": "target.read",
     "relight": "relit.relight",
     "render_basis": "basis.render.render",
-    "render_template": "pipeline",
+    "render_template": "renders",
+    "run": "pipeline",
     "solve": "lighting.solve",
     "suggest_lights": "placement.suggest",
     "use_variant": "scene.variant",

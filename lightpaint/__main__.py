@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """`python -m lightpaint`: the command line, where its script is not on the path."""
 
 import sys

@@ -1,68 +1,99 @@
-"""The corridor: load → basis → target → solve → relight → verify, in that order."""
+"""The corridor: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
 
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
+from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.obtain import check_same_view, obtain_basis
-from lightpaint.basis.render.render import basis_lights, render_basis
-from lightpaint.colour.display import choose_exposure
-from lightpaint.colour.view import View
-from lightpaint.errors import LightpaintError, SceneError, TargetError
-from lightpaint.files import check_writable, restoring
+from lightpaint.colour.view import ViewChoice
+from lightpaint.errors import SceneError, TargetError
+from lightpaint.files import restoring
 from lightpaint.images.estimate import write_estimate
-from lightpaint.images.png import write_png
+from lightpaint.job import Job, PaintedView, check_needed
 from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_bounds
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import read_constraints
-from lightpaint.lighting.constraints.reduction import reduce_to
-from lightpaint.lighting.lighting import Lighting, combine, write_lighting
+from lightpaint.lighting.lighting import combine, write_lighting
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.placement.suggest import Suggestion, check_suggestible, suggest_lights
-from lightpaint.progress import Progress, labelled, silent
-from lightpaint.relit.export.exports import EXPORTS, write_exports
-from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.placement.suggest import suggest_lights
+from lightpaint.progress import Listener, Progress, labelled, listener, silent
+from lightpaint.relit.export.exports import write_exports
+from lightpaint.relit.relight import relight
 from lightpaint.relit.rounds import refine_by_rendering
 from lightpaint.relit.verify import verify
-from lightpaint.results import (
-    ALWAYS,
-    RESULTS,
-    VIEW_RESULTS,
-    Look,
-    earlier_results,
-    show_look,
-    write_predicted,
-)
-from lightpaint.scene.quality import Preset, on_film, samples
-from lightpaint.scene.render import Stream, render
+from lightpaint.results import Look, write_predicted, write_report
+from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.scene.surfaces import render_surfaces
 from lightpaint.settings import Settings
-from lightpaint.target.read import read_target
+from lightpaint.sources import BasisFile, Painting, SceneFile
 from lightpaint.target.target import Target
-from lightpaint.target.template import Template, write_look, write_template
-
-#: Rendering of what each light does alone, to recognise it by.
-THUMBNAIL = Preset(32, 2**14)
 
 #: Samples per pixel of a verification that has a large film for a small basis, at least.
 FEWEST = 4
 
+AnyScene = str | Path | Scene
+AnyTarget = str | Path | Target
+
+
+def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = None) -> list[Look]:
+    """Do `job`: find its lighting, prove it, and write results to its folder; a look for each view.
+
+    progress: hears how far the work has come and, if it is a `Listener`, remarks.
+    bases: of the views on their films, where an earlier run has obtained them; the list is
+    emptied, so that no pixel is held twice.
+    """
+    listen, settings = listener(progress), job.settings
+    for remark in job.remarks:
+        listen.say(remark)
+    problem = Problem.of(
+        _obtained(job, bases, listen),
+        [view.target for view in job.views],
+        constraints=job.asked,
+        unpainted=settings.unpainted,
+        method=settings.method,
+        view=job.display,
+    )
+    solution = _improved(job, solution_of(problem), listen)
+    analyses = analyse(solution)
+    with restoring(job.folder, job.files):
+        lighting = with_bounds(solution, analyses).lighting
+        write_lighting(job.folder / "lighting.json", lighting)
+        if job.groups is not None:
+            write_exports(job.folder, job.groups, lighting)
+        relit = None
+        if (scene := job.views[0].scene) is not None:
+            relit = relight(scene, lighting, job.folder / "relit.xml")
+        return [
+            _finished(job, view, analysis, relit, _hearing(job, view, listen))
+            for view, analysis in zip(job.views, analyses, strict=True)
+        ]
+
+
+@overload
+def paint_with_light(
+    scene: AnyScene | None, target: AnyTarget, folder: str | Path, **how: Any
+) -> Look: ...
+
+
+@overload
+def paint_with_light(
+    scene: Sequence[AnyScene], target: Sequence[AnyTarget], folder: str | Path, **how: Any
+) -> list[Look]: ...
+
 
 def paint_with_light(
-    scene: str | Path | Scene | None,
-    target: str | Path | Target,
+    scene: AnyScene | Sequence[AnyScene] | None,
+    target: AnyTarget | Sequence[AnyTarget],
     folder: str | Path,
     *,
-    basis: str | Path | Basis | LightGroups | None = None,
+    basis: str | Path | Basis | LightGroups | list[Basis] | None = None,
+    constraints: Constraints | None = None,
     mask: str | Path | None = None,
     sensor: int | str | None = None,
     parameters: Mapping[str, object] | None = None,
@@ -70,235 +101,168 @@ def paint_with_light(
     groups: Mapping[str, Iterable[str]] | None = None,
     progress: Progress = silent,
     **settings: Any,
-) -> Look:
+) -> Look | list[Look]:
     """Find the lighting of `scene` that comes closest to a painting, and prove it.
 
-    scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer.
+    scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer. For several
+    views a list: the same scene, loaded through another sensor each; `target` is then a list of
+    what each is to show, and a list comes back.
     folder: receives lighting.json, predicted.exr, comparison.png and report.html and, with
-    a scene, relit.xml and verified.exr.
+    a scene, relit.xml and verified.exr; of a list, the pictures lie in a folder for each sensor.
     basis: one made before of the same scene; taken from the cache or rendered if not given. Of
     light groups that another renderer made, `folder` receives the answer for other programs, too.
+    For several views a list, which is emptied, so that no pixel is held twice.
+    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
+    mask: as `read_target` takes it, where `target` is a path.
     sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
+    progress: hears how far the work has come and, if it is a `Listener`, remarks.
     settings: any of `Settings`, by name, like spp=64.
 
     Raises LightpaintError; all that a user gives is checked before anything is rendered.
     """
-    asked = Settings(**settings)
-    if asked.suggest and scene is None:
-        raise LightpaintError(
-            "suggesting lights renders them in the scene: give it, and not only its basis"
-        )
-    if asked.refine and scene is None:
-        raise LightpaintError("refining renders the scene: give it, and not only its basis")
-    if scene is None and basis is None:
-        raise LightpaintError("give a scene, a basis, or both")
-    if isinstance(scene, str | Path):
-        scene = load_scene(
-            scene, sensor=sensor, parameters=parameters, lights=lights, groups=groups
-        )
-    layers = basis if isinstance(basis, LightGroups) else None
-    if isinstance(basis, LightGroups):
-        basis = basis.basis
-    if isinstance(basis, str | Path):
-        basis = read_basis(Path(basis))
-    if scene is not None and basis is not None:
-        check_same_view(scene, basis)
-    if not isinstance(target, Target):
-        target = read_target(target, mask=mask, view=asked.view)
-    view = PaintedView(scene, target, Path(folder), basis, layers)
-    [look] = _paint([view], Path(folder), asked, progress)
-    return look
-
-
-def paint_views_with_light(
-    scenes: Sequence[Scene],
-    targets: Sequence[Target],
-    folder: str | Path,
-    *,
-    bases: list[Basis] | None = None,
-    progress: Progress = silent,
-    **settings: Any,
-) -> list[Look]:
-    """Find the one lighting that comes closest to paintings of several views of a scene.
-
-    scenes: the same scene, loaded through another sensor each; targets: what each is to show.
-    folder: receives lighting.json and relit.xml, and for each sensor a folder of that name with
-    predicted.exr, verified.exr, comparison.png and report.html.
-    bases: of these views, if made before; the list is emptied, so that no pixel is held twice.
-    settings: as of `paint_with_light`.
-    """
-    names = check_each_once(scenes)
-    asked = Settings(**settings)
-    if asked.suggest and len(scenes) > 1:
-        raise LightpaintError("lights are suggested for one view only: leave out the others")
-    made = [None] * len(scenes) if bases is None else list(bases)
+    how = {
+        "sensor": sensor,
+        "parameters": {key: str(value) for key, value in (parameters or {}).items()},
+        "lights": None if lights is None else tuple(lights),
+        "groups": {name: tuple(members) for name, members in (groups or {}).items()},
+    }
+    bases = basis if isinstance(basis, list) else None
     if bases is not None:
-        bases.clear()
-    views = [
-        PaintedView(scene, target, Path(folder) / name, made.pop(0))
-        for scene, target, name in zip(scenes, targets, names, strict=True)
-    ]
-    return _paint(views, Path(folder), asked, progress)
-
-
-def check_each_once(scenes: Sequence[Scene]) -> list[str]:
-    """The sensor of each. Raises SceneError for one that is there twice or names no folder."""
-    names = [scene.sensor_names[scene.sensor] for scene in scenes]
-    if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
-    for name in names:
-        if Path(name).name != name or name in ("..", ""):
-            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
-    return names
-
-
-@dataclass(frozen=True)
-class PaintedView:
-    """What is seen through one sensor: its painting, and where its results go.
-
-    scene: None where there is only a basis; basis: None where it is still to be rendered.
-    groups: where the basis is of light groups from elsewhere.
-    """
-
-    scene: Scene | None
-    target: Target
-    folder: Path
-    basis: Basis | None = None
-    groups: LightGroups | None = None
-
-
-def _paint(
-    views: list[PaintedView], folder: Path, settings: Settings, progress: Progress
-) -> list[Look]:
-    """One lighting for all views, into `folder`; pictures into the folders of the views."""
-    scene = views[0].scene
-    constraints = all_constraints(scene, settings.constraints)
-    if scene is not None:
-        reduce_to(constraints, basis_lights(scene))  # names what cannot be had before it renders
-        if settings.suggest:
-            check_suggestible(scene)
-    for place in (folder, *(view.folder for view in views)):
-        check_writable(place)
-    written = _to_be_written(views, folder)
-    views[:] = _fitted(views, settings)
-    reports = {view.folder: _progress_of(view, len(views), progress) for view in views}
-    views[:] = [_with_basis(x, settings, len(views), reports[x.folder]) for x in views]
-    problem = Problem.of(
-        [_basis(view) for view in views],
-        [view.target for view in views],
-        constraints=constraints,
-        unpainted=settings.unpainted,
-        method=settings.method,
-        view=_fitted_in(views, settings),
+        scene = [_on_film_of(x, its) for x, its in zip(_listed(scene), bases, strict=True)]
+        # They are on the films of their bases already.
+        basis, settings = None, settings | {"resolution": "1/1"}
+    job = _job(
+        (scene, {key: value for key, value in how.items() if value not in (None, {})}),
+        (target, mask),
+        Path(folder),
+        basis,
+        Constraints() if constraints is None else constraints,
+        Settings(**settings),
     )
-    # In place: the caller's list is the last to hold the bases as they were.
-    views[:] = [replace(v, basis=b) for v, b in zip(views, problem.views.bases, strict=True)]
-    solution = _improved(solution_of(problem), views, settings, progress)
-    analyses = analyse(solution)
-    solution = with_bounds(solution, analyses)
-    with restoring(folder, written):
-        write_lighting(folder / "lighting.json", solution.lighting)
-        if (groups := views[0].groups) is not None:
-            write_exports(folder, groups, solution.lighting)
-        relit = None if scene is None else relight(scene, solution.lighting, folder / "relit.xml")
-        return [
-            _finished(view, its, relit, settings, reports[view.folder])
-            for view, its in zip(views, analyses, strict=True)
-        ]
+    looks = run(job, progress, bases=bases)
+    return looks if job.by_sensor else looks[0]
 
 
-def _fitted_in(views: list[PaintedView], settings: Settings) -> View | None:
-    """The one view through which all paintings are compared, None for linear light."""
-    if settings.space == "linear":
-        return None
-    if settings.view is not None:
-        return settings.view
-    seen = {view.target.view for view in views if view.target.view is not None}
-    if len(seen) > 1:
-        told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
-        raise TargetError(
-            f"the paintings were seen through {told}: say with --view and --exposure which of them "
-            "is to be fitted"
-        )
-    return next(iter(seen), None) or View("srgb", choose_exposure(views[0].target.image))
+def _job(
+    scene: tuple[Any, Mapping[str, Any]],
+    target: tuple[Any, str | Path | None],
+    folder: Path,
+    basis: Any,
+    constraints: Constraints,
+    settings: Settings,
+) -> Job:
+    """What the arguments of `paint_with_light` ask for. scene, target: and how to read them."""
+    (scenes, how), (targets, mask) = scene, target
+    by_sensor = isinstance(scenes, list | tuple)
+    painted: dict[str, Any] = {"mask": mask and str(mask), "view": ViewChoice.of(settings.view)}
+    scenes = [SceneFile(str(x), **how) if _is_path(x) else x for x in _listed(scenes)]
+    targets = [Painting(str(x), **painted) if _is_path(x) else x for x in _listed(targets)]
+    if how and not scenes:
+        check_needed(how, basis)
+    if how and not any(isinstance(x, SceneFile) for x in scenes):
+        named = ", ".join(f"{name}=..." for name in how)
+        raise SceneError(f"{named} cannot change a scene that is loaded: give its path")
+    if mask is not None and not any(isinstance(x, Painting) for x in targets):
+        raise TargetError("mask=... cannot change a target that is read: give its path")
+    basis = BasisFile(str(basis)) if _is_path(basis) else basis
+    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, by_sensor)
 
 
-def _to_be_written(views: list[PaintedView], folder: Path) -> list[Path]:
-    """All files that are about to be replaced. Raises what keeps the scene from being relit."""
-    written = [*earlier_results(folder), folder / "lighting.json"]
-    for view in views:
-        if view.folder == folder:
-            written += [folder / name for name in ALWAYS]
-            written += [folder / name for name in EXPORTS if view.groups is not None]
-        else:
-            written += [file for pattern in RESULTS for file in view.folder.glob(pattern)]
-            written += [view.folder / name for name in VIEW_RESULTS]
-    if (scene := views[0].scene) is not None:
-        written += [folder / "verified.exr", *check_relightable(scene, folder / "relit.xml")]
-    return written
+def _listed(given: Any) -> list[Any]:
+    """One or several or none, as several."""
+    if given is None:
+        return []
+    return list(given) if isinstance(given, list | tuple) else [given]
 
 
-def _fitted(views: list[PaintedView], settings: Settings) -> list[PaintedView]:
-    """The views on the films that are to be rendered, with targets of their sizes."""
-    fitted = []
-    for view in views:
-        scene, size = view.scene, view.target.size
-        if view.basis is not None:
-            size = view.basis.size
-        elif scene is not None:
-            scene = on_film(scene, settings.quality, settings.resolution)
-            size = scene.size
-        target = view.target.fitted_to(size, resize=settings.resize)
-        if view.groups is not None:
-            target = target.without(view.groups.holes)
-        fitted.append(replace(view, scene=scene, target=target))
-    return fitted
+def _is_path(given: Any) -> bool:
+    return isinstance(given, str | Path)
 
 
-def _with_basis(
-    view: PaintedView, settings: Settings, count: int, progress: Progress
-) -> PaintedView:
-    """`view` with its basis, one of `count` that share the time there is."""
-    if view.basis is not None or view.scene is None:
-        return view
+def _on_film_of(scene: Any, basis: Basis) -> Scene:
+    """`scene`, through the sensor and on the film that `basis` was made with."""
+    if not isinstance(scene, Scene):
+        raise SceneError("bases of several views go with scenes that are loaded: use load_scene")
+    check_same_view(scene, basis)
+    return scene.reduced(f"{basis.size[1]}x{basis.size[0]}")
+
+
+def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int = 1) -> Basis:
+    """The basis of `scene` on its film, kept or rendered. views: that share the time there is."""
+    listen = listener(progress)
+    is_rendered = False
+
+    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+        nonlocal is_rendered
+        is_rendered = True
+        listen(label, done, total, unit)
+
     basis = obtain_basis(
-        view.scene,
+        scene,
         spp=samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
-        time_s=None if settings.time_s is None else settings.time_s / count,
+        time_s=None if settings.time_s is None else settings.time_s / views,
         seed=settings.seed,
         use_cache=settings.use_cache,
-        progress=progress,
+        progress=report,
     )
-    return replace(view, basis=basis)
+    if settings.use_cache and not cache.is_kept(basis):
+        listen.say(
+            f"the basis could not be kept in {cache.folder()}, so the next run renders it again: "
+            "is the disk full, or the folder not yours?"
+        )
+    if not is_rendered:
+        listen.say(
+            f"basis of {basis.origin.spp} samples per pixel kept from an earlier run "
+            "(use_cache=False renders it anew)"
+        )
+    return basis
 
 
-def _improved(
-    solution: Solution, views: list[PaintedView], settings: Settings, progress: Progress
-) -> Solution:
+def _obtained(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
+    """The basis of each view: handed in, given with the job, kept, or rendered."""
+    if bases is None:
+        return [_basis_of(job, view, listen) for view in job.views]
+    made = list(bases)
+    bases.clear()
+    return made
+
+
+def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:
+    if view.basis is not None:
+        return view.basis
+    assert view.scene is not None
+    return obtain(view.scene, job.settings, _hearing(job, view, listen), views=len(job.views))
+
+
+def _hearing(job: Job, view: PaintedView, listen: Listener) -> Listener:
+    """`listen`, told of which view, where there are several."""
+    return listen if len(job.views) == 1 else labelled(listen, view.folder.name)
+
+
+def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
     """What can be done against noise is done."""
+    settings = job.settings
     if settings.noise_correction:
         solution = correct_noise(solution)
-    scenes = [(view.scene, _basis(view)) for view in views if view.scene is not None]
+    pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
+    scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
     solution = refine_by_rendering(
-        scenes, solution, rounds=settings.refine, seed=settings.seed, progress=progress
+        scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
     )
     lighting = replace(solution.lighting, cd_per_unit=settings.cd_per_unit)
     return replace(solution, lighting=lighting)
 
 
 def _finished(
-    view: PaintedView,
-    analysis: Analysis,
-    relit: Scene | None,
-    settings: Settings,
-    progress: Progress,
+    job: Job, view: PaintedView, analysis: Analysis, relit: Scene | None, listen: Listener
 ) -> Look:
-    """One view predicted, verified and shown in its folder."""
-    basis, scene, solution = _basis(view), view.scene, analysis.solution
+    """A view predicted, verified and shown in its folder."""
+    settings, scene, solution = job.settings, view.scene, analysis.solution
+    basis = solution.basis
     view.folder.mkdir(exist_ok=True)
     predicted = combine(basis, solution.lighting)
     spp = settings.spp or (basis.origin.spp if scene is None else scene.spp)
-    verification = None
+    verification, suggestions = None, None
     if relit is not None and scene is not None:
         if relit.sensor != scene.sensor:
             relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False)
@@ -307,8 +271,12 @@ def _finished(
             spp = max(FEWEST, basis.origin.spp * pixels // checked)
     write_predicted(view.folder / "predicted.exr", predicted, sensor=basis.origin.sensor, spp=spp)
     if relit is not None:
-        verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=progress)
+        verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=listen)
         write_estimate(view.folder / "verified.exr", verification.verified, {})
+    if settings.suggest and scene is not None:
+        suggestions = suggest_lights(
+            scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
+        )
     look = Look(
         target=view.target,
         basis=basis,
@@ -317,119 +285,7 @@ def _finished(
         relit=relit,
         verification=verification,
         analysis=analysis,
-        suggestions=_suggested(view, solution, settings, progress),
+        suggestions=suggestions,
     )
-    show_look(look, view.folder, command=settings.command)
+    write_report(look, view.folder, command=settings.command)
     return look
-
-
-def _suggested(
-    view: PaintedView, solution: Solution, settings: Settings, progress: Progress
-) -> tuple[Suggestion, ...] | None:
-    if not settings.suggest or view.scene is None:
-        return None
-    return suggest_lights(
-        view.scene,
-        _basis(view),
-        solution,
-        count=settings.suggest,
-        seed=settings.seed,
-        progress=progress,
-    )
-
-
-def _progress_of(view: PaintedView, count: int, progress: Progress) -> Progress:
-    return progress if count == 1 else labelled(progress, view.folder.name)
-
-
-def _basis(view: PaintedView) -> Basis:
-    assert view.basis is not None
-    return view.basis
-
-
-def all_constraints(scene: Scene | None, given: Constraints | None) -> Constraints:
-    """What the lights file of `scene` asks, if it has one, and then `given`."""
-    asked = given or Constraints()
-    if scene is None or scene.lights_file is None:
-        return asked
-    return read_constraints(scene.lights_file).and_then(asked)
-
-
-def render_template(
-    scene: Scene,
-    folder: Path,
-    *,
-    view: View | None = None,
-    spp: int | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> list[Path]:
-    """Render something to paint on into `folder`, and return its files (docs/targets.md).
-
-    view: how the look becomes a picture; sRGB by default, at an exposure that shows something.
-    """
-    look = render(
-        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
-    ).image
-    surfaces = render_surfaces(scene, seed=seed, progress=progress)
-    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.film)}")
-    lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
-    template = Template(
-        look,
-        view or View("srgb", choose_exposure(look)),
-        scene=scene.path.name,
-        content=scene.content,
-        sensor=scene.sensor_names[scene.sensor],
-        albedo=surfaces.albedo,
-    )
-    return write_template(
-        folder,
-        template,
-        normals=surfaces.normal,
-        depth=surfaces.depth,
-        mattes=surfaces.coverage,
-        lights=dict(zip(lights.names, lights.images, strict=True)),
-    )
-
-
-def render_look(
-    scene: Scene,
-    path: Path,
-    *,
-    view: View | None = None,
-    spp: int | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Path:
-    """Only the look to paint on, as EXR at `path`; returns the PNG beside it."""
-    look = render(
-        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
-    ).image
-    return write_look(path, look, view or View("srgb", choose_exposure(look)))
-
-
-def relight_look(
-    scene: Scene,
-    lighting: Lighting,
-    folder: Path,
-    *,
-    spp: int | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Scene:
-    """Write relit.xml to `folder`, and its render as relit.exr and relit.png."""
-    path = folder / "relit.xml"
-    files = [*check_relightable(scene, path), folder / "relit.exr", folder / "relit.png"]
-    with restoring(folder, files):
-        relit = relight(scene, lighting, path)
-        image = render(
-            relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
-        )
-        write_estimate(folder / "relit.exr", image, {})
-        write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
-    return relit
-
-
-def command_line(arguments: list[str]) -> str:
-    """The shell command with these arguments, quoted so that it can be pasted."""
-    return shlex.join(["lightpaint", *arguments])

@@ -1,13 +1,15 @@
 """Telling whoever waits how far long work has come, and letting them stop it.
 
 Rooms report through a plain callable, so that a terminal, a notebook and a test can all
-listen; which of them listens is the caller's choice.
+listen; which of them listens is the caller's choice. Who listens to the corridor may hear
+remarks, too.
 """
 
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 
@@ -21,21 +23,57 @@ class Progress(Protocol):
         """
 
 
-def silent(label: str, done: int, total: int, unit: str = "passes") -> None:
-    """The progress report of whoever does not listen."""
+class Listener(Progress, Protocol):
+    """Hears how far the work has come, and what is worth knowing of it."""
+
+    def say(self, text: str) -> None:
+        """A remark, in plain text."""
+
+
+class _Silent:
+    """Listens to nothing."""
+
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Hear no progress."""
+
+    def say(self, text: str) -> None:
+        """Hear no remark."""
+
+
+#: Whoever does not listen.
+silent = _Silent()
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Progress goes to one, remarks to another."""
+
+    progress: Progress
+    remarks: Callable[[str], None]
+
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        self.progress(label, done, total, unit)
+
+    def say(self, text: str) -> None:
+        self.remarks(text)
+
+
+def listener(progress: Progress) -> Listener:
+    """`progress` as a listener: a plain callable lets remarks pass."""
+    return _Split(progress, getattr(progress, "say", silent.say))
 
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C, after what was done has been kept. Its text says how to go on."""
 
 
-def labelled(progress: Progress, name: str) -> Progress:
-    """`progress` whose labels say of what: `verification of balcony`."""
+def labelled(listen: Listener, name: str) -> Listener:
+    """`listen` whose labels say of what: `verification of balcony`."""
 
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-        progress(f"{label} of {name}", done, total, unit)
+        listen(f"{label} of {name}", done, total, unit)
 
-    return report
+    return _Split(report, listen.say)
 
 
 @contextmanager

@@ -1,22 +1,27 @@
 """What can be asked of a solve beside scene and painting."""
 
-from dataclasses import dataclass
-from typing import get_args
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
+from typing import Any, get_args
 
 from lightpaint.colour.view import View
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.optimum import Method
-from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Space
+from lightpaint.scene.film import check_resolution
 from lightpaint.scene.quality import Quality
+
+#: More rounds of rendering and solving again than this are a slip of the pen.
+MAX_REFINE = 100
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a painting is to be answered.
+    """How a painting is to be answered. Raises LightpaintError for a value that means nothing.
 
     What is solved:
-    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
     unpainted: weight of unpainted pixels against the current look.
     method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
     resize: whether a target of another size is resampled.
@@ -44,7 +49,6 @@ class Settings:
     command: the shell command that asks for this, for the report.
     """
 
-    constraints: Constraints | None = None
     unpainted: float = 0.0
     method: Method = "polished"
     resize: bool = False
@@ -63,11 +67,77 @@ class Settings:
     command: str = ""
 
     def __post_init__(self) -> None:
-        if self.space not in get_args(Space):
-            known = " or ".join(get_args(Space))
-            raise LightpaintError(f"no space {self.space!r} to fit in: expected {known}")
+        for field in fields(self):
+            value, (fits, expected) = getattr(self, field.name), _EXPECTED[field.name]
+            if not (fits(value) or (value is None and field.default is None)):
+                raise LightpaintError(f"{field.name} is {value!r}: expected {expected}")
+        if self.spp is not None and self.time_s is not None:
+            raise LightpaintError(
+                f"spp is {self.spp} and time_s {self.time_s:g}: expected a number of samples or a "
+                "time to render for, not both"
+            )
+        if self.resolution is not None:
+            check_resolution(self.resolution)
 
     @property
     def checks_as_basis(self) -> bool:
         """Whether the verification has as many samples as the basis, whatever their films."""
         return self.spp is None and (self.time_s is not None or self.quality is not None)
+
+
+#: Whether a value will do, and what else is expected of it.
+Check = tuple[Callable[[Any], bool], str]
+
+
+def _whole(least: int, most: float = math.inf) -> Check:
+    # bool is an int to Python, and no number to people.
+    def fits(value: Any) -> bool:
+        return isinstance(value, Integral) and not _is_bool(value) and least <= int(value) <= most
+
+    return fits, f"a whole number >= {least}" + (f", at most {most}" if most < math.inf else "")
+
+
+def _number(about: str, *, may_be_zero: bool = False) -> Check:
+    def fits(value: Any) -> bool:
+        if not isinstance(value, Real) or _is_bool(value):
+            return False
+        return 0 < float(value) < math.inf or (may_be_zero and value == 0)
+
+    return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}"
+
+
+def _one_of(words: Any) -> Check:
+    known = get_args(words)
+    expected = " or ".join(map(repr, known))
+    return lambda value: isinstance(value, str) and value in known, expected
+
+
+def _a(kind: type, about: str) -> Check:
+    return lambda value: isinstance(value, kind), about
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+_SWITCH: Check = (_is_bool, "True or False")
+
+_EXPECTED: dict[str, Check] = {
+    "unpainted": _number("a weight", may_be_zero=True),
+    "method": _one_of(Method),
+    "resize": _SWITCH,
+    "space": _one_of(Space),
+    "view": _a(View, "a View, like View('agx', 1.0)"),
+    # Two halves of the samples tell the noise.
+    "spp": _whole(2),
+    "time_s": _number("seconds"),
+    "seed": _whole(0),
+    "resolution": _a(str, "a part of the film like '1/4' or '320x180'"),
+    "quality": _one_of(Quality),
+    "use_cache": _SWITCH,
+    "noise_correction": _SWITCH,
+    "refine": _whole(0, MAX_REFINE),
+    "suggest": _whole(0),
+    "cd_per_unit": _number("cd/m²"),
+    "command": _a(str, "the text of a shell command"),
+}

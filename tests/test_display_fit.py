@@ -161,5 +161,5 @@ def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):
 
 
 def test_a_space_that_there_is_none(folder: Path):
-    with pytest.raises(LightpaintError, match="no space 'Display' to fit in: expected linear or"):
+    with pytest.raises(LightpaintError, match="space is 'Display': expected 'linear' or 'display'"):
         lp.paint_with_light(None, "odd.exr", "a", basis="room.basis.exr", space="Display")

@@ -20,7 +20,7 @@ from lightpaint.lighting.analysis.uncertainty import error_bars
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
-from lightpaint.pipeline import paint_views_with_light
+from lightpaint.pipeline import paint_with_light
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 
@@ -216,7 +216,7 @@ def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
         if label == "verification of close":
             alive.extend(ref() is not None for ref in watched)
 
-    paint_views_with_light(scenes, targets, tmp_path / "out", bases=made, spp=4, progress=look)
+    paint_with_light(scenes, targets, tmp_path / "out", basis=made, spp=4, progress=look)
     assert made == []
     assert alive
     assert not any(alive)
@@ -230,8 +230,8 @@ def test_paintings_of_two_views_seen_through_two_transforms(room: Path, tmp_path
         for s, view in zip(scenes, shown, strict=True)
     ]
     with pytest.raises(TargetError, match=r"seen through agx at \+1 stops and srgb"):
-        paint_views_with_light(scenes, targets, tmp_path / "out", spp=4, space="display")
-    looks = paint_views_with_light(
+        paint_with_light(scenes, targets, tmp_path / "out", spp=4, space="display")
+    looks = paint_with_light(
         scenes, targets, tmp_path / "out", spp=4, space="display", view=View("srgb")
     )
     assert len(looks) == 2
@@ -243,5 +243,5 @@ def test_a_file_where_a_view_s_folder_is_to_be(room: Path, tmp_path: Path) -> No
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "close").write_text("mine", encoding="utf-8")
     with pytest.raises(OutputError, match=r"cannot write into .*close"):
-        paint_views_with_light(scenes, targets, tmp_path / "out", spp=4)
+        paint_with_light(scenes, targets, tmp_path / "out", spp=4)
     assert (tmp_path / "out" / "close").read_text(encoding="utf-8") == "mine"

@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """The command line: one sub-command per room. Parses, calls, prints; no more.
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: `verify` found
@@ -5,11 +6,13 @@ a disagreement; 2: something the user can mend, said in one line; 130: interrupt
 """
 
 import io
+import os
 import sys
 import warnings
 from collections.abc import Sequence
 
 from lightpaint.cli.parser import command_parser
+from lightpaint.cli.words import spoken
 from lightpaint.errors import LightpaintError
 
 
@@ -20,17 +23,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # A terminal that lacks a character shows another, and loses no result over it.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    options = command_parser().parse_args(given)
+    parser = command_parser()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what could be typed
+        from lightpaint.cli.completion import complete
+
+        complete(parser)
+    options = parser.parse_args(given)
     try:
         # What a command needs is imported when it runs: --help answers at once.
         from lightpaint.cli import commands
+        from lightpaint.cli.options import values_of
         from lightpaint.scene.variant import SlowBackendWarning
 
         # The commands say it in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
-        return int(getattr(commands, options.command)(options, given))
+        return int(getattr(commands, options.command)(**values_of(options, given)))
     except LightpaintError as error:
-        print(f"lightpaint {options.command}: {error}", file=sys.stderr)
+        print(f"lightpaint {options.command}: {spoken(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
         how_to_go_on = f": {interrupt}" if str(interrupt) else ""

@@ -1,7 +1,7 @@
 """What each sub-command does: calls of the corridor, and tables of what came out."""
 
 import json
-from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,41 +11,53 @@ from lightpaint.basis import cache as bases
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import tables, terminal
 from lightpaint.cli.doctor import examine
-from lightpaint.cli.options import folders_of, load, render_or_find, view_of
-from lightpaint.cli.solve import solve
+from lightpaint.cli.options import folders_of, is_folder
+from lightpaint.colour.view import View
 from lightpaint.errors import OutputError
 from lightpaint.files import check_writable
+from lightpaint.job import Job
 from lightpaint.lighting.lighting import read_lighting
-from lightpaint.pipeline import relight_look, render_look, render_template
+from lightpaint.pipeline import obtain, run
+from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import scene_of
+from lightpaint.remarks import remarks_of_memory, remarks_of_scene
+from lightpaint.renders import relight_look, render_look, render_template
 from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film
+from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.settings import Settings
+from lightpaint.sources import SceneFile
 from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
 
 __all__ = ["basis", "cache", "doctor", "lights", "relight", "solve", "template", "verify"]
 
 
-def lights(options: Namespace, _given: list[str]) -> int:
+def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int:
     """`lightpaint lights SCENE`"""
-    scene = load(options)
-    if options.json:
-        listed = [tables.described(light, options.cd_per_unit) for light in scene.lights]
-        scale = {} if options.cd_per_unit is None else {"cd_per_unit": options.cd_per_unit}
-        data = {"scene": str(scene.path), **scale, "lights": listed}
+    loaded = scene.content
+    for remark in remarks_of_scene(loaded):
+        terminal.say(remark)
+    if as_json:
+        listed = [tables.described(light, cd_per_unit) for light in loaded.lights]
+        scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
+        data = {"scene": str(loaded.path), **scale, "lights": listed}
         terminal.write(json.dumps(data, indent=2))
         return 0
-    tables.show_lights(scene, options.cd_per_unit)
+    tables.show_lights(loaded, cd_per_unit)
     return 0
 
 
-def basis(options: Namespace, _given: list[str]) -> int:
+def basis(*, scene: SceneFile, output: Path, settings: Settings) -> int:
     """`lightpaint basis SCENE -o F.basis.exr`"""
-    output = Path(options.output or Path(options.scene).stem + ".basis.exr")
-    _check_suffix(output)
+    if output.suffix.lower() != ".exr":
+        raise OutputError(f"{output} must end in .exr, the format that is written")
     check_writable(output.parent)
-    scene = on_film(load(options), options.quality, options.resolution)
-    made = render_or_find(scene, options)
+    loaded = on_film(scene.content, settings.quality, settings.resolution)
+    with terminal.Listener() as listen:
+        for remark in (*remarks_of_scene(loaded), *remarks_of_memory(loaded)):
+            listen.say(remark)
+        made = obtain(loaded, settings, listen)
     write_basis(output, made)
     kept = " and what is kept" if made.is_fixed.any() else ""
     count = int((~made.is_fixed).sum())
@@ -53,82 +65,91 @@ def basis(options: Namespace, _given: list[str]) -> int:
     return 0
 
 
-def template(options: Namespace, _given: list[str]) -> int:
+def template(
+    *, scene: SceneFile, output: Path, view: View | None, settings: Settings, force: bool
+) -> int:
     """`lightpaint template SCENE -o DIR`"""
-    output = Path(options.output or "template")
-    only_look = output.suffix.lower() == ".exr"
-    painted_on = [output, output.with_suffix(".png")] if only_look else earlier_files(output)
-    for file in painted_on:
-        if file.exists() and not options.force:
-            raise OutputError(
-                f"{file} exists and may have been painted on: choose another name with -o, or "
-                "pass --force"
-            )
-    if not only_look and output.suffix.lower() in (".png", ".tif", ".tiff", ".jpg", ".jpeg"):
-        raise OutputError(
-            f"{output} is no folder: name one with -o, or a file that ends in .exr (a PNG comes "
-            "along)"
-        )
-    if not only_look and output.is_file():
-        raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
-    check_writable(output.parent if only_look else output)
-    asked = view_of(options)
-    view = None if asked.is_open else asked.over(None)
-    scene = load(options, is_to_solve=False, with_lights_file=not only_look)
-    if options.resolution:
-        scene = scene.reduced(options.resolution)
-    how: dict[str, Any] = {"view": view, "spp": options.spp, "seed": options.seed}
-    with terminal.progress() as progress:
-        if only_look:
-            picture = render_look(scene, output, progress=progress, **how)
+    _check_template(output, force=force)
+    loaded = _loaded(scene)
+    if settings.resolution:
+        loaded = loaded.reduced(settings.resolution)
+    how: dict[str, Any] = {"view": view, "spp": settings.spp, "seed": settings.seed}
+    linear, picture = output / LIGHT, output / SHOWN
+    with terminal.Listener() as listen:
+        if is_folder(output):
+            render_template(loaded, output, progress=listen, **how)
         else:
-            render_template(scene, output, progress=progress, **how)
-            picture = output / SHOWN
-    linear = output if only_look else output / LIGHT
+            linear, picture = output, render_look(loaded, output, progress=listen, **how)
     terminal.write(f"{linear}: paint over it in linear light, in a program that knows EXR")
     terminal.write(
         f"{picture}: the same in 16 bits, for any program: paint over it and save as PNG"
     )
-    if not only_look:
+    if is_folder(output):
         terminal.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
     return 0
 
 
-def relight(options: Namespace, _given: list[str]) -> int:
+def solve(*, jobs: Sequence[Job]) -> int:
+    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`"""
+    listen, obtained = terminal.Listener(), None
+    # Those of all before the first is run, which says its own again: once is enough.
+    for remark in (remark for job in jobs for remark in job.remarks):
+        listen.say(remark)
+    for job in jobs:
+        with listen:
+            looks = run(job, listen, bases=obtained)
+        # Several paintings of one scene share its basis.
+        obtained = [look.basis for look in looks]
+        for view, look in zip(job.views, looks, strict=True):
+            if job.by_sensor:
+                terminal.write(f"\n{look.basis.origin.sensor}:")
+            tables.show_look(look, view.folder)
+            if look.suggestions is not None:
+                tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
+        if job.groups is not None:
+            there = ", ".join(name for name in EXPORTS if (job.folder / name).is_file())
+            terminal.write(f"for other programs: {there}")
+    if not jobs[0].scenes and jobs[0].groups is None:
+        terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
+    return 0
+
+
+def relight(
+    *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
+) -> int:
     """`lightpaint relight SCENE lighting.json...`"""
-    answers = [read_lighting(path) for path in options.lightings]
-    names = [a.target or Path(p).stem for a, p in zip(answers, options.lightings, strict=True)]
-    folders = folders_of(options.output, names)
-    scene = load(options, is_to_solve=False)
+    answers = [read_lighting(path) for path in lightings]
+    names = [a.target or path.stem for a, path in zip(answers, lightings, strict=True)]
+    folders = folders_of(output, names)
+    loaded = _loaded(scene)
     for folder in folders:
         check_writable(folder)
     for lighting, folder in zip(answers, folders, strict=True):
-        if lighting.scene_identity not in ("", scene_of(scene, lighting).identity):
+        if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
             terminal.say(f"{folder}: the lighting was solved for another state of the scene")
-        with terminal.progress() as progress:
-            relight_look(
-                scene, lighting, folder, spp=options.spp, seed=options.seed, progress=progress
-            )
+        with terminal.Listener() as listen:
+            how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
+            relight_look(loaded, lighting, folder, progress=listen, **how)
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
     return 0
 
 
-def verify(options: Namespace, _given: list[str]) -> int:
+def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> int:
     """`lightpaint verify DIR...`"""
-    use_variant(options.variant)
+    use_variant(variant)
     agree = True
-    folders = [view for folder in options.folders for view in result_folders(Path(folder))]
-    for folder in folders:
-        with terminal.progress() as progress:
-            result = verify_result(folder, spp=options.spp, seed=options.seed, progress=progress)
+    for folder in (view for given in folders for view in result_folders(given)):
+        with terminal.Listener() as listen:
+            how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
+            result = verify_result(folder, progress=listen, **how)
         terminal.write(f"{folder}: {tables.spoken_agreement(result)}")
         agree &= result.agrees
     return 0 if agree else 1
 
 
-def cache(options: Namespace, _given: list[str]) -> int:
+def cache(*, action: str) -> int:
     """`lightpaint cache [clear]`"""
-    if options.action == "clear":
+    if action == "clear":
         terminal.write(f"{bases.clear()} deleted from {bases.folder()}")
         return 0
     table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
@@ -144,9 +165,9 @@ def cache(options: Namespace, _given: list[str]) -> int:
     return 0
 
 
-def doctor(options: Namespace, _given: list[str]) -> int:
+def doctor(*, variant: str | None) -> int:
     """`lightpaint doctor`"""
-    findings = examine(options.variant)
+    findings = examine(variant)
     for finding in findings:
         mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
         terminal.write(f"{finding.what:18s} {mark:8s} {finding.found}")
@@ -158,6 +179,29 @@ def doctor(options: Namespace, _given: list[str]) -> int:
     return 2 if missing else 0
 
 
-def _check_suffix(path: Path) -> None:
-    if path.suffix.lower() != ".exr":
-        raise OutputError(f"{path} must end in .exr, the format that is written")
+def _check_template(output: Path, *, force: bool) -> None:
+    """Raise OutputError for a place that a template cannot or should not go to."""
+    is_tree = is_folder(output)
+    painted_on = earlier_files(output) if is_tree else [output, output.with_suffix(".png")]
+    for file in painted_on:
+        if file.exists() and not force:
+            raise OutputError(
+                f"{file} exists and may have been painted on: choose another name with -o, or "
+                "pass --force"
+            )
+    if output.suffix.lower() in (".png", ".tif", ".tiff", ".jpg", ".jpeg"):
+        raise OutputError(
+            f"{output} is no folder: name one with -o, or a file that ends in .exr (a PNG comes "
+            "along)"
+        )
+    if is_tree and output.is_file():
+        raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
+    check_writable(output if is_tree else output.parent)
+
+
+def _loaded(scene: SceneFile) -> Scene:
+    """The scene, of whose lights only the sum counts."""
+    loaded = scene.content
+    if note := use_variant().note:
+        terminal.say(note)
+    return loaded

@@ -1,109 +1,196 @@
-"""What the options of a command give: scenes, bases, constraints, places for results."""
+"""From options to jobs and values: what each command is called with.
 
+Nothing else reads the Namespace. `solve --lights FILE.exr TARGET` and `solve FILE.exr TARGET`
+both mean another renderer's light groups; `--lights key,fill` goes on to mean the lights of a
+scene.
+"""
+
+import shlex
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import memory_needed, why_not_one_pass
-from lightpaint.cli import terminal
+from lightpaint.basis.file import is_basis_file
+from lightpaint.basis.lightgroups.read import is_light_groups
 from lightpaint.colour.view import ViewChoice
-from lightpaint.errors import OutputError
+from lightpaint.errors import BasisError, OutputError, TargetError
+from lightpaint.job import Job, check_needed
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.scene.quality import samples
-from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.scene.variant import use_variant
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.settings import Settings
+from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
+
+#: Options that say how a scene is loaded, by the names that Python has for them.
+LOADING = ("sensor", "parameters", "variant", "lights", "groups")
 
 
-def load(
-    options: Namespace,
-    *,
-    path: Path | None = None,
-    is_to_solve: bool = True,
-    is_first: bool = True,
-    with_lights_file: bool = False,
-) -> Scene:
-    """The scene that was asked for, and what is worth knowing of it.
+def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
+    """The arguments that the function of a command takes. given: as they were typed."""
+    asked, settings = vars(options), settings_of(options, given)
+    output = Path(asked["output"]) if asked.get("output") else None
+    match options.command:
+        case "lights":
+            unit = options.cd_per_unit
+            return {"scene": scene_of(options), "as_json": options.json, "cd_per_unit": unit}
+        case "basis":
+            output = output or Path(Path(options.scene).stem + ".basis.exr")
+            return {"scene": scene_of(options), "output": output, "settings": settings}
+        case "template":
+            output, view = output or Path("template"), view_of(options)
+            # Which lights go together is shown in the folder, and nowhere else.
+            tied = is_folder(output)
+            return {
+                "scene": scene_of(options, is_to_solve=False, use_lights_file=tied),
+                "output": output,
+                "view": None if view.is_open else view.over(None),
+                "settings": settings,
+                "force": options.force,
+            }
+        case "solve":
+            return {"jobs": jobs_of(options, settings)}
+        case "relight":
+            scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+            paths = list(map(Path, options.lightings))
+            return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
+        case "verify":
+            folders = list(map(Path, options.folders))
+            return {"folders": folders, "variant": options.variant, "settings": settings}
+        case "cache":
+            return {"action": options.action}
+        case _:
+            return {"variant": options.variant}
 
-    is_to_solve: whether its lights are looked at, and not only their sum. is_first: whether
-    anything is to be said that would be said again of another view. with_lights_file: whether
-    the one beside the scene ties lights that no option does.
-    """
-    chosen: dict[str, Any] = {"use_lights_file": with_lights_file}
+
+def is_folder(output: Path) -> bool:
+    """Whether a template goes to a folder, and not only to an EXR and a PNG."""
+    return output.suffix.lower() != ".exr"
+
+
+def settings_of(options: Namespace, given: Sequence[str]) -> Settings:
+    """What the options say of `Settings`; those without an option are as by default."""
+    # A view is of the painting, which has it; the command is the whole line.
+    names = {field.name for field in fields(Settings)} - {"view", "command"}
+    said = {name: value for name, value in vars(options).items() if name in names}
+    return Settings(**said, command=shlex.join(["lightpaint", *given]))
+
+
+def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> SceneFile:
+    """The scene that was asked for. is_to_solve: whether its lights are chosen."""
+    path = options.source if options.command == "solve" else options.scene
     if is_to_solve:
-        chosen = {
+        how |= {
             "lights": options.lights,
             "groups": _groups(options.groups),
             "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
         }
-    scene = load_scene(
-        path or options.scene,
-        sensor=options.sensor,
-        parameters=dict(options.parameters),
-        variant=options.variant,
-        **chosen,
-    )
-    if not is_first:
-        return scene
-    if is_to_solve:
-        if scene.lights_file is not None:
-            terminal.say(f"lights and groups as in {scene.lights_file}")
-        obstacles = [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]
-        if obstacles:
-            terminal.say(f"left as it is: {'; '.join(obstacles)}")
-    # Python gets the same as a warning.
-    if note := use_variant().note:
-        terminal.say(note)
-    elif is_to_solve and (reason := why_not_one_pass(scene)):
-        terminal.say(
-            f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
-        )
-    return scene
+    loading = {"sensor": options.sensor, "variant": options.variant, **how}
+    return SceneFile(path, parameters=dict(options.parameters), **loading)
 
 
-def render_or_find(scene: Scene, options: Namespace, *, time_s: float | None = None) -> Basis:
-    """Render the basis, or say that it was there already.
+def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
+    """What `solve` is asked for, a job for each painting or one for several views.
 
-    time_s: instead of what the options say.
+    All are born, and so checked, before the first is run.
     """
-    if (needed := memory_needed(scene)) > 2e9:
-        terminal.say(
-            f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "
-            f"{needed / 1e9:.1f} GB of memory at most"
+    basis = basis_of(options)
+    if options.views and options.targets:
+        raise TargetError("TARGET and --target at once: give every painting with its sensor")
+    paths = options.targets or [path for _, path in options.views]
+    if not paths:
+        raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
+    paintings = [
+        Painting(
+            path,
+            mask=mask,
+            layer=options.layer,
+            view=view_of(options),
+            template=options.template,
+            find=options.find_template,
+            paint=options.paint,
         )
-    rendered = False
-    with terminal.progress() as report:
+        for path, mask in zip(paths, _one_for_each(options.masks or [None], paths), strict=True)
+    ]
+    asked = constraints_of(options)
+    if basis is not None and options.lights_file:
+        asked = read_constraints(options.lights_file).and_then(asked)
+    if options.views:
+        if options.sensor:
+            raise TargetError("-s cannot be had with --target, which names the sensors")
+        scenes = tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
+        folder = Path(options.output or Path(paths[0]).stem)
+        return [Job(scenes, tuple(paintings), folder, None, asked, settings, by_sensor=True)]
+    # One scene, which is loaded once for all.
+    source = () if basis is not None else (scene_of(options),)
+    folders = folders_of(options.output and Path(options.output), [Path(p).stem for p in paths])
+    return [
+        Job(source, (painting,), folder, basis, asked, settings)
+        for painting, folder in zip(paintings, folders, strict=True)
+    ]
 
-        def progress(label: str, done: int, total: int, unit: str = "passes") -> None:
-            nonlocal rendered
-            rendered = True
-            if getattr(options, "views", None):
-                label += f" of {scene.sensor_names[scene.sensor]}"
-            report(label, done, total, unit)
 
-        made = obtain_basis(
-            scene,
-            spp=samples(options.quality, spp=options.spp, time_s=options.time_s),
-            time_s=options.time_s if time_s is None else time_s,
-            seed=options.seed,
-            use_cache=options.cache,
-            progress=progress,
+def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
+    """The basis or the light groups that `solve` starts from; None where it is a scene.
+
+    Where `--lights` names the light groups, the source is put in front of the targets, since it
+    is one. Raises BasisError for options that a basis without its scene has no use of.
+    """
+    source, names = Path(options.source), options.lights
+    given = ",".join(names or ())
+    basis: BasisFile | GroupsFile
+    if given and _is_file_to_be(given, source):
+        _check_light_groups(given)
+        basis, names = GroupsFile(given, options.pattern), None
+        options.targets = [options.source, *options.targets]
+    elif source.suffix.lower() != ".xml" and is_light_groups(source):
+        basis = GroupsFile(options.source, options.pattern)
+    elif options.pattern:
+        raise BasisError(
+            f"--pattern names the layers of light groups, and {source} has none: leave it out, or "
+            "give the EXR"
         )
-    if options.cache and not cache.is_kept(made):
-        terminal.say(
-            f"the basis could not be kept in {cache.folder()}, so the next run renders it again: "
-            "is the disk full, or the folder not yours?"
+    elif is_basis_file(source):
+        basis = BasisFile(options.source)
+    else:
+        return None
+    if options.views:
+        raise BasisError(
+            f"--target cannot be had from {basis.path}, which has one view only: give the scene, "
+            "to solve for several"
         )
-    if not rendered:
-        terminal.say(
-            f"basis of {made.origin.spp} samples per pixel kept from an earlier run "
-            "(--no-cache renders it anew)"
+    is_groups = isinstance(basis, GroupsFile)
+    idle = [name for name in LOADING if getattr(options, name) and name != "lights"]
+    check_needed([*idle, *(["lights"] if names and not is_groups else [])], basis)
+    if names:
+        raise BasisError(
+            f"--lights {given} chooses lights of a scene: of light groups, keep the "
+            "others as they are with --lock NAME"
         )
-    return made
+    return basis
+
+
+def _is_file_to_be(given: str, source: Path) -> bool:
+    """Whether `--lights` means a file or folder, and not lights of a scene or a basis."""
+    if given.lower().endswith(".exr"):
+        return True
+    # A folder may well have the name of a light: results are kept in such.
+    return source.suffix.lower() != ".xml" and Path(given).is_dir()
+
+
+def _check_light_groups(given: str) -> None:
+    """Raise BasisError for a `--lights` that names something else."""
+    path = Path(given)
+    if not path.exists():
+        raise BasisError(f"no such file or folder of light groups: --lights {given}")
+    if path.is_dir() and not is_light_groups(path):
+        raise BasisError(f"--lights {given} is a folder without an .exr file")
+    if not is_light_groups(path):
+        raise BasisError(
+            f"--lights {given} holds no light groups: give an EXR of another renderer's, or a "
+            "folder of them; a basis of lightpaint's own stands where the scene does"
+        )
 
 
 def view_of(options: Namespace) -> ViewChoice:
@@ -128,16 +215,16 @@ def constraints_of(options: Namespace) -> Constraints:
     )
 
 
-def folders_of(output: str | None, names: Sequence[str]) -> list[Path]:
+def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
     """One result folder per name: DIR itself for a single one, DIR/<name> for several."""
     for name in names:
         if Path(name).name != name or name == "..":
             raise OutputError(f"{name!r} is no name for a folder: choose one with -o")
     if len(names) == 1:
-        return [Path(output or names[0])]
+        return [output or Path(names[0])]
     if len(set(names)) < len(names):
         raise OutputError(f"results would overwrite each other: {', '.join(names)}")
-    return [Path(output or ".") / name for name in names]
+    return [(output or Path()) / name for name in names]
 
 
 def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
@@ -146,3 +233,13 @@ def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
     for name, members in given:
         groups[name] = groups.get(name, []) + members
     return groups
+
+
+def _one_for_each(masks: list[str | None], targets: list[str]) -> list[str | None]:
+    if len(masks) == 1:
+        return masks * len(targets)
+    if len(masks) != len(targets):
+        raise TargetError(
+            f"{len(masks)} masks for {len(targets)} targets: give one for all, or one for each"
+        )
+    return masks

@@ -1,5 +1,6 @@
 """What commands print of scenes and answers: tables, and sentences below them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +9,16 @@ from rich.markup import escape
 
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.placement.suggest import Suggestion
 from lightpaint.relit.verify import Verification
 from lightpaint.report.sentences import (
     how_sure,
     relative_errors,
     spoken_error,
+    spoken_percent,
     what_is_missed,
 )
+from lightpaint.report.suggestion import spoken_position, spoken_suggestions
 from lightpaint.report.verdict import agreement, energy_shares, verdict
 from lightpaint.results import Look
 from lightpaint.scene.emission import MULTIPLE
@@ -162,3 +166,32 @@ def spoken_agreement(result: Verification) -> str:
         f"{agreement(result)}; RMSE {result.rmse:.2g} (noise {result.noise_rmse:.2g}), "
         f"ΔE {result.delta_e_mean:.1f}"
     )
+
+
+def show_suggestions(
+    suggestions: Sequence[Suggestion], *, cd_per_unit: float | None = None
+) -> None:
+    """Print the lights that would help, and their XML."""
+    terminal.write("")
+    terminal.write(spoken_suggestions(suggestions))
+    if not suggestions:
+        return
+    headings = ("suggested light", "at", "intensity R G B", "unit", "takes away", "left", "colour")
+    amounts = () if cd_per_unit is None else ("luminous", "flux")
+    table = terminal.table(*headings, *amounts)
+    for light in suggestions:
+        seen = light.photometry(cd_per_unit)
+        table.add_row(
+            light.name,
+            spoken_position(light),
+            terminal.numbers(light.emission),
+            "W/sr",
+            spoken_percent(light.gain_share),
+            spoken_percent(light.missed_share),
+            seen.color,
+            *seen.amounts[: len(amounts)],
+        )
+    terminal.print_table(table)
+    terminal.write("to be pasted into <scene>, and solved again:")
+    for light in suggestions:
+        terminal.write(light.xml)

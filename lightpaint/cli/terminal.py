@@ -3,15 +3,20 @@
 import io
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from rich.table import Table
 
+from lightpaint.cli.words import spoken
 from lightpaint.errors import OutputError
-from lightpaint.progress import Progress as Report
 
 
 def numbers(rgb: tuple[float, float, float]) -> str:
@@ -49,33 +54,55 @@ def write(text: str) -> None:
 
 def say(text: str) -> None:
     """A remark, to stderr."""
-    print(f"lightpaint: {text}", file=sys.stderr)
+    print(f"lightpaint: {spoken(text)}", file=sys.stderr)
 
 
-@contextmanager
-def progress() -> Iterator[Report]:
-    """Report to the terminal; in a log, one line per piece of work that is finished."""
-    if not sys.stderr.isatty():
-        yield _report_line
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks = {}
+class Listener:
+    """Hears progress and remarks, and shows them on stderr; of equal remarks the first.
 
-        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-            if label not in tasks:
-                what = label if unit == "passes" else f"{label} ({unit})"
-                tasks[label] = bars.add_task(what, total=total)
-            bars.update(tasks[label], completed=done, total=total)
+    On a terminal bars are shown while it is entered; in a log it is one line for each piece of
+    work that begins.
+    """
 
-        yield report
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+        self._bars: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
 
+    def __enter__(self) -> "Listener":
+        if sys.stderr.isatty():
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+            )
+            self._bars = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bars.start()
+        return self
 
-def _report_line(label: str, done: int, total: int, unit: str = "passes") -> None:
-    if done == 0:
-        print(f"{label}: {total} {unit}", file=sys.stderr, flush=True)
+    def __exit__(self, *_: object) -> None:
+        if self._bars is not None:
+            self._bars.stop()
+        self._bars, self._tasks = None, {}
+
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Show that `done` of `total` pieces of the work `label` are finished."""
+        if self._bars is None:
+            if done == 0:
+                print(f"{label}: {total} {unit}", file=sys.stderr, flush=True)
+            return
+        if label not in self._tasks:
+            what = label if unit == "passes" else f"{label} ({unit})"
+            self._tasks[label] = self._bars.add_task(what, total=total)
+        self._bars.update(self._tasks[label], completed=done, total=total)
+
+    def say(self, text: str) -> None:
+        """A remark, above the bars if there are any."""
+        if text in self._said:
+            return
+        self._said.add(text)
+        if self._bars is None:
+            say(text)
+            return
+        self._bars.console.out(f"lightpaint: {spoken(text)}", highlight=False)

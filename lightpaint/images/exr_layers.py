@@ -130,13 +130,13 @@ def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
         if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
             raise ImageError(
                 f"has {len(layers)} layers of Krita ({_names(layers)}) and no merged picture: "
-                "flatten the image and export it again, or name the painted one with --layer"
+                "flatten the image and export it again, or name the painted one with layer=..."
             )
         plain = [layer for layer in layers if not layer.prefix] or layers
         if len(plain) > 1:
             raise ImageError(
                 f"has {len(plain)} layers ({_names(plain)}), and which of them is meant cannot be "
-                "told: name it with --layer, or export a single image"
+                "told: name it with layer=..., or export a single image"
             )
         return plain[0]
     for named in (

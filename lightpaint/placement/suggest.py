@@ -89,7 +89,7 @@ def check_suggestible(scene: Scene) -> None:
     """Raise SceneError for a scene that no lights can be suggested for, before it renders."""
     if reason := why_not_one_pass(scene):
         raise SceneError(
-            f"--suggest renders many lights in one pass, and {reason}: leave it out, or use "
+            f"suggesting lights renders many in one pass, and {reason}: leave it out, or use "
             "the integrator path and a variant like llvm_ad_rgb"
         )
 
@@ -112,7 +112,7 @@ def suggest_lights(
     Raises SceneError for scenes that one pass cannot serve (see `check_suggestible`).
     """
     if count < 1:
-        raise SceneError(f"--suggest {count}: ask for one light or more")
+        raise SceneError(f"{count} lights cannot be suggested: ask for one or more")
     check_suggestible(scene)
     norm2 = float(solution.norm2.sum())
     if sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:

@@ -119,7 +119,7 @@ def tag(element: str, /, **attributes: str) -> str:
         if "$" in value:
             raise SceneError(
                 f"cannot write <{element} {key}={value!r}>: Mitsuba reads $ as the start of a "
-                "parameter; rename the folder or file, or choose another value for -D"
+                "parameter; rename the folder or file, or choose other parameters=..."
             )
     listed = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
     return f"<{element}{listed}/>"

@@ -58,7 +58,7 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
     return (
         f"More samples would change {light}, by {change} (95 %); "
-        f"--spp {halving_spp(basis, uncertainty, k)} halves that."
+        f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
     )
 
 

@@ -64,7 +64,7 @@ def _members_of_groups(
     group_of: dict[str, str] = {}
     for group, patterns in groups.items():
         if not group:
-            raise SceneError("a group needs a name: write name=a,b,c")
+            raise SceneError("a group needs a name: its members are given by it")
         listed = _listed(patterns, f"group {group!r}")
         for pattern in listed:
             found = _matching(pattern, names, f"group {group!r}", scene)

@@ -70,15 +70,21 @@ def reductions(film: Film) -> list[int]:
     return [factor for factor in range(1, common + 1) if common % factor == 0]
 
 
+def check_resolution(resolution: str) -> re.Match[str]:
+    """Its numbers. Raises SceneError for what is neither a part, `1/4`, nor a size, `320x180`."""
+    given = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
+    if given is None:
+        raise SceneError(f"{resolution!r} is no resolution: give 1/4, say, or 320x180")
+    return given
+
+
 def reduction(film: Film, resolution: str) -> int:
     """The factor that `resolution`, `1/4` or `320x180`, means for `film`.
 
     A size is that of the image, so of the crop window. Raises SceneError if it is neither,
     or if film or crop window are not whole multiples of it.
     """
-    given = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
-    if given is None:
-        raise SceneError(f"{resolution!r} is no resolution: give 1/4, say, or 320x180")
+    given = check_resolution(resolution)
     part, width, height = (int(number or 0) for number in given.groups())
     factor = part if given[1] else None
     if width and height:

@@ -263,5 +263,5 @@ def mitsuba_errors(path: Path) -> Iterator[None]:
             text = "it, or a file that it refers to, has a name that is not UTF-8"
         text = one_line(text, limit=MAX_SAID)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
-        hint = f"; set it with -D {undefined[1]}=VALUE" if undefined else ""
+        hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
         raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error

@@ -48,7 +48,7 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
         raise SizeError(
             f"the painting is {picture.size[1]}x{picture.size[0]} but its template is "
             f"{template.size[1]}x{template.size[0]}: export it at that size, or say by alpha or "
-            "--mask what was painted"
+            "mask=... what was painted"
         )
     difference, tolerance = _difference(path, picture, template)
     # The slope is smooth at both ends, so that nothing is decided by a hair's breadth.

@@ -154,13 +154,13 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     if share == 0:
         raise TargetError(
             f"nothing in {path} differs from the template in {reading.folder}: paint over it, or "
-            "pass --no-template if all of it counts"
+            "pass find=False if all of it counts"
         )
     note = f"{100 * share:.3g} % painted: what differs from the template in {reading.folder}"
     if share > NEARLY_ALL:
         note += (
-            "; if you painted less, it was saved through another view or profile (--view, --mask), "
-            "or moved, cropped or flipped"
+            "; if you painted less, it was saved through another view or profile (view=..., "
+            "mask=...), or moved, cropped or flipped"
         )
     return importance, [note]
 
@@ -170,7 +170,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
             f"to take {reading.path} for light its template is needed, which knows what surfaces "
-            "reflect: give the folder that lightpaint template wrote, --template DIR"
+            "reflect: give the folder that lightpaint template wrote as template=..."
         )
     albedo = reading.template.albedo
     # Metals, glass and what is not there reflect no diffuse light: nothing can be said of it.
@@ -202,6 +202,6 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
         return []
     return [
         f"{100 * share:.0f} % of the paint asks surfaces for a colour that they hardly reflect, so "
-        f"for more than {BEYOND:g} times the light of the template's brightest parts: --paint "
-        "light paints the light instead"
+        f"for more than {BEYOND:g} times the light of the template's brightest parts: "
+        'paint="light" paints the light instead'
     ]

@@ -183,13 +183,13 @@ class Target:
         if self.size != size and not resize:
             raise SizeError(
                 f"target {self.name} is {self.size[1]}x{self.size[0]} but the basis is "
-                f"{size[1]}x{size[0]}: export it at that size, or pass --resize"
+                f"{size[1]}x{size[0]}: export it at that size, or pass resize=True"
             )
         (height, width), (mine_h, mine_w) = size, self.size
         if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
             raise SizeError(
                 f"target {self.name} is {mine_w}x{mine_h}, of another shape than the basis with "
-                f"{width}x{height}: crop it to that shape, --resize does not stretch"
+                f"{width}x{height}: crop it to that shape, since resize=True does not stretch"
             )
         return self.resized(size)
 

@@ -278,7 +278,7 @@ def test_results_of_two_solves_never_stand_together(
 
 
 def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
-    command = f"{sys.executable} -m lightpaint.cli.parser solve {basis_file} {WARM} {COOL} -o out"
+    command = f"{sys.executable} -m lightpaint solve {basis_file} {WARM} {COOL} -o out"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command} | true"],
         cwd=tmp_path,
@@ -442,7 +442,7 @@ def test_interrupted_keeps_what_is_done_and_goes_on(tmp_path: Path, delay_s: flo
     command = [
         sys.executable,
         "-m",
-        "lightpaint.cli.parser",
+        "lightpaint",
         "basis",
         str(CORNELL),
         "--spp",

@@ -209,13 +209,13 @@ def test_names_that_are_taken_are_not_given(tmp_path: Path):
 
 def test_what_one_pass_cannot_do_is_refused(tmp_path: Path):
     scene = load_scene(write_room(tmp_path, integrator='<integrator type="ptracer"/>'))
-    with pytest.raises(SceneError, match=r"--suggest .* the integrator is 'ptracer'"):
+    with pytest.raises(SceneError, match=r"suggesting lights .* the integrator is 'ptracer'"):
         check_suggestible(scene)
     basis = render_basis(load_scene(write_room(tmp_path)), spp=2)
     solution = solve(basis, _target(np.ones((20, 24, 3))))
     with pytest.raises(SceneError, match="the integrator is 'ptracer'"):
         suggest_lights(scene, basis, solution)
-    with pytest.raises(SceneError, match="--suggest 0: ask for one light or more"):
+    with pytest.raises(SceneError, match="0 lights cannot be suggested: ask for one or more"):
         suggest_lights(load_scene(write_room(tmp_path)), basis, solution, count=0)
 
 

@@ -1,6 +1,7 @@
 """Error bars and refinement with real renders of the Cornell box, against many samples."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,6 +91,6 @@ def test_a_refined_look_is_verified_and_tells_its_errors(
     assert "What is missed" in page
 
 
-def test_refining_needs_a_scene(tmp_path: Path, target: lp.Target):
-    with pytest.raises(lp.LightpaintError, match="refining renders the scene"):
-        lp.paint_with_light(None, target, tmp_path, refine=1)
+def test_refining_needs_a_scene(tmp_path: Path, target: lp.Target, make_basis: Any):
+    with pytest.raises(lp.LightpaintError, match=r"refine=\.\.\. cannot change a saved basis"):
+        lp.paint_with_light(None, target, tmp_path, basis=make_basis(), refine=1)

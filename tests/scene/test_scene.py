@@ -143,7 +143,7 @@ SEEN = NO_SENSOR.replace("<emitter", '<sensor type="perspective"/><emitter')
         (NO_SENSOR, "no sensor"),
         ('<scene version="3.0.0"><sensor type="perspective"/></scene>', "no lights"),
         (SEEN.replace("constant", "no_such_plugin"), "no_such_plugin"),
-        (NO_SENSOR.replace("0.1 0.2 0.3", "$colour"), "-D colour=VALUE"),
+        (NO_SENSOR.replace("0.1 0.2 0.3", "$colour"), "parameters={'colour': ...}"),
         ('<scene version="3.0.0"><include filename="gone.xml"/></scene>', "gone.xml"),
         (
             '<scene version="3.0.0"><sensor type="perspective"/>'

@@ -126,7 +126,7 @@ def test_its_own_size_changes_nothing():
 
 def test_another_size_only_if_allowed():
     target = _random(6, 8)
-    with pytest.raises(SizeError, match=r"painted is 8x6 but the basis is 12x9.*--resize"):
+    with pytest.raises(SizeError, match=r"painted is 8x6 but the basis is 12x9.*resize=True"):
         target.fitted_to((9, 12), resize=False)
     assert target.fitted_to((9, 12), resize=True).size == (9, 12)
 

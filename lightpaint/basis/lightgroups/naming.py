@@ -1,7 +1,7 @@
 """Which layers of a file are its light groups, and which is the whole picture.
 
 Works on names alone. A layer is known by its own name, `ViewLayer.Combined_key`, and a
-`--pattern` also finds it by the name of its part or file.
+A pattern also finds it by the name of its part or file.
 """
 
 import re
@@ -58,11 +58,11 @@ def choose_layers(
         told = [f"{len(found)} as of {convention.renderer}" for convention, found in fitting]
         raise BasisError(
             f"{where} names its layers in several ways ({', '.join(told)}): say which are the "
-            f"lights, like --pattern {_example(layers)!r}; {_listed(layers)}"
+            f"lights, like pattern={_example(layers)!r}; {_listed(layers)}"
         )
     raise BasisError(
         f"{where} has no layers named like the light groups of a known renderer: say which they "
-        f"are, like --pattern {_example(layers)!r}; {_listed(layers)}"
+        f"are, like pattern={_example(layers)!r}; {_listed(layers)}"
     )
 
 
@@ -110,7 +110,7 @@ def _by_convention(
     if len(views) > 1:
         remarks.append(
             f"of the view layers {', '.join(views)} the first is taken: "
-            f"--pattern '{views[1]}.Combined_{NAME}' takes {views[1]}"
+            f"pattern='{views[1]}.Combined_{NAME}' takes {views[1]}"
         )
     found = [m for m in found if (m.groupdict().get("view") or "") == view]
     _check_one_eye([m[0] for m in found], where)
@@ -135,7 +135,7 @@ def _by_convention(
 def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -> Choice:
     if pattern.count(NAME) != 1:
         raise BasisError(
-            f"--pattern {pattern!r} must have {NAME} once, where the name of the light stands, "
+            f"pattern={pattern!r} must have {NAME} once, where the name of the light stands, "
             "like 'Light_{name}'"
         )
     before, after = pattern.split(NAME)
@@ -146,7 +146,7 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
         if match:
             found.append((match[1], layer))
     if not found:
-        raise BasisError(f"--pattern {pattern!r} fits no layer of {where}: {_listed(layers)}")
+        raise BasisError(f"pattern={pattern!r} fits no layer of {where}: {_listed(layers)}")
     # A pattern as wide as {name} also meets the beauty.
     names = [layer for layer in layers if layer not in [taken for _, taken in found]]
     first = {
@@ -157,7 +157,7 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
     if beauty is None:
         beauty = beauty_among(layer for _, layer in found)
     found = [(name, layer) for name, layer in found if layer != beauty]
-    return Choice(f"--pattern {pattern}", _named(found, where), beauty=beauty)
+    return Choice(f"pattern {pattern}", _named(found, where), beauty=beauty)
 
 
 def _check_one_eye(names: Sequence[str], where: str) -> None:
@@ -170,7 +170,7 @@ def _check_one_eye(names: Sequence[str], where: str) -> None:
         head = both[0].rpartition("_")[0]
         raise BasisError(
             f"{where} holds the views left and right, and a solve is of one: say which, like "
-            f"--pattern '{head}_{NAME}.left'"
+            f"pattern='{head}_{NAME}.left'"
         )
 
 
@@ -180,7 +180,7 @@ def _named(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
         if name in lights:
             raise BasisError(
                 f"{where} has the light {name!r} twice, in {lights[name]} and in {layer}: "
-                "say which are meant with --pattern"
+                "say which are meant with pattern=..."
             )
         lights[name] = layer
     return lights

@@ -70,7 +70,7 @@ def render_basis(
     if len(scene.lights) * height * width * 3 >= 2**32:
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
-            "use --resolution or fewer lights"
+            "use resolution=... or fewer lights"
         )
     check_memory(scene)
     if start is not None and not is_of(scene, start, seed):
@@ -101,7 +101,7 @@ def check_memory(scene: Scene) -> None:
         height, width = scene.size
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB are free: use --resolution or fewer lights"
+            f"{free / 1e9:.1f} GB are free: use resolution=... or fewer lights"
         )
 
 

@@ -41,7 +41,7 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     if not basis.knows_noise:
         raise BasisError(
             f"{basis.origin.scene} says nothing of its noise, so that a render of the mix cannot "
-            "be weighed against it: leave refine out"
+            "be weighed against it: use refine=0"
         )
     if mixed.size != basis.size:
         raise SizeError(

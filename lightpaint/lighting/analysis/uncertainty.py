@@ -142,8 +142,7 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     if not basis.knows_noise:
         raise BasisError(
             f"{basis.origin.scene} says nothing of its noise, so that none can be corrected: "
-            "leave noise_correction=True out, and denoise the layers or render them with more "
-            "samples"
+            "use noise_correction=False, and denoise the layers or render them with more samples"
         )
     noise = noise_sums(solution)
     e = solution.equations

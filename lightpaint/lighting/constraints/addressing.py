@@ -66,7 +66,7 @@ def _found(
                 return []  # as it does anyway
             raise ConstraintError(
                 f"{where}: {name!r} is not among the lights to adjust, and stays as it is: "
-                "choose it with --lights, or ask nothing of it"
+                "choose it with lights=..., or ask nothing of it"
             )
         if name not in names:
             raise ConstraintError(

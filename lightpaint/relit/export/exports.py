@@ -19,8 +19,8 @@ from lightpaint.relit.export.nuke import nuke_script
 #: Everything that `write_exports` may write.
 EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", "relit.exr")
 
-#: Renderers whose answer a Blender script may take; `--pattern` may be of Blender as well.
-BLENDER = ("Blender", "--pattern")
+#: Renderers whose answer a Blender script may take; a pattern may be of Blender as well.
+BLENDER = ("Blender", "pattern")
 
 #: The largest finite float16.
 LARGEST_HALF = 65504.0

@@ -88,7 +88,7 @@ def test_of_several_view_layers_the_first():
         "far",
     )
     [remark] = found.remarks
-    assert "--pattern 'near.Combined_{name}' takes near" in remark
+    assert "pattern='near.Combined_{name}' takes near" in remark
     other = _choose(*names, pattern="near.Combined_{name}")
     assert (other.lights, other.beauty) == ({"a": "near.Combined_a"}, "near.Combined")
 
@@ -132,9 +132,9 @@ def test_a_pattern_finds_what_no_convention_does():
         (
             ["", "L_key", "L_fill"],
             None,
-            r"like --pattern 'L_\{name\}'; .* are R, G, B, L_key, L_fill",
+            r"like pattern='L_\{name\}'; .* are R, G, B, L_key, L_fill",
         ),
-        (["depth"], None, r"like --pattern 'Light_\{name\}'; its RGB layers are depth"),
+        (["depth"], None, r"like pattern='Light_\{name\}'; its RGB layers are depth"),
         (["RGBA_key", "C_key"], None, "1 as of Arnold, 1 as of Karma"),
         (["a", "b"], "L_{name}", r"'L_\{name\}' fits no layer of a\.exr: its RGB layers are a, b"),
         (["a"], "L_", r"must have \{name\} once"),

@@ -1,0 +1,173 @@
+"""The options of commands, in groups that several of them share."""
+
+import argparse
+
+from lightpaint.cli import arguments
+
+
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """The scene, and how it is loaded."""
+    parser.add_argument("scene", metavar="SCENE", help="Mitsuba scene XML")
+    add_view(parser)
+
+
+def add_view(parser: argparse.ArgumentParser) -> None:
+    """What a scene is seen through, and loaded with."""
+    parser.add_argument(
+        "-s", "--sensor", metavar="SENSOR", help="sensor by index or id (default: the first)"
+    )
+    parser.add_argument(
+        "-D",
+        dest="parameters",
+        type=arguments.key_value,
+        action="append",
+        default=[],
+        metavar="key=value",
+        help="set a $parameter of the scene; may be repeated",
+    )
+    add_variant(parser)
+
+
+def add_lights(parser: argparse.ArgumentParser) -> None:
+    """Which lights are adjusted, and which go together."""
+    parser.add_argument(
+        "--lights",
+        type=arguments.names_of,
+        action="extend",
+        metavar="a,b,window_*",
+        help="lights to adjust, by name or pattern; the others stay as they are (default: all)",
+    )
+    parser.add_argument(
+        "--group",
+        dest="groups",
+        type=arguments.group,
+        action="append",
+        default=[],
+        metavar="name=a,b,c",
+        help="adjust these emitters, by name or pattern, as one light; may be repeated",
+    )
+    parser.add_argument(
+        "--lights-file",
+        metavar="F.toml",
+        help="lights, groups and constraints (default: <scene>.lights.toml where there is one); "
+        "--lights replaces its list, --group adds to its groups or replaces the one of that "
+        "name; with a saved basis only its constraints apply",
+    )
+    parser.add_argument(
+        "--no-lights-file",
+        dest="use_lights_file",
+        action="store_false",
+        help="leave the lights file beside the scene alone",
+    )
+
+
+def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
+    """How a picture is seen. name, stops: what they are where nobody says."""
+    parser.add_argument(
+        "--view",
+        metavar="VIEW",
+        help="view transform of pictures of 8 or 16 bits: srgb, linear, filmic, agx, ocio or "
+        f"ocio:DISPLAY/VIEW (default: {name})",
+    )
+    parser.add_argument(
+        "--exposure",
+        type=float,
+        metavar="STOPS",
+        help=f"exposure of that view (default: {stops})",
+    )
+
+
+def add_variant(parser: argparse.ArgumentParser) -> None:
+    """What Mitsuba renders with."""
+    parser.add_argument(
+        "-m",
+        "--variant",
+        metavar="VARIANT",
+        help="Mitsuba variant (default: llvm_ad_rgb, or scalar_rgb without LLVM)",
+    )
+
+
+def add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene's") -> None:
+    """How well one picture is rendered."""
+    add_spp(parser, default)
+    add_seed(parser)
+
+
+def add_budget(parser: argparse.ArgumentParser) -> None:
+    """What a basis may cost."""
+    group = parser.add_mutually_exclusive_group()
+    add_spp(group, "the scene's")
+    group.add_argument(
+        "--time",
+        dest="time_s",
+        type=arguments.number(" of seconds"),
+        metavar="SECONDS",
+        help="instead: render the basis for so long, besides what earlier runs have kept; "
+        "compiling counts, the verification does not",
+    )
+    parser.add_argument(
+        "--quality",
+        choices=("preview", "final"),
+        help="preview: 64 samples per pixel on a film of some 30,000 pixels; final: 512 on the "
+        "whole film; --spp, --time and --resolution go before",
+    )
+    add_resolution(parser)
+    add_seed(parser)
+
+
+def add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
+    """How many samples."""
+    parser.add_argument(
+        "--spp",
+        type=arguments.at_least(2),
+        metavar="N",
+        help=f"samples per pixel (default: {default})",
+    )
+
+
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """Which samples."""
+    parser.add_argument(
+        "--seed",
+        type=arguments.at_least(0),
+        default=0,
+        metavar="S",
+        help="random seed (default: %(default)s)",
+    )
+
+
+def add_resolution(parser: argparse.ArgumentParser) -> None:
+    """On how small a film."""
+    parser.add_argument(
+        "--resolution",
+        metavar="1/N|WxH",
+        help="render on a film reduced by a whole factor, like 1/4 or 320x180; the verification "
+        "of solve keeps the whole film (default: the whole film)",
+    )
+
+
+def add_cache(parser: argparse.ArgumentParser) -> None:
+    """Whether bases are kept."""
+    parser.add_argument(
+        "--no-cache",
+        dest="use_cache",
+        action="store_false",
+        help="neither take nor keep the basis for later runs (default: do both)",
+    )
+
+
+def add_unit(parser: argparse.ArgumentParser) -> None:
+    """What a number stands for."""
+    parser.add_argument(
+        "--unit",
+        dest="cd_per_unit",
+        type=arguments.number(" of cd/m²"),
+        metavar="CD/M2",
+        help="cd/m² that a radiance of 1 in the scene stands for, to have lumen, candela and lux "
+        "(default: numbers in proportion, without a unit)",
+    )
+
+
+def add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
+    """Where results go."""
+    parser.add_argument("-o", "--output", metavar=metavar, help=about)

@@ -1,0 +1,168 @@
+"""The options of `lightpaint solve` alone: paintings, method, constraints."""
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from lightpaint.cli import arguments
+from lightpaint.cli.option_groups import add_view_transform
+
+
+def add_paintings(parser: argparse.ArgumentParser) -> None:
+    """What was painted, of one view or several."""
+    parser.add_argument(
+        "targets", metavar="TARGET", nargs="*", help="painting: EXR, PNG, TIFF, JPEG, ..."
+    )
+    parser.add_argument(
+        "--target",
+        dest="views",
+        type=arguments.sensor_target,
+        action="append",
+        default=[],
+        metavar="SENSOR=TARGET",
+        help="instead of TARGET: painting of the view through that sensor; give it once for each "
+        "view, and one lighting answers all of them",
+    )
+    parser.add_argument(
+        "--mask",
+        dest="masks",
+        action="append",
+        metavar="MASK",
+        help="picture of what counts, instead of the alpha or what differs from the template; once "
+        "for all targets, or once for each in order",
+    )
+    parser.add_argument("--layer", metavar="NAME", help="layer, part or view of an EXR to read")
+    said = "what the template or the picture says, else"
+    add_view_transform(parser, f"{said} srgb", f"{said} 0")
+    parser.add_argument(
+        "--template",
+        metavar="DIR",
+        help="what was painted on, so that only what differs from it counts (default: the template "
+        "beside the painting, or ./template)",
+    )
+    parser.add_argument(
+        "--no-template",
+        dest="find_template",
+        action="store_false",
+        help="do not look for a template",
+    )
+    parser.add_argument(
+        "--paint",
+        choices=("look", "light"),
+        default="look",
+        help="what the brush puts down: the look of a surface, or the light that falls on it, "
+        "which is multiplied by what the surface reflects (default: %(default)s)",
+    )
+
+
+def add_method(parser: argparse.ArgumentParser) -> None:
+    """How a painting is answered."""
+    parser.add_argument(
+        "--unpainted",
+        type=arguments.number(may_be_zero=True),
+        default=0.0,
+        metavar="W",
+        help="weight of unpainted pixels against the current look (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--resize", action="store_true", help="resample a target of another size (default: refuse)"
+    )
+    parser.add_argument(
+        "--correct-noise",
+        dest="noise_correction",
+        action="store_true",
+        help="take half of the noise's power, as the halves of the samples show it, out of the "
+        "equations: closer to the answer of many samples at low --spp, and costs next to nothing",
+    )
+    parser.add_argument(
+        "--refine",
+        type=arguments.at_least(0, most=100),
+        default=0,
+        metavar="K",
+        help="times to render the scene as solved, with as many samples as the basis, and improve "
+        "the answer by what that shows (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--space",
+        choices=("linear", "display"),
+        default="linear",
+        help="linear: come closest in light; display: in what the eye sees of it through --view, "
+        "where dark parts count for more (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--method",
+        choices=("polished", "gauss-seidel"),
+        default="polished",
+        help="gauss-seidel: the paper's iteration alone, which comes late to the optimum or runs "
+        "out of sweeps, and says so (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--suggest",
+        type=arguments.at_least(1),
+        nargs="?",
+        const=3,
+        default=0,
+        metavar="N",
+        help="look for up to N (3) further point lights that would help most, with XML to paste; "
+        "takes some ten seconds",
+    )
+
+
+def add_constraints(parser: argparse.ArgumentParser) -> None:
+    """What is asked of the lights, as in the lights file and before it."""
+    group = parser.add_argument_group(
+        "constraints",
+        "NAME is a light, a group or a pattern; all may be repeated. LEVEL is a luminance like "
+        "2.5, a share of the present one like 40%, or r,g,b. COLOR is #ffaa66, 3200K or r,g,b.",
+    )
+
+    def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
+        dest = "limits" if option == "--limit" else option[2:]
+        group.add_argument(
+            option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
+        )
+
+    add(
+        "--lock", "NAME[=LEVEL]", arguments.lock, "keep it as it is, or at a level, or '3200K 40%%'"
+    )
+    add(
+        "--limit",
+        "NAME=MIN:MAX",
+        arguments.limits,
+        "emit between these levels; one may be left out",
+    )
+    add(
+        "--tie", "A,B,...", arguments.names_of, "put these on one dimmer, their colours as they are"
+    )
+    add("--color", "NAME=COLOR", arguments.named, "this colour, and only a dimmer")
+    group.add_argument(
+        "--kelvin",
+        type=arguments.kelvin,
+        action=arguments.Kelvin,
+        default=[],
+        metavar="NAME=2700:6500[,duv=D]",
+        help="white between these, or of one temperature; so far from Planck's locus, like "
+        "duv=0.003, positive towards green (default: on it)",
+    )
+    parser.set_defaults(duv=[])
+    add(
+        "--primaries",
+        "NAME=COLOR,...",
+        arguments.primaries,
+        "what a fixture with these LEDs can mix",
+    )
+    add("--off", "NAME", str, "off")
+    group.add_argument(
+        "--prefer-current",
+        type=arguments.number(may_be_zero=True),
+        default=0.0,
+        metavar="STRENGTH",
+        help="pull to the present lighting, like 0.01: where the painting leaves it open, "
+        "lights stay (default: %(default)s)",
+    )
+    group.add_argument(
+        "--sparse",
+        type=arguments.at_least(1),
+        metavar="K",
+        help="use the K lights that serve best, besides locked ones; the others are off",
+    )

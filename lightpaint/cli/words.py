@@ -1,0 +1,59 @@
+"""The words of the command line for those of the library: `--resize` for `resize=True`."""
+
+import re
+
+#: Arguments of the library that errors and remarks name, and their options.
+OPTIONS = {
+    "cd_per_unit": "--unit",
+    "groups": "--group",
+    "layer": "--layer",
+    "lights": "--lights",
+    "mask": "--mask",
+    "noise_correction": "--correct-noise",
+    "paint": "--paint",
+    "parameters": "-D",
+    "pattern": "--pattern",
+    "quality": "--quality",
+    "refine": "--refine",
+    "resize": "--resize",
+    "resolution": "--resolution",
+    "seed": "--seed",
+    "sensor": "-s",
+    "space": "--space",
+    "spp": "--spp",
+    "suggest": "--suggest",
+    "template": "--template",
+    "time_s": "--time",
+    "variant": "-m",
+    "view": "--view",
+}
+
+#: What is spelled otherwise than by an option and a value.
+SPELLINGS = {
+    "find=False": "--no-template",
+    "noise_correction=False": "no --correct-noise",
+    "use_cache=False": "--no-cache",
+}
+
+#: `name=value` as the library writes it: alone among words, so that no path is taken for one.
+_SAID = re.compile(
+    r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+"|\{'\w+':\ \.\.\.\})"""
+    r"""(?=[,;:.)]*(?:\s|$))""",
+    re.VERBOSE,
+)
+
+
+def spoken(text: str) -> str:
+    """`text` of the library in the words of the command line."""
+    return _SAID.sub(_spoken, text)
+
+
+def _spoken(match: re.Match[str]) -> str:
+    said, (name, value) = match[0], match.groups()
+    if said in SPELLINGS:
+        return SPELLINGS[said]
+    if name not in OPTIONS:
+        return said
+    if key := re.fullmatch(r"\{'(\w+)': \.\.\.\}", value):
+        return f"{OPTIONS[name]} {key[1]}=VALUE"
+    return OPTIONS[name] if value in ("...", "True") else f"{OPTIONS[name]} {value.strip(chr(34))}"

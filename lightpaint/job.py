@@ -1,0 +1,296 @@
+"""One record of what is asked: scene or basis, paintings, constraints, settings, folder.
+
+A job is checked once, when it is born: whatever somebody gave is looked at before the first
+sample is taken. One of files and plain values can be sent to another machine, which reads the
+files anew; one of objects in memory can only be run where it is.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.obtain import check_same_view
+from lightpaint.basis.render.render import basis_lights
+from lightpaint.colour.display import choose_exposure
+from lightpaint.colour.view import View
+from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
+from lightpaint.files import check_writable
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.placement.suggest import check_suggestible
+from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.relit.relight import check_relightable
+from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
+from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results
+from lightpaint.scene.quality import on_film
+from lightpaint.scene.scene import Scene
+from lightpaint.settings import Settings
+from lightpaint.sources import (
+    BasisFile,
+    GroupsFile,
+    Painting,
+    SceneFile,
+    content,
+    from_json,
+    to_json,
+)
+from lightpaint.target.target import Target
+
+#: Settings that only change what is rendered, and those that light groups know nothing of.
+RENDERED = ("spp", "time_s", "quality", "resolution", "refine", "suggest")
+NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit")
+
+
+@dataclass(frozen=True)
+class PaintedView:
+    """What is seen through one sensor: its painting, and where its results go.
+
+    scene: on the film of the basis; None where there is only a basis. target: of the size of the
+    basis. basis: None where it is still to be rendered.
+    """
+
+    scene: Scene | None
+    target: Target
+    folder: Path
+    basis: Basis | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One lighting to be found, for one view or several. Raises LightpaintError for what cannot be.
+
+    scenes: the scene through the sensor of each view; none to solve from `basis` alone, without
+    a renderer. targets: what each view is to show. folder: receives the results.
+    basis: made before of the one view; taken from the cache or rendered if not given. Of light
+    groups that another renderer made, `folder` receives the answer for other programs, too.
+    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
+    by_sensor: whether pictures go to a folder for each sensor, as they do of several.
+
+    Found at birth: views, each with what it needs; asked, all constraints; display, the view
+    transform to come closest in; remarks, what is worth saying to a person, in plain text.
+    """
+
+    scenes: tuple[Scene | SceneFile, ...]
+    targets: tuple[Target | Painting, ...]
+    folder: Path
+    basis: Basis | BasisFile | LightGroups | GroupsFile | None = None
+    constraints: Constraints = field(default_factory=Constraints)
+    settings: Settings = field(default_factory=Settings)
+    by_sensor: bool = False
+    views: tuple[PaintedView, ...] = field(init=False, repr=False)
+    asked: Constraints = field(init=False, repr=False)
+    display: View | None = field(init=False, repr=False)
+    remarks: tuple[str, ...] = field(init=False, repr=False)
+    _relit: tuple[Path, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._check_counts()
+        self._check_nothing_idle()
+        # What is read soonest comes first, so that mistakes are said soon.
+        targets = [content(target) for target in self.targets]
+        basis = content(self.basis)
+        basis = basis.basis if isinstance(basis, LightGroups) else basis
+        scenes = [content(scene) for scene in self.scenes]
+        folders = [self.folder]
+        if self.by_sensor or len(scenes) > 1:
+            folders = [self.folder / name for name in check_each_once(scenes)]
+        asked = all_constraints(scenes[0] if scenes else None, self.constraints)
+        if scenes and basis is not None:
+            check_same_view(scenes[0], basis)
+        # Names what cannot be had before it renders.
+        reduce_to(asked, basis_lights(scenes[0]) if basis is None else basis.lights)
+        if self.settings.suggest:
+            check_suggestible(scenes[0])
+        views = tuple(
+            PaintedView(*self._on_one_film(scene, target, basis), folder, basis)
+            for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
+        )
+        for folder in (self.folder, *folders):
+            check_writable(folder)
+        relit = check_relightable(scenes[0], self.folder / "relit.xml") if scenes else []
+        # The only place that sets what was found; frozen afterwards.
+        born = vars(self)
+        born.update(views=views, asked=asked, display=self._display(views), _relit=tuple(relit))
+        born.update(remarks=tuple(self._remarks(targets)))
+
+    @property
+    def groups(self) -> LightGroups | None:
+        """The light groups it is solved from, if it is from such."""
+        found = content(self.basis)
+        return found if isinstance(found, LightGroups) else None
+
+    @property
+    def files(self) -> list[Path]:
+        """What is about to be replaced, in `folder` and in those of the views."""
+        files = [*earlier_results(self.folder), self.folder / "lighting.json", *self._relit]
+        for view in self.views:
+            if view.folder != self.folder:
+                files += [file for pattern in RESULTS for file in view.folder.glob(pattern)]
+            names = VIEW_RESULTS if self.scenes else ALWAYS
+            files += [view.folder / name for name in names]
+            files += [view.folder / name for name in EXPORTS if self.groups is not None]
+        return files
+
+    def to_json(self) -> str:
+        """This job as text, to be run elsewhere; paths stay as they were given.
+
+        Raises LightpaintError for a job of objects in memory.
+        """
+        return to_json(
+            self.scenes,
+            self.targets,
+            self.basis,
+            self.constraints,
+            self.settings,
+            folder=str(self.folder),
+            by_sensor=self.by_sensor,
+        )
+
+    @staticmethod
+    def from_json(text: str) -> "Job":
+        """The job that `to_json` wrote, of the files as they are here and now.
+
+        Raises LightpaintError for what is no job, and for one that cannot be done here.
+        """
+        return Job(**from_json(text))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the same is asked of the same files. Jobs in memory equal only themselves."""
+        if self is other or not isinstance(other, Job):
+            return self is other
+        try:
+            return self.to_json() == other.to_json()
+        except LightpaintError:
+            return False
+
+    def __hash__(self) -> int:
+        return hash(self.folder)
+
+    def _check_counts(self) -> None:
+        """Raise unless every view has its painting, and there is something to solve with."""
+        if not isinstance(self.constraints, Constraints):
+            raise ConstraintError(
+                f"the constraints are a {type(self.constraints).__name__}: give Constraints.of(...)"
+            )
+        if not self.scenes and self.basis is None:
+            raise LightpaintError("give a scene, a basis, or both")
+        if not self.targets:
+            raise TargetError("no painting to solve for: give a target")
+        several = len(self.targets) > 1 or len(self.scenes) > 1
+        if several and self.basis is not None:
+            raise BasisError("a basis has one view only: give the scene, to solve for several")
+        if several and self.settings.suggest:
+            raise LightpaintError("lights are suggested for one view only: leave out the others")
+        if self.scenes and len(self.targets) != len(self.scenes):
+            raise TargetError(
+                f"{len(self.targets)} targets for {len(self.scenes)} views: give one for each; "
+                "several paintings of one view are a job each"
+            )
+
+    def _check_nothing_idle(self) -> None:
+        """Raise BasisError for settings that change nothing, since nothing is rendered."""
+        if self.scenes:
+            return
+        is_groups = isinstance(self.basis, LightGroups | GroupsFile)
+        default = Settings()
+        check_needed(
+            [
+                name
+                for name in (NOT_IN_GROUPS if is_groups else RENDERED)
+                if getattr(self.settings, name) != getattr(default, name)
+            ],
+            self.basis,
+        )
+
+    def _on_one_film(
+        self, scene: Scene | None, target: Target, basis: Basis | None
+    ) -> tuple[Scene | None, Target]:
+        """Scene and target of the size that the basis has, or will have."""
+        if not isinstance(target, Target):
+            raise TargetError(
+                f"the target is a {type(target).__name__}: give what read_target returns"
+            )
+        if scene is not None:
+            check_same_picture(target, scene)
+        if scene is not None and basis is None:
+            scene = on_film(scene, self.settings.quality, self.settings.resolution)
+        given = scene if basis is None else basis
+        assert given is not None
+        fitted = target.fitted_to(given.size, resize=self.settings.resize)
+        return scene, fitted if self.groups is None else fitted.without(self.groups.holes)
+
+    def _display(self, views: Sequence[PaintedView]) -> View | None:
+        """The one view through which all paintings are compared, None for linear light."""
+        if self.settings.space == "linear":
+            return None
+        if self.settings.view is not None:
+            return self.settings.view
+        seen = {view.target.view for view in views if view.target.view is not None}
+        if len(seen) > 1:
+            told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
+            raise TargetError(
+                f"the paintings were seen through {told}: say with view=... which of them is to "
+                "be fitted"
+            )
+        return next(iter(seen), None) or View("srgb", choose_exposure(views[0].target.image))
+
+    def _remarks(self, targets: Sequence[Target]) -> list[str]:
+        """What a person should know before this is run. targets: as they were read."""
+        remarks = list(self.groups.remarks) if self.groups is not None else []
+        rendered = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
+        if (first := self.views[0].scene) is not None:
+            remarks += remarks_of_scene(first, is_rendered=bool(rendered))
+        for target, view in zip(targets, self.views, strict=True):
+            remarks += remarks_of_target(target, view.target.size, view.scene, self.settings)
+        return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
+
+
+def check_needed(given: Iterable[str], basis: Any) -> None:
+    """Raise BasisError for anything `given`, by name, that a basis without its scene has no use of.
+
+    basis: a saved one, or light groups.
+    """
+    if not (idle := [f"{name}=..." for name in given]):
+        return
+    if isinstance(basis, LightGroups | GroupsFile):
+        raise BasisError(
+            f"{', '.join(idle)} cannot be had from {basis.path}: its light groups are rendered "
+            "already, and say nothing of samples, noise or units; leave it out"
+        )
+    raise BasisError(
+        f"{', '.join(idle)} cannot change a saved basis: leave "
+        f"{'it' if len(idle) == 1 else 'them'} out, or give the scene"
+    )
+
+
+def check_same_picture(target: Target, scene: Scene) -> None:
+    """Raise TargetError for a painting of another view than `scene` is seen through."""
+    sensor = scene.sensor_names[scene.sensor]
+    if target.sensor not in ("", sensor):
+        raise TargetError(
+            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
+            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
+        )
+
+
+def check_each_once(scenes: Sequence[Scene]) -> list[str]:
+    """The sensor of each. Raises SceneError for one that is there twice or names no folder."""
+    names = [scene.sensor_names[scene.sensor] for scene in scenes]
+    if len(set(names)) < len(names):
+        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+    for name in names:
+        if Path(name).name != name or name in ("..", ""):
+            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+    return names
+
+
+def all_constraints(scene: Scene | None, given: Constraints | None) -> Constraints:
+    """What the lights file of `scene` asks, if it has one, and then `given`."""
+    asked = given or Constraints()
+    if scene is None or scene.lights_file is None:
+        return asked
+    return read_constraints(scene.lights_file).and_then(asked)

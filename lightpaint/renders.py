@@ -1,0 +1,96 @@
+"""What is rendered to be painted on or looked at: templates, and scenes as they were relit."""
+
+from pathlib import Path
+
+from lightpaint.basis.render.render import render_basis
+from lightpaint.colour.display import choose_exposure
+from lightpaint.colour.view import View
+from lightpaint.files import restoring
+from lightpaint.images.estimate import write_estimate
+from lightpaint.images.png import write_png
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.progress import Progress, silent
+from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.scene.quality import Preset
+from lightpaint.scene.render import Stream, render
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.surfaces import render_surfaces
+from lightpaint.target.template import Template, write_look, write_template
+
+#: Rendering of what each light does alone, to recognise it by.
+THUMBNAIL = Preset(32, 2**14)
+
+
+def render_template(
+    scene: Scene,
+    folder: Path,
+    *,
+    view: View | None = None,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> list[Path]:
+    """Render something to paint on into `folder`, and return its files (docs/targets.md).
+
+    view: how the look becomes a picture; sRGB by default, at an exposure that shows something.
+    """
+    look = render(
+        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
+    ).image
+    surfaces = render_surfaces(scene, seed=seed, progress=progress)
+    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.film)}")
+    lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
+    template = Template(
+        look,
+        view or View("srgb", choose_exposure(look)),
+        scene=scene.path.name,
+        content=scene.content,
+        sensor=scene.sensor_names[scene.sensor],
+        albedo=surfaces.albedo,
+    )
+    return write_template(
+        folder,
+        template,
+        normals=surfaces.normal,
+        depth=surfaces.depth,
+        mattes=surfaces.coverage,
+        lights=dict(zip(lights.names, lights.images, strict=True)),
+    )
+
+
+def render_look(
+    scene: Scene,
+    path: Path,
+    *,
+    view: View | None = None,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Path:
+    """Only the look to paint on, as EXR at `path`; returns the PNG beside it."""
+    look = render(
+        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
+    ).image
+    return write_look(path, look, view or View("srgb", choose_exposure(look)))
+
+
+def relight_look(
+    scene: Scene,
+    lighting: Lighting,
+    folder: Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Scene:
+    """Write relit.xml to `folder`, and its render as relit.exr and relit.png."""
+    path = folder / "relit.xml"
+    files = [*check_relightable(scene, path), folder / "relit.exr", folder / "relit.png"]
+    with restoring(folder, files):
+        relit = relight(scene, lighting, path)
+        image = render(
+            relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
+        )
+        write_estimate(folder / "relit.exr", image, {})
+        write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
+    return relit

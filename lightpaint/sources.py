@@ -1,0 +1,174 @@
+"""What a job is made of, by file: a scene, a painting, a saved basis, light groups.
+
+Each is plain values that can be sent, and is read once, when it is first asked for.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis
+from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
+from lightpaint.colour.view import View, ViewChoice
+from lightpaint.errors import LightpaintError
+from lightpaint.lighting.constraints.constraints import Constraints, Tie
+from lightpaint.records import strict_json
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.settings import Settings
+from lightpaint.target.read import Paint, read_target
+from lightpaint.target.target import Target
+
+FORMAT = "lightpaint-job 1"
+FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by_sensor")
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene by its file, as `load_scene` takes it; loaded once, when it is first asked for."""
+
+    path: str
+    sensor: int | str | None = None
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    variant: str | None = None
+    lights: Sequence[str] | None = None
+    groups: Mapping[str, Sequence[str]] | None = None
+    lights_file: str | None = None
+    use_lights_file: bool = True
+
+    @cached_property
+    def content(self) -> Scene:
+        """The scene, as it is when it is first asked for."""
+        return load_scene(**vars_of(self))
+
+
+@dataclass(frozen=True)
+class Painting:
+    """A painting by its file, as `read_target` takes it; read once."""
+
+    path: str
+    mask: str | None = None
+    layer: str | None = None
+    view: ViewChoice = field(default_factory=ViewChoice)
+    template: str | None = None
+    find: bool = True
+    paint: Paint = "look"
+
+    @cached_property
+    def content(self) -> Target:
+        """The target, as it is when it is first asked for."""
+        return read_target(**vars_of(self))
+
+
+@dataclass(frozen=True)
+class BasisFile:
+    """A saved basis; read once."""
+
+    path: str
+
+    @cached_property
+    def content(self) -> Basis:
+        """The basis, as it is when it is first asked for."""
+        return read_basis(Path(self.path))
+
+
+@dataclass(frozen=True)
+class GroupsFile:
+    """Light groups of another renderer, as `read_light_groups` takes them; read once."""
+
+    path: str
+    pattern: str | None = None
+
+    @cached_property
+    def content(self) -> LightGroups:
+        """The light groups, as they are when they are first asked for."""
+        return read_light_groups(self.path, pattern=self.pattern)
+
+
+#: What of a job can be sent.
+File = SceneFile | Painting | BasisFile | GroupsFile
+
+
+def vars_of(given: Any) -> dict[str, Any]:
+    """What a dataclass holds, by name."""
+    return {name: getattr(given, name) for name in given.__dataclass_fields__}
+
+
+def content(given: Any) -> Any:
+    """What is in a file that a job names; what is in memory already, and None, as it is."""
+    return given.content if isinstance(given, File) else given
+
+
+def to_json(
+    scenes: Sequence[Any],
+    targets: Sequence[Any],
+    basis: Any,
+    constraints: Constraints,
+    settings: Settings,
+    **others: Any,
+) -> str:
+    """A job's fields as text. Raises LightpaintError for what is in memory."""
+    named = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
+    for what, given in named:
+        if not all(isinstance(one, File) for one in given):
+            raise LightpaintError(
+                f"this job cannot be sent: its {what} is in memory; give the path of a file"
+            )
+    data = {
+        "format": FORMAT,
+        "scenes": list(map(asdict, scenes)),
+        "targets": list(map(asdict, targets)),
+        "basis": basis and {type(basis).__name__: asdict(basis)},
+        "constraints": asdict(constraints),
+        "settings": asdict(settings),
+        **others,
+    }
+    # NumPy's numbers are as good as Python's.
+    return json.dumps(data, indent=1, default=lambda number: number.item())
+
+
+def from_json(text: str) -> dict[str, Any]:
+    """The fields that `to_json` wrote. Raises LightpaintError for what is no job."""
+    try:
+        data = strict_json(text)
+        if (form := data.pop("format")) != FORMAT:
+            raise ValueError(f"its format is {form!r}, not {FORMAT!r}")
+        if unknown := set(data) - set(FIELDS):
+            raise ValueError(f"it has the keys {', '.join(sorted(unknown))}")
+        settings, constraints = data["settings"], data["constraints"]
+        view = settings["view"] and View(**settings["view"])
+        return {
+            "folder": Path(data["folder"]),
+            "by_sensor": bool(data["by_sensor"]),
+            "scenes": tuple(SceneFile(**one) for one in data["scenes"]),
+            "targets": tuple(
+                Painting(**{**one, "view": ViewChoice(**one["view"])}) for one in data["targets"]
+            ),
+            "basis": _made(data["basis"]),
+            "constraints": Constraints(
+                **{
+                    **constraints,
+                    "lights": tuple(tuple(one) for one in constraints["lights"]),
+                    "ties": tuple(_tie(**one) for one in constraints["ties"]),
+                }
+            ),
+            "settings": Settings(**{**settings, "view": view}),
+        }
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        said = " ".join(str(error).split())
+        raise LightpaintError(f"this is no job: {said}; make one with Job.to_json") from None
+
+
+def _made(given: Any) -> BasisFile | GroupsFile | None:
+    """A basis or light groups, by the name of their kind."""
+    if given is None:
+        return None
+    [(kind, values)] = given.items()
+    return GroupsFile(**values) if kind == "GroupsFile" else BasisFile(**values)
+
+
+def _tie(lights: Sequence[str], color: Any, where: str) -> Tie:
+    return Tie(tuple(lights), color and tuple(color), where)

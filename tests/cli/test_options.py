@@ -1,0 +1,133 @@
+"""What `solve` starts from, as it is given on the command line."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from light_groups import channels, interleaved, pictures, write
+
+from lightpaint.basis.basis import write_basis
+from lightpaint.basis.lightgroups.read import read_light_groups
+from lightpaint.cli.options import basis_of, jobs_of, settings_of
+from lightpaint.cli.parser import command_parser
+from lightpaint.cli.words import spoken
+from lightpaint.errors import BasisError
+from lightpaint.sources import BasisFile, GroupsFile
+from lightpaint.target.target import Target
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+    """A folder with light groups, paintings, a scene, a basis and results."""
+    monkeypatch.chdir(tmp_path)
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
+    interleaved(tmp_path / "groups.exr", layers | {"RGBA": pictures().sum(axis=0)})
+    interleaved(tmp_path / "with,comma.exr", layers)
+    write(tmp_path / "painting.exr", ("rgb", channels("", pictures()[0])))
+    (tmp_path / "scene.xml").write_text("<scene/>")
+    write_basis(tmp_path / "a.basis.exr", make_basis(2))
+    (tmp_path / "key").mkdir()
+    write(tmp_path / "key" / "predicted.exr", ("rgb", channels("", pictures()[0])))
+    (tmp_path / "empty").mkdir()
+    return tmp_path
+
+
+def _options(*given: str) -> Any:
+    return command_parser().parse_args(["solve", *given])
+
+
+def _jobs(*given: str) -> Any:
+    options = _options(*given)
+    return jobs_of(options, settings_of(options, given))
+
+
+@pytest.mark.parametrize(
+    ("given", "path", "targets"),
+    [
+        ("painting.exr --lights groups.exr", "groups.exr", ["painting.exr"]),
+        ("a.exr b.exr --lights groups.exr", "groups.exr", ["a.exr", "b.exr"]),
+        ("a.exr --lights with,comma.exr", "with,comma.exr", ["a.exr"]),
+        ("a.exr --lights key", "key", ["a.exr"]),
+        ("groups.exr a.exr", "groups.exr", ["a.exr"]),
+        ("key a.exr", "key", ["a.exr"]),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_light_groups_by_either_spelling(given: str, path: str, targets: list[str]):
+    options = _options(*given.split())
+    assert basis_of(options) == GroupsFile(path)
+    assert options.targets == targets
+
+
+@pytest.mark.parametrize(
+    ("given", "basis"),
+    [
+        ("scene.xml painting.exr", None),
+        ("scene.xml painting.exr --lights key,window_*", None),
+        ("scene.xml painting.exr --lights key", None),  # though there is such a folder
+        ("a.basis.exr painting.exr", BasisFile("a.basis.exr")),
+        ("missing.exr painting.exr", BasisFile("missing.exr")),  # which reading it will say
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_everything_else_is_what_it_was(given: str, basis: BasisFile | None):
+    assert basis_of(_options(*given.split())) == basis
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("painting.exr --lights nowhere.exr", "no such file .* nowhere.exr"),
+        ("painting.exr --lights a.basis.exr", "holds no light groups"),
+        ("scene.xml p.exr --pattern {name}", "--pattern names the layers"),
+        ("groups.exr p.exr --lights a,b", "--lights a,b chooses lights of a scene.* --lock NAME"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_slips_are_said(given: str, says: str):
+    with pytest.raises(BasisError, match=says):
+        basis_of(_options(*given.split()))
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ("--spp 64", "--spp"),
+        ("--refine 1 --correct-noise", "--refine, --correct-noise"),
+        ("--time 3", "--time"),
+        ("--quality final", "--quality"),
+        ("--target a=b", "--target"),
+        ("--group a=b", "--group"),
+        ("--unit 100", "--unit"),
+        ("-s 1 -D a=b -m x", "-s, -D, -m"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_options_that_need_a_renderer_are_refused(given: str, named: str):
+    painting = [] if "--target" in given else ["painting.exr"]
+    with pytest.raises(BasisError) as refused:
+        _jobs("groups.exr", *painting, *given.split())
+    assert spoken(str(refused.value)).startswith(f"{named} cannot be had from groups.exr")
+
+
+@pytest.mark.usefixtures("here")
+def test_groups_are_read_with_their_pattern():
+    [job] = _jobs("painting.exr", "--lights", "groups.exr")
+    assert job.groups.basis.names == ("a", "b", "c")
+    [job] = _jobs("painting.exr", "--lights", "groups.exr", "--pattern", "RGBA_{name}")
+    assert job.groups.renderer == "pattern RGBA_{name}"
+
+
+def test_holes_are_taken_from_the_painting(tmp_path: Path):
+    images = pictures()
+    images[0, 1, 2] = np.nan
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", images, strict=True)}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    importance = np.ones(images.shape[1:3], np.float32)
+    target = Target("t", images[1], importance, everything=True, not_finite=2)
+    counted = target.without(groups.holes)
+    assert (counted.importance == 0).sum() == 1
+    assert counted.importance[1, 2] == 0
+    assert counted.not_finite == 3
+    assert counted.without(groups.holes) is counted

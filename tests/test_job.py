@@ -1,0 +1,312 @@
+"""A job: checked when it is born, and the same wherever it is sent."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from light_groups import interleaved, pictures
+from renderer import LIGHTS, write_room
+
+from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_with_light, run
+from lightpaint.basis.basis import Basis, write_basis
+from lightpaint.basis.lightgroups.read import read_light_groups
+from lightpaint.colour.view import View, ViewChoice
+from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
+from lightpaint.images.exr import write_rgb
+from lightpaint.scene.scene import load_scene
+from lightpaint.sources import BasisFile, GroupsFile
+from lightpaint.target.target import Target
+
+SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
+    <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">
+    <integer name="width" value="14"/><integer name="height" value="10"/></film></sensor>"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+    """A folder with a basis, light groups, paintings of them and a mask."""
+    monkeypatch.chdir(tmp_path)
+    basis = make_basis(3)
+    write_basis(tmp_path / "a.basis.exr", basis)
+    write_rgb(tmp_path / "p.exr", 0.7 * basis.images.sum(axis=0))
+    write_rgb(tmp_path / "mask.exr", np.ones_like(basis.images[0]))
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
+    interleaved(tmp_path / "groups.exr", layers)
+    write_rgb(tmp_path / "g.exr", pictures()[0])
+    return tmp_path
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    lights = LIGHTS["panel"] + LIGHTS["bulb"]
+    return write_room(tmp_path, lights=lights, sensors=SIDE)
+
+
+def _flat(basis: Basis, **how: Any) -> Target:
+    image, importance = basis.images.sum(axis=0), np.ones(basis.size, np.float32)
+    return Target("flat", image, importance, everything=True, **how)
+
+
+def _from_basis(**how: Any) -> Job:
+    how = {"basis": BasisFile("a.basis.exr"), "targets": (Painting("p.exr"),)} | how
+    return Job((), folder=Path("out"), **how)
+
+
+ASKED = Constraints.of(
+    {"light 0": {"lock": "50%"}, "light*": {"kelvin": (2700, 6500), "duv": 0.003}},
+    tie=[["light 1", "light 2"], {"lights": ["light 2"], "color": "#ffaa66"}],
+    prefer_current=0.1,
+)
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"targets": (Painting("p.exr", mask="mask.exr", view=ViewChoice("agx", None)),)},
+        {"settings": Settings(unpainted=0.1, view=View("agx", 1 / 3), space="display")},
+        {"settings": Settings(seed=np.int64(3), cd_per_unit=np.float32(0.1))},  # type: ignore[arg-type]
+        {"constraints": replace(ASKED, ties=())},
+        {"basis": GroupsFile("groups.exr", "RGBA_{name}"), "targets": (Painting("g.exr"),)},
+    ],
+)
+def test_a_round_trip_is_the_same_job(how: Any):
+    job = _from_basis(**how)
+    again = Job.from_json(job.to_json())
+    assert again == job
+    assert again.to_json() == job.to_json()
+    assert again.remarks == job.remarks
+    for name in ("folder", "settings", "by_sensor", "targets", "basis"):
+        assert getattr(again, name) == getattr(job, name)
+    settings = replace(job.settings, resize=not job.settings.resize)
+    assert again != _from_basis(**{**how, "settings": settings})
+
+
+def test_a_job_in_another_process_gives_the_same_answer(here: Path):
+    job = _from_basis(constraints=Constraints.of({"light 0": {"limits": {"max": "40%"}}}))
+    [look] = run(job)
+    mine = (here / "out" / "lighting.json").read_bytes()
+    (here / "job.json").write_text(job.to_json(), encoding="utf-8")
+    (here / "out" / "lighting.json").unlink()
+    code = "import sys, lightpaint as lp; lp.run(lp.Job.from_json(open('job.json').read()))"
+    subprocess.run([sys.executable, "-c", code], cwd=here, check=True, env={**os.environ})
+    assert (here / "out" / "lighting.json").read_bytes() == mine
+    assert look.lighting.lights[0].constraint == "limits 0 to 40%"
+
+
+def test_a_job_of_a_scene_is_sent_with_all_that_was_said(room: Path, tmp_path: Path):
+    (tmp_path / "l.toml").write_text('[groups]\nboth = ["*"]\n', encoding="utf-8")
+    scene = SceneFile(
+        str(room), "side", {"width": "12"}, lights_file=str(tmp_path / "l.toml"), lights=("both",)
+    )
+    write_rgb(tmp_path / "p.exr", np.ones((10, 14, 3), np.float32))
+    job = Job((scene,), (Painting(str(tmp_path / "p.exr")),), tmp_path / "out")
+    assert [light.name for light in scene.content.lights] == ["both"]
+    assert f"lights and groups as in {tmp_path / 'l.toml'}" in job.remarks
+    assert Job.from_json(job.to_json()) == job
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("here")
+def test_a_job_in_memory_says_why_it_cannot_be_sent(make_basis: Any):
+    basis = make_basis(3)
+    for what, how in {
+        "basis": {"basis": basis},
+        "target": {"targets": (_flat(basis),)},
+    }.items():
+        job = _from_basis(**how)
+        with pytest.raises(LightpaintError, match=f"cannot be sent: its {what} is in memory"):
+            job.to_json()
+        assert job == job
+        assert job != _from_basis(**how)
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_no_job_is_refused_in_one_line():
+    good = json.loads(_from_basis().to_json())
+    for bad in (
+        "{",
+        "[]",
+        "{}",
+        json.dumps({**good, "format": "lightpaint-job 0"}),
+        json.dumps({key: value for key, value in good.items() if key != "folder"}),
+        json.dumps({**good, "scenes": [{"file": "x.xml"}]}),
+        json.dumps({**good, "basis": {"BasisFile": {}}}),
+        json.dumps({**good, "targets": 5}),
+        json.dumps({**good, "more": 1}),
+    ):
+        with pytest.raises(LightpaintError, match="this is no job: ") as refused:
+            Job.from_json(bad)
+        assert "\n" not in str(refused.value)
+    with pytest.raises(LightpaintError, match="spp is 1: expected a whole number >= 2"):
+        Job.from_json(json.dumps({**good, "settings": {**good["settings"], "spp": 1}}))
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("how", "error", "says"),
+    [
+        ({"basis": None}, LightpaintError, "give a scene, a basis, or both"),
+        ({"targets": ()}, TargetError, "no painting to solve for"),
+        ({"targets": (Painting("p.exr"),) * 2}, BasisError, "a basis has one view only"),
+        ({"targets": ("p.exr",)}, TargetError, "the target is a str"),
+        ({"constraints": {"a": {"off": True}}}, ConstraintError, "constraints are a dict"),
+        ({"constraints": Constraints.of({"x": {}})}, ConstraintError, "no light 'x'"),
+        ({"settings": Settings(spp=8)}, BasisError, r"^spp=\.\.\. cannot change a saved basis"),
+        (
+            {"settings": Settings(quality="final", refine=1)},
+            BasisError,
+            r"^quality=\.\.\., refine=\.\.\. cannot change a saved basis: leave them out",
+        ),
+        (
+            {"basis": GroupsFile("groups.exr"), "settings": Settings(seed=1)},
+            BasisError,
+            r"^seed=\.\.\. cannot be had from groups.exr",
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_said_at_birth(how: Any, error: type[Exception], says: str):
+    with pytest.raises(error, match=says):
+        _from_basis(**how)
+    assert not Path("out").exists()
+
+
+def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
+    room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("lightpaint.basis.render.obtain.render_basis", None)
+    scene = load_scene(room)
+    side = load_scene(room, sensor="side")
+    (height, width) = scene.size
+    image = np.ones((height, width, 3), np.float32)
+    target = Target("t", image, image[..., 0], everything=True)
+
+    def refused(error: type[Exception], says: str, scenes: Any, targets: Any, **how: Any) -> None:
+        with pytest.raises(error, match=says):
+            paint_with_light(scenes, targets, tmp_path / "out", **how)
+        assert not (tmp_path / "out").exists()
+
+    refused(
+        LightpaintError,
+        "is 24x20 but the basis is 12x10|resize",
+        scene,
+        replace(target, image=image[:7, :9], importance=image[:7, :9, 0]),
+    )
+    refused(TargetError, "2 targets for 1 views", scene, [target, target])
+    refused(SceneError, "painted twice", [scene, scene], [target, target])
+    refused(
+        TargetError, "template of the sensor side, not of", scene, replace(target, sensor="side")
+    )
+    refused(
+        LightpaintError, "suggested for one view only", [scene, side], [target, target], suggest=1
+    )
+    refused(
+        SceneError,
+        r"^lights=\.\.\. cannot change a scene that is loaded",
+        scene,
+        target,
+        lights=["bulb"],
+    )
+    refused(TargetError, r"^mask=\.\.\. cannot change a target", scene, target, mask="m.exr")
+    refused(
+        ConstraintError,
+        "no light 'x'",
+        scene,
+        target,
+        constraints=Constraints.of({"x": {"off": True}}),
+    )
+
+
+def test_the_lights_file_beside_a_scene_holds_and_is_replaced(room: Path, tmp_path: Path):
+    beside = tmp_path / "room.lights.toml"
+    beside.write_text("[light.bulb]\noff = true\n", encoding="utf-8")
+    write_rgb(tmp_path / "p.exr", np.ones((20, 24, 3), np.float32))
+    given = Constraints.of({"bulb": {"lock": True}})
+    job = Job((SceneFile(str(room)),), (Painting(str(tmp_path / "p.exr")),), tmp_path, None, given)
+    assert [name for name, _, _ in job.asked.lights] == ["bulb", "bulb"]
+    assert job.constraints == given
+    assert f"lights and groups as in {beside}" in job.remarks
+
+
+def test_remarks_say_what_was_done_to_a_painting(here: Path, make_basis: Any):
+    basis = make_basis(3)
+    large = np.repeat(np.repeat(basis.images[0], 2, 0), 2, 1)
+    target = Target(
+        "t",
+        large,
+        np.ones(large.shape[:2], np.float32),
+        everything=True,
+        not_finite=3,
+        notes=("a note",),
+        view=View("agx"),
+    )
+    job = _from_basis(targets=(target,))
+    assert job.remarks == (
+        "t: 20x24 pixels averaged to the basis's 10x12",
+        "t: painted through agx, whose highlights stand for very much light and rule the fit: "
+        'space="display" fits what the eye sees',
+        "t: a note",
+        "t: 3 pixels hold NaN or Inf and count nothing",
+    )
+    quiet = _from_basis(targets=(target,), settings=Settings(resize=True, space="display"))
+    assert quiet.remarks == job.remarks[2:]
+    groups = read_light_groups(here / "groups.exr")
+    job = _from_basis(basis=groups, targets=(Painting("g.exr"),))
+    assert job.remarks[: len(groups.remarks)] == groups.remarks
+
+
+def test_one_listener_hears_work_and_remarks(here: Path):
+    class Ear:
+        def __init__(self) -> None:
+            self.heard: list[str] = []
+
+        def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+            self.heard.append(label)
+
+        def say(self, text: str) -> None:
+            self.heard.append(text)
+
+    job, ear = _from_basis(targets=(replace(Painting("p.exr").content, notes=("a note",)),)), Ear()
+    run(job, ear)
+    assert ear.heard == ["p: a note"]
+    run(job, lambda *_: None)  # a plain callable lets remarks pass
+
+
+def test_a_basis_that_was_obtained_serves_the_next_painting(
+    room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    from lightpaint.basis.render import obtain
+
+    rendered: list[Any] = []
+    once = obtain.render_basis
+    monkeypatch.setattr(
+        obtain, "render_basis", lambda *a, **k: (rendered.append(a), once(*a, **k))[1]
+    )
+    scene = SceneFile(str(room))
+    image = np.ones((20, 24, 3), np.float32)
+    jobs = []
+    for k in range(2):
+        write_rgb(tmp_path / f"{k}.exr", (k + 1) * image)
+        settings = Settings(spp=4, use_cache=False)
+        painting = (Painting(str(tmp_path / f"{k}.exr")),)
+        jobs.append(Job((scene,), painting, tmp_path / f"out{k}", settings=settings))
+    assert jobs[0].views[0].scene is jobs[1].views[0].scene
+    [first] = run(jobs[0])
+    bases = [first.basis]
+    [second] = run(jobs[1], bases=bases)
+    assert len(rendered) == 1
+    assert bases == []
+    assert second.basis is first.basis
+    np.testing.assert_allclose(
+        second.lighting.weights_for(second.basis),
+        2 * first.lighting.weights_for(first.basis),
+        rtol=1e-6,
+        atol=1e-9,
+    )

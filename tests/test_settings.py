@@ -1,0 +1,74 @@
+"""Settings are looked at when they are born, each field with one line."""
+
+import math
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint import LightpaintError, Settings, View
+
+WRONG = {
+    "unpainted": (-0.1, math.nan, math.inf, "1", None, True),
+    "method": ("Gauss-Seidel", "newton", None, ["polished"]),
+    "resize": ("yes", 1, None, 0),
+    "space": ("Display", None, 1),
+    "view": ("srgb", ("agx", 1.0)),
+    "spp": (1, 0, -4, 2.5, "64", True, math.inf),
+    "time_s": (0, -1, math.nan, math.inf, "3", True),
+    "seed": (-1, 0.5, "0", None, False),
+    "resolution": ("half", "1/x", "", 4, (320, 180)),
+    "quality": ("best", "Final", 1),
+    "use_cache": ("no", 0, None),
+    "noise_correction": ("True", 1, None),
+    "refine": (-1, 101, 1.0, "1", None, True),
+    "suggest": (-1, 1.5, None, True),
+    "cd_per_unit": (0, -100, math.nan, math.inf, "100", True),
+    "command": (None, ["lightpaint"]),
+}
+
+RIGHT = {
+    "unpainted": (0, 0.5, np.float64(2)),
+    "method": ("polished", "gauss-seidel"),
+    "resize": (True, False),
+    "space": ("linear", "display"),
+    "view": (None, View("agx", 1.0)),
+    "spp": (None, 2, np.int64(64)),
+    "time_s": (None, 0.1, 3),
+    "seed": (0, 2**70, np.uint8(3)),
+    "resolution": (None, "1/4", "320x180"),
+    "quality": (None, "preview", "final"),
+    "use_cache": (True, False),
+    "noise_correction": (True, False),
+    "refine": (0, 100),
+    "suggest": (0, 3),
+    "cd_per_unit": (None, 100, 0.5),
+    "command": ("", "lightpaint solve a b"),
+}
+
+
+def _each(values: dict[str, Any]) -> list[tuple[str, Any]]:
+    return [(name, value) for name, several in values.items() for value in several]
+
+
+def test_every_field_is_tried() -> None:
+    assert set(WRONG) == set(RIGHT) == {field.name for field in fields(Settings)}
+
+
+@pytest.mark.parametrize(("name", "value"), _each(WRONG))
+def test_a_value_that_means_nothing_is_refused_in_one_line(name: str, value: Any) -> None:
+    with pytest.raises(LightpaintError, match=r"expected|no resolution") as refused:
+        Settings(**{name: value})
+    assert "\n" not in str(refused.value)
+    assert repr(value) in str(refused.value)
+
+
+@pytest.mark.parametrize(("name", "value"), _each(RIGHT))
+def test_a_value_that_means_something_is_taken(name: str, value: Any) -> None:
+    assert getattr(Settings(**{name: value}), name) == value
+
+
+def test_samples_and_a_time_at_once_are_refused() -> None:
+    with pytest.raises(LightpaintError, match=r"spp is 4 and time_s 2: .* not both"):
+        Settings(spp=4, time_s=2)
