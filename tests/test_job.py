@@ -14,7 +14,8 @@ from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_with_light, run
-from lightpaint.basis.basis import Basis, write_basis
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.colour.view import View, ViewChoice
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from light_groups import channels, interleaved, pictures, write
 
-from lightpaint.basis.basis import write_basis
+from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.cli.options import basis_of, jobs_of, settings_of
 from lightpaint.cli.parser import command_parser
