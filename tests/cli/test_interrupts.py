@@ -16,8 +16,8 @@ from lightpaint.basis.basis import Basis, read_basis
 VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
 INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}
 
-#: Samples per pixel: a few seconds of work.
-SPP = {"one pass": 20_000, "separate renders": 2000}
+#: Samples per pixel: seconds of work, where it goes slowly.
+SPP = {"one pass": 10_000, "separate renders": 1000}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
@@ -59,20 +59,32 @@ def samples(basis: Basis) -> int:
     return sum(a + b for a, b, _, _ in each)
 
 
-@pytest.mark.parametrize("method", INTEGRATORS)
+@pytest.fixture(scope="module", params=INTEGRATORS)
+def never_stopped(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, Path, Basis]:
+    """(method, a room, the basis that nothing interrupted)."""
+    method, folder = str(request.param), tmp_path_factory.mktemp("whole")
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
+    room = write_room(folder, lights=lights, integrator=INTEGRATORS[method])
+    with start(folder, room, SPP[method], "whole") as process:
+        assert process.wait(timeout=120) == 0
+    return method, room, read_basis(folder / "whole.exr")
+
+
 @pytest.mark.parametrize("signals", [(signal.SIGINT,), (signal.SIGKILL,), (signal.SIGINT,) * 2])
 def test_stopped_and_gone_on_is_as_if_never_stopped(
-    tmp_path: Path, method: str, signals: tuple[signal.Signals, ...]
+    tmp_path: Path, never_stopped: tuple[str, Path, Basis], signals: tuple[signal.Signals, ...]
 ) -> None:
-    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
-    room, spp = write_room(tmp_path, lights=lights, integrator=INTEGRATORS[method]), SPP[method]
-    done = 0
+    method, room, whole = never_stopped
+    spp, done = SPP[method], 0
     for number in signals:
         with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
             assert process.stderr is not None
             while not process.stderr.readline().startswith("basis"):
-                pass
+                assert process.poll() is None
             while not kept(tmp_path, "stopped"):
+                assert process.poll() is None
                 time.sleep(0.01)
             time.sleep(0.7)
             assert process.poll() is None
@@ -83,20 +95,23 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         if number == signal.SIGINT:
             assert time.monotonic() - stopped_s < 3
             assert code == 130
+            assert said.startswith("lightpaint basis: interrupted")
             assert "are kept; the same command goes on" in said
+            assert said.count("\n") == 1
         [path] = kept(tmp_path, "stopped")
         part = read_basis(path)
         assert part.origin.method == method
         # Nothing of what was kept is lost, and there is more to do.
         assert done < samples(part) < spp * len(part.lights)
         done = samples(part)
-    assert not (tmp_path / "stopped.exr").exists()
+        if number == signal.SIGINT and method == "one pass":
+            assert f"{part.origin.spp} of {spp}" in said
+    assert {p.name for p in tmp_path.iterdir()} == {"stopped"}
 
-    # The same command goes on; beside it, one that was never stopped.
-    for cache in ("stopped", "whole"):
-        with start(tmp_path, room, spp, cache) as process:
-            assert process.wait(timeout=120) == 0
-    stopped, whole = (read_basis(tmp_path / f"{name}.exr") for name in ("stopped", "whole"))
+    # The same command goes on.
+    with start(tmp_path, room, spp, "stopped") as process:
+        assert process.wait(timeout=120) == 0
+    stopped = read_basis(tmp_path / "stopped.exr")
     assert stopped.origin == whole.origin
     assert stopped.origin.spp == spp
     # float32 sums of thousands of samples, written and taken apart again at each stop.
