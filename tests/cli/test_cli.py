@@ -4,10 +4,8 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,7 @@ from command import refused, run, spawn, succeed
 from PIL import Image
 from renderer import LIGHTS, REPOSITORY, write_room
 
-from lightpaint import paint_with_light, read_basis
-from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint import paint_with_light
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
@@ -442,61 +439,6 @@ def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
     room.write_text(text, encoding="utf-8")
     assert "-D width=VALUE" in refused(tmp_path, "lights", room)
     assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9")
-
-
-@pytest.mark.parametrize("delay_s", [0, 0.1])
-def test_interrupted_before_anything_is_done(tmp_path: Path, delay_s: float) -> None:
-    """What is done later, and how it goes on, is test_interrupts.py's."""
-    command = [sys.executable, "-m", "lightpaint", "basis", str(CORNELL), "--spp", "4000"]
-    command += ["--seed", str(int(10 * delay_s))]
-    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
-    with subprocess.Popen(
-        command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stderr is not None
-        while not process.stderr.readline().startswith("basis"):
-            assert process.poll() is None
-        time.sleep(delay_s)
-        process.send_signal(signal.SIGINT)
-        errors = process.stderr.read()
-        assert process.wait(timeout=60) == 130
-    assert errors.startswith("lightpaint basis: interrupted")
-    assert errors.count("\n") == 1
-    assert len(list((tmp_path / "cache").glob("*"))) == ("are kept" in errors)
-    assert [p.name for p in tmp_path.iterdir() if p.name != "cache"] == []
-
-
-@pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])
-def test_killed_at_any_moment_leaves_a_readable_basis(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float
-) -> None:
-    code = f"""
-import lightpaint.scene.render, lightpaint as lp, sys
-from lightpaint.basis.render.obtain import obtain_basis
-sys.modules["lightpaint.basis.render.budget"].KEEP_EVERY_S = 0
-lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
-scene = lp.load_scene({str(CORNELL)!r})
-print("ready", flush=True)
-obtain_basis(scene, spp=100_000)
-"""
-    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path)}
-    with subprocess.Popen(
-        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        while not list(tmp_path.glob("*.basis.exr")):
-            time.sleep(0.01)
-        time.sleep(delay_s)
-        process.kill()
-    [path] = tmp_path.glob("*.basis.exr")
-    basis = read_basis(path)
-    assert basis.origin.spp >= 2
-    # And the next run goes on from there, like one that was never interrupted.
-    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
-    more = basis.origin.spp + 32
-    assert more <= obtain_basis(load_scene(CORNELL), spp=more).origin.spp <= more + 1
-    assert more <= read_basis(path).origin.spp <= more + 1
 
 
 def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, PATH, SAME_SAMPLES, write_room
+from renderer import CORNELL, LIGHTS, PATH, SAME_SAMPLES, write_room
 
 from lightpaint.basis.basis import Basis, read_basis
+from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.scene.scene import load_scene
 
 VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
 INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}
@@ -120,3 +122,57 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     assert np.abs(stopped.half_differences - whole.half_differences).max() <= tolerance
     np.testing.assert_array_equal(stopped.emitters_seen, whole.emitters_seen)
     assert len(kept(tmp_path, "stopped")) == 1
+
+
+@pytest.mark.parametrize("delay_s", [0, 0.1])
+def test_interrupted_before_much_is_done(
+    tmp_path: Path, never_stopped: tuple[str, Path, Basis], delay_s: float
+) -> None:
+    _, room, _ = never_stopped
+    with start(tmp_path, room, 1_000_000, "cache") as process:
+        assert process.stderr is not None
+        while not process.stderr.readline().startswith("basis"):
+            assert process.poll() is None
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        errors = process.stderr.read()
+        assert process.wait(timeout=60) == 130
+    assert errors.startswith("lightpaint basis: interrupted")
+    assert errors.count("\n") == 1
+    assert len(kept(tmp_path, "cache")) == ("are kept" in errors)
+    assert {p.name for p in tmp_path.iterdir()} <= {"cache"}
+
+
+@pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])
+def test_killed_at_any_moment_leaves_a_readable_basis(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float
+) -> None:
+    """However far the writing of a part has come."""
+    code = f"""
+import lightpaint.scene.render, lightpaint as lp, sys
+from lightpaint.basis.render.obtain import obtain_basis
+sys.modules["lightpaint.basis.render.budget"].KEEP_EVERY_S = 0
+lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
+scene = lp.load_scene({str(CORNELL)!r})
+print("ready", flush=True)
+obtain_basis(scene, spp=100_000)
+"""
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        while not list(tmp_path.glob("*.basis.exr")):
+            assert process.poll() is None
+            time.sleep(0.01)
+        time.sleep(delay_s)
+        process.kill()
+    [path] = tmp_path.glob("*.basis.exr")
+    basis = read_basis(path)
+    assert basis.origin.spp >= 2
+    # And the next run goes on from there, like one that was never interrupted.
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    more = basis.origin.spp + 32
+    assert more <= obtain_basis(load_scene(CORNELL), spp=more).origin.spp <= more + 1
+    assert more <= read_basis(path).origin.spp <= more + 1
