@@ -1,13 +1,43 @@
-"""Running the command line as a user does."""
+"""Running the command line as a user does: in this process, or in one of its own."""
 
 import os
 import subprocess
 import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from subprocess import CompletedProcess
+from typing import IO
+
+import pytest
+
+from lightpaint.cli import main
+
+Runner = Callable[..., CompletedProcess[str]]
 
 
-def run(folder: Path, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
-    """`lightpaint …` in `folder`, with these environment variables."""
+def run(folder: Path, *arguments: object, **variables: str) -> CompletedProcess[str]:
+    """`lightpaint …` in `folder`, with these environment variables, in this process.
+
+    One of its own (`spawn`) would load Mitsuba and compile its kernels anew, for seconds. It is
+    for what a process is to itself: its variant of Mitsuba, what it imports, signals, its streams.
+    """
+    given = [str(argument) for argument in arguments]
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        with _surroundings(folder, variables), _printing_to(out, err):
+            try:
+                code = main(given)
+            except SystemExit as end:  # argparse's
+                code = int(end.code or 0)
+        out.seek(0)
+        err.seek(0)
+        return CompletedProcess(given, code, out.read().decode(), err.read().decode())
+
+
+def spawn(folder: Path, *arguments: object, **variables: str) -> CompletedProcess[str]:
+    """`lightpaint …` in `folder`, with these environment variables, in a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "lightpaint", *map(str, arguments)],
         cwd=folder,
@@ -19,17 +49,17 @@ def run(folder: Path, *arguments: object, **variables: str) -> subprocess.Comple
     )
 
 
-def succeed(folder: Path, *arguments: object) -> str:
+def succeed(folder: Path, *arguments: object, by: Runner = run) -> str:
     """What a command that must succeed prints to stdout."""
-    done = run(folder, *arguments)
+    done = by(folder, *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-def refused(folder: Path, *arguments: object) -> str:
+def refused(folder: Path, *arguments: object, by: Runner = run) -> str:
     """The one line a user gets for a mistake; nothing may be left in `folder`."""
     before = sorted(p for p in folder.rglob("*"))
-    done = run(folder, *arguments)
+    done = by(folder, *arguments)
     assert done.returncode == 2, done.stdout + done.stderr
     lines = done.stderr.strip().splitlines()
     assert len(lines) == 1, done.stderr
@@ -37,3 +67,29 @@ def refused(folder: Path, *arguments: object) -> str:
     assert "Traceback" not in done.stderr
     assert sorted(p for p in folder.rglob("*")) == before
     return lines[0]
+
+
+@contextmanager
+def _surroundings(folder: Path, variables: dict[str, str]) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        patch.chdir(folder)
+        for name, value in variables.items():
+            patch.setenv(name, value)
+        yield
+
+
+@contextmanager
+def _printing_to(*files: IO[bytes]) -> Iterator[None]:
+    """What Python, C and C++ print to stdout and stderr goes to these two files."""
+    with ExitStack() as stack:
+        redirections = (redirect_stdout, redirect_stderr)
+        for fd, (file, redirect) in enumerate(zip(files, redirections, strict=True), start=1):
+            (sys.stdout, sys.stderr)[fd - 1].flush()
+            before = os.dup(fd)
+            stack.callback(os.close, before)
+            stack.callback(os.dup2, before, fd)
+            os.dup2(file.fileno(), fd)
+            # Closed, and so flushed, before the descriptor is what it was.
+            text = stack.enter_context(open(fd, "w", encoding="utf-8", closefd=False))
+            stack.enter_context(redirect(text))
+        yield

@@ -1,13 +1,22 @@
-"""Shared fixtures: small synthetic bases, so that the rooms without a renderer test in ms."""
+"""Shared fixtures: small synthetic bases, so that the rooms without a renderer test in ms.
 
+Where the renderer is needed there is one small room, loaded and rendered once, to look at only.
+"""
+
+import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from renderer import write_room
+from threadpoolctl import threadpool_limits
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.render.render import render_basis
+from lightpaint.scene.scene import Scene, load_scene
 
 # Shared machines are slow now and then, which is no failure; a fixed choice of examples makes
 # a run repeatable.
@@ -15,6 +24,23 @@ settings.register_profile("lightpaint", deadline=None, derandomize=True)
 settings.load_profile("lightpaint")
 
 BasisFactory = Callable[..., Basis]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Workers of pytest-xdist share the cores: there, BLAS and children's BLAS have one thread."""
+    if hasattr(config, "workerinput"):
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"
+        threadpool_limits(1, "blas")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line for all skips, whose reasons are the names of what was not there."""
+    skipped = terminalreporter.getreports("skipped")
+    wanting = sorted({report.longrepr[2].removeprefix("Skipped: ") for report in skipped})
+    if wanting:
+        terminalreporter.write_line(
+            f"not tried here, for want of: {', '.join(wanting)} ({len(skipped)} tests)"
+        )
 
 
 @pytest.fixture(scope="session")
@@ -55,6 +81,18 @@ def make_basis() -> BasisFactory:
         return Basis(lights, images, np.asarray(half_differences, np.float32), seen, origin)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def small_room(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """The room of `renderer.py` with all its lights."""
+    return load_scene(write_room(tmp_path_factory.mktemp("small_room")))
+
+
+@pytest.fixture(scope="session")
+def small_room_basis(small_room: Scene) -> BasisFactory:
+    """A function that renders its basis: the same one for the same samples and seed."""
+    return cache(partial(render_basis, small_room))
 
 
 @pytest.fixture(scope="session", autouse=True)

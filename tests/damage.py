@@ -1,235 +1,175 @@
-"""Damaged pictures in thousands, read in a process of its own that may take 2 GB.
+"""Damaged and hostile files in thousands, read in a process of its own that may take 2 GB.
 
 Run as a program it reads a pickle of cases and prints one line for each; the process that gave
-them counts one that never came as a crash or a hang.
+them counts one that never came as a crash or a hang. `damage_readers.py` knows the kinds of files.
 """
 
 import os
 import pickle
 import random
 import resource
+import signal
 import struct
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from damage_readers import Reader
+
+from lightpaint.errors import LightpaintError
+
 MEMORY = 2 * 2**30
-SECONDS = 10.0
+SECONDS = 10
 
 #: Numbers that headers lie with.
 LIES = (0, 1, 2, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
+#: What may become of a case: read as it was before; read as it now says, which another reader
+#: agrees with (`alone` where that one sees none, `read` where there is no other); or refused in one
+#: line that names the file.
+FINE = ("same", "agreed", "alone", "read", "refused")
+
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of one damaged file.
+class Case:
+    """A file, its name and what it holds, and what was done to it.
 
-    said: `same` as undamaged; `refused`; `agreed`: another picture, and another reader sees it
-    too; `alone`: the other reader sees none; or what went wrong.
+    file: in the folder of cases, or wherever it says. content: None for what is there already.
     """
 
-    name: str
-    kind: str
-    at: int
-    said: str
+    file: str
+    done: str
+    content: bytes | None = None
 
 
-def damaged(content: bytes, seed: int, flips: int, lies: int) -> Iterator[tuple[str, int, bytes]]:
-    """(kind of damage, where, bytes): cut at 250 places, bits turned, numbers made to lie."""
+def turned(content: bytes, at: int, bit: int) -> bytes:
+    """`content` with one bit turned."""
+    return content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
+
+
+def damaged(file: str, content: bytes, seed: int, flips: int, lies: int) -> Iterator[Case]:
+    """Cut at 250 places and near the end, bits turned, numbers made to lie."""
     rng = random.Random(seed)
     step = max(1, len(content) // 250)
     for end in sorted({*range(0, len(content), step), *range(len(content) - 20, len(content))}):
-        yield "cut", end, content[:end]
+        yield Case(file, f"cut at {end}", content[:end])
     for k in range(flips):
         # Every other one in the head, where the structure is.
         at = rng.randrange(min(400, len(content)) if k % 2 else len(content))
-        bent = bytearray(content)
-        bent[at] ^= 1 << rng.randrange(8)
-        yield "flip", at, bytes(bent)
+        yield Case(file, f"flip at {at}", turned(content, at, rng.randrange(8)))
     for _ in range(lies):
         at = rng.randrange(min(600, len(content)))
         lie = struct.pack(rng.choice("<>") + rng.choice("HI"), 0)
         number = rng.choice(LIES) & (256 ** len(lie) - 1)
         order = rng.choice(("little", "big"))
-        yield "lie", at, content[:at] + number.to_bytes(len(lie), order) + content[at + len(lie) :]
+        bent = content[:at] + number.to_bytes(len(lie), order) + content[at + len(lie) :]
+        if bent != content:
+            yield Case(file, f"lie at {at}", bent)
 
 
-def outcomes(samples: dict[str, bytes], folder: Path, *, flips: int, lies: int) -> list[Outcome]:
-    """What becomes of every damaged version of these files."""
-    cases = [
-        (name, kind, at, bent)
-        for k, (name, content) in enumerate(samples.items())
-        for kind, at, bent in damaged(content, k, flips, lies)
-        if bent != content
-    ]
-    results: list[Outcome] = []
+def outcomes(
+    kind: str, whole: Mapping[str, bytes], cases: Sequence[Case], folder: Path
+) -> list[tuple[Case, str]]:
+    """What becomes of each case, read as `kind` (see `Reader`). whole: undamaged files by name."""
+    results: list[tuple[Case, str]] = []
     while len(results) < len(cases):
         remaining = cases[len(results) :]
-        with (folder / "cases.pickle").open("wb") as file:
-            pickle.dump((samples, remaining), file)
+        (folder / "cases.pickle").write_bytes(pickle.dumps((kind, whole, remaining)))
         said, end = _worker(folder)
-        for (name, kind, at, _), line in zip(remaining, said, strict=False):
-            results.append(Outcome(name, kind, at, line))
+        results += zip(remaining, said, strict=False)
         if len(said) < len(remaining):
-            name, kind, at, bent = remaining[len(said)]
-            (folder / f"broke_{len(results)}_{name}").write_bytes(bent)
-            results.append(Outcome(name, kind, at, end))
+            results.append((remaining[len(said)], end))
+    print(kind, dict(Counter(said if said in FINE else "anything else" for _, said in results)))
     return results
 
 
-def counted(results: list[Outcome]) -> Counter[str]:
-    """How many are read, refused, and anything else."""
-    fine = ("same", "refused", "agreed", "alone")
-    return Counter(r.said if r.said in fine else "anything else" for r in results)
+def wrong(results: Iterable[tuple[Case, str]], right: Sequence[str] = FINE) -> list[str]:
+    """What ended in any other way."""
+    return [f"{case.file}, {case.done}: {said}" for case, said in results if said not in right]
+
+
+def cut_and_read(results: Iterable[tuple[Case, str]]) -> list[tuple[Case, str]]:
+    """What was cut off, and read as if something were left of it."""
+    return [(c, s) for c, s in results if c.done.startswith("cut") and s not in ("same", "refused")]
+
+
+def clear(error: BaseException, path: Path, longest: int = 2500) -> bool:
+    """Whether an error is one line, no longer than can be read, that names the file."""
+    text = str(error)
+    # A template is a folder; a scene may name what it refers to, which has its name here.
+    named = path.stem in text or path.parent.name in text
+    return named and text.isprintable() and len(text) < longest
+
+
+def attempt(read: Callable[[Path], Any], path: Path, error: type[Exception]) -> Any:
+    """What is read, or None for a clear error of that type."""
+    try:
+        return read(path)
+    except error as refusal:
+        if not clear(refusal, path):
+            raise AssertionError(f"unclear: {refusal}") from refusal
+        return None
 
 
 def _worker(folder: Path) -> tuple[list[str], str]:
     root = Path(__file__).parents[1]
     path = os.pathsep.join([str(root), str(root / "tests"), os.environ.get("PYTHONPATH", "")])
     with (folder / "said").open("w+") as said:
-        try:
-            done = subprocess.run(
-                [sys.executable, __file__, str(folder)],
-                stdout=said,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONPATH": path},
-                timeout=300,
-                check=False,
-            )
-            end = f"ended with {done.returncode}"
-        except subprocess.TimeoutExpired:
-            end = "hung"
+        done = subprocess.run(
+            [sys.executable, __file__, str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": path},
+            timeout=600,
+            check=False,
+        )
         said.seek(0)
+        end = "hung" if done.returncode == -signal.SIGALRM else f"ended with {done.returncode}"
         return said.read().splitlines(), end
 
 
 def _read_all(folder: Path) -> None:
+    kind, whole, cases = pickle.loads((folder / "cases.pickle").read_bytes())
+    out = os.fdopen(os.dup(1), "w")
+    from lightpaint.colour.science import colour_science
+
+    reader = Reader(kind)
+    known = {}
     # Everything that is used is loaded before the limit: threads reserve what they never take.
-    from lightpaint.images.picture import read_picture
-
-    samples, cases = pickle.loads((folder / "cases.pickle").read_bytes())
-    whole = {}
-    for name, content in samples.items():
-        path = folder / name
-        path.write_bytes(content)
-        whole[name] = _picture(read_picture(path))
+    colour_science()
+    for file, content in whole.items():
+        (folder / file).write_bytes(content)
+        known[file] = reader.read(folder / file)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    for name, _, _, bent in cases:
-        path = folder / name
-        path.write_bytes(bent)
-        print(_said(path, whole[name]), flush=True)
+    for case in cases:
+        path = folder / case.file
+        if case.content is not None:
+            path.write_bytes(case.content)
+        signal.alarm(10 * SECONDS)
+        out.write(_said(reader, path, known.get(case.file)) + "\n")
+        out.flush()
 
 
-def _said(path: Path, whole: tuple[object, ...]) -> str:
-    from lightpaint.errors import ImageError
-    from lightpaint.images.picture import read_picture
-
-    began = time.perf_counter()
+def _said(reader: Reader, path: Path, known: Any) -> str:
+    began = time.process_time()  # however busy the machine is
     try:
-        picture = read_picture(path)
-    except ImageError as error:
-        clear = path.name in str(error) and "\n" not in str(error) and len(str(error)) < 600
-        said = "refused" if clear else f"unclear: {str(error)!r}"
+        read = reader.read(path)
+    except LightpaintError as error:
+        # Pictures are refused for less than scenes may be.
+        is_clear = clear(error, path, 600) if reader.kind == "picture" else clear(error, path)
+        said = "refused" if is_clear else f"unclear: {str(error)!r}"
     except BaseException as error:
         return f"{type(error).__name__}: {str(error)[:200]!r}"
     else:
-        said = "same" if _picture(picture) == whole else _second_opinion(path, picture)
-    took = time.perf_counter() - began
+        said = "same" if read == known else reader.opinion(path, read)
+    took = time.process_time() - began
     return said if took < SECONDS else f"took {took:.1f} s"
-
-
-def _second_opinion(path: Path, picture: Any) -> str:
-    """Whether another reader sees in the file what was read: `agreed`, `alone` or `disputed`.
-
-    No reader can know of a bit that is turned in pixels without a checksum; but two that see
-    different pixels in one file cannot both be right.
-    """
-    import numpy as np
-
-    from lightpaint.images.bitmap import read_bitmap
-    from lightpaint.images.picture import file_kind
-
-    try:
-        theirs = _theirs(path, file_kind(path))
-    except Exception:
-        return "alone"
-    if theirs.ndim == 2:
-        theirs = theirs[..., None]
-    if theirs.size == 0:
-        return "alone"
-    theirs = theirs[..., :3] if theirs.shape[-1] >= 3 else theirs[..., :1].repeat(3, axis=-1)
-    if picture.kind == "exr":
-        ours = np.where(picture.finite[..., None], picture.image, 0)
-    else:
-        ours = read_bitmap(path, picture.kind).values
-    if ours.shape != theirs.shape:
-        return f"disputed: {ours.shape} and {theirs.shape}"
-    if picture.codes is None:
-        finite = np.isfinite(theirs).all(axis=-1, keepdims=True)
-        theirs = np.where(finite, theirs, 0)
-        ours = np.where(finite, ours, 0)
-    if picture.alpha is not None and picture.kind == "psd":
-        # What is partly transparent is left out, since readers differ there.
-        theirs, ours = (np.where(picture.alpha[..., None] > 0, v, 0) for v in (theirs, ours))
-    # Two builds of JPEG's library round apart.
-    close = 3 if picture.lossy else 1e-6 * np.abs(theirs).max()
-    with np.errstate(all="ignore"):
-        miss = np.abs(ours.astype(float) - theirs.astype(float)).max()
-    return "agreed" if miss <= close else f"disputed by {miss:g}"
-
-
-def _theirs(path: Path, kind: str) -> Any:
-    """Pixels by a reader that is not ours, (h, w) or (h, w, n)."""
-    import numpy as np
-
-    if kind == "exr":
-        import OpenImageIO
-
-        file = OpenImageIO.ImageInput.open(str(path))
-        spec = file.spec()
-        if "uint" in map(str, [spec.format, *spec.channelformats]):
-            raise ValueError("integers, which it scales to be between 0 and 1")
-        order = [list(spec.channelnames).index(c) for c in "RGB"]
-        stored = file.read_image(0, 0, 0, spec.nchannels, OpenImageIO.FLOAT)[..., order]
-        canvas = np.zeros((spec.full_height, spec.full_width, 3), np.float32)
-        y, x = spec.y - spec.full_y, spec.x - spec.full_x
-        for row in range(stored.shape[0]):
-            for column in range(stored.shape[1]):
-                if 0 <= y + row < canvas.shape[0] and 0 <= x + column < canvas.shape[1]:
-                    canvas[y + row, x + column] = stored[row, column]
-        return canvas
-    if kind == "tiff":
-        import tifffile
-
-        with tifffile.TiffFile(path) as file:
-            return file.pages[0].asarray()
-    if kind == "psd":
-        head = struct.unpack(">HIIH", path.read_bytes()[12:24])
-        channels, height, width, depth = head
-        stored = np.frombuffer(path.read_bytes(), ">u2")
-        if depth == 16 and path.read_bytes()[-channels * height * width * 2 - 2 :][:2] == b"\0\0":
-            return np.moveaxis(
-                stored[-channels * height * width :].reshape(channels, height, -1), 0, -1
-            )
-    from PIL import Image
-
-    with Image.open(path) as image:
-        return np.asarray(image)
-
-
-def _picture(picture: object) -> tuple[object, ...]:
-    """All that is known of a picture, to compare."""
-    import numpy as np
-
-    return tuple(
-        (value.shape, value.tobytes()) if isinstance(value, np.ndarray) else repr(value)
-        for value in vars(picture).values()
-    )
 
 
 if __name__ == "__main__":

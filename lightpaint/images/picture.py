@@ -9,6 +9,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.colour.view import View, ViewChoice
 from lightpaint.errors import ImageError
+from lightpaint.files import one_line
 from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.decode import light_of_floats, light_of_integers, unpremultiply, view_of
 from lightpaint.images.exr import Part, read_parts
@@ -240,5 +241,8 @@ def _looks_straight(image: Floats, alpha: Floats) -> bool:
 
 
 def _naming(path: Path, error: ImageError) -> str:
-    """The message, beginning with the file unless it is named already."""
-    return str(error) if str(path) in str(error) else f"{path} {error}"
+    """The message, beginning with the file unless it is named already.
+
+    It may say names of the file's own, which may hold what a terminal obeys.
+    """
+    return str(error) if str(path) in str(error) else f"{path} {one_line(str(error), limit=2000)}"

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damage import damaged
-from damaged_files import Case, outcomes, wrong
+from damage import Case, cut_and_read, damaged, outcomes, turned, wrong
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
@@ -38,20 +37,18 @@ def path(tmp_path: Path, basis: Basis) -> Path:
 
 def _cases(content: bytes, name: str) -> Iterator[Case]:
     """Cut and turned everywhere, and with numbers that lie in all of the header."""
-    for done, at, bent in damaged(content, 1, 300, 300):
-        yield Case(name, f"{done} at {at}", bent)
+    yield from damaged(name, content, 1, 300, 300)
     head = content.rfind(b"lightpaint") + 600
     rng = random.Random(2)
     for _ in range(300):
         at, bit = rng.randrange(min(head, len(content))), rng.randrange(8)
-        bent = content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
-        yield Case(name, f"bit {bit} of byte {at}", bent)
+        yield Case(name, f"bit {bit} of byte {at}", turned(content, at, bit))
 
 
 def test_damage_of_bytes(path: Path, tmp_path: Path) -> None:
-    whole = tmp_path / "whole.exr"
-    whole.write_bytes(path.read_bytes())
-    results = outcomes("basis", whole, list(_cases(path.read_bytes(), path.name)), tmp_path)
+    content = path.read_bytes()
+    cases = list(_cases(content, path.name))
+    results = outcomes("basis", {path.name: content}, cases, tmp_path)
     # With checksums nothing but what was written is ever read.
     assert wrong(results, ("same", "refused")) == []
     assert len(results) > 1000
@@ -65,14 +62,12 @@ def test_damage_of_light_groups(tmp_path: Path) -> None:
         for layer in ("Combined_key", "Combined_fill")
         for c in "RGB"
     }
-    write_parts(tmp_path / "whole.exr", [Part("ViewLayer", channels)])
-    content = (tmp_path / "whole.exr").read_bytes()
-    cases = [Case("a.exr", f"{d} at {at}", bent) for d, at, bent in damaged(content, 3, 150, 150)]
-    results = outcomes("groups", tmp_path / "whole.exr", cases, tmp_path)
+    write_parts(tmp_path / "a.exr", [Part("ViewLayer", channels)])
+    content = (tmp_path / "a.exr").read_bytes()
+    cases = list(damaged("a.exr", content, 3, 150, 150))
+    results = outcomes("groups", {"a.exr": content}, cases, tmp_path)
     assert wrong(results) == []
-    assert [
-        case.done for case, said in results if case.done[:3] == "cut" and said == "agreed"
-    ] == []
+    assert cut_and_read(results) == []
 
 
 def _edited(name: str) -> Callable[[list[Part]], list[Part]]:

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from renderer import REPOSITORY, write_room
+from command import succeed
+from renderer import CORNELL, REPOSITORY, write_room
 
-CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"
 WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
 
 #: Larger than any XML or JSON here, smaller than any basis, comparison or report.
@@ -28,7 +28,7 @@ def small_disk(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple
         return
     mount = ["mount", "-t", "tmpfs", "-o", f"size={SMALL}", "tmpfs", str(folder)]
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("mounting needs rights that this user does not have")
+        pytest.skip("the right to mount")
     yield folder, "true"
     subprocess.run(["umount", str(folder)], check=True)
 
@@ -74,12 +74,24 @@ def test_a_full_cache_costs_no_answer(small_disk: tuple[Path, str], tmp_path: Pa
             (disk / "others").write_bytes(bytes(SMALL))
 
 
+SMALL_SOLVE = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 4)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A cache that has the basis: what fails is writing results."""
+    folder = tmp_path_factory.mktemp("full_disk")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIGHTPAINT_CACHE", str(folder / "cache"))
+        succeed(folder, *SMALL_SOLVE)
+    return str(folder / "cache")
+
+
 @pytest.mark.parametrize("earlier", [True, False])
 def test_a_full_disk_leaves_earlier_results_as_they_were(
-    small_disk: tuple[Path, str], tmp_path: Path, earlier: bool
+    small_disk: tuple[Path, str], tmp_path: Path, cache: str, earlier: bool
 ) -> None:
     disk, before = small_disk
-    cache = {"LIGHTPAINT_CACHE": str(tmp_path / "cache")}
     folder = disk / "look"
     if earlier:
         folder.mkdir()
@@ -87,10 +99,7 @@ def test_a_full_disk_leaves_earlier_results_as_they_were(
             (folder / name).write_text(f"the earlier {name}", encoding="utf-8")
         (folder / "notes.txt").write_text("mine", encoding="utf-8")
     was = contents(disk)
-    arguments = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 4, "-o", folder)
-    # The basis is there: what fails is writing results.
-    assert run(tmp_path, "true", *arguments[:-1], tmp_path / "elsewhere", **cache)[0] == 0
-    code, output, errors = run(tmp_path, before, *arguments, **cache)
+    code, output, errors = run(tmp_path, before, *SMALL_SOLVE, "-o", folder, LIGHTPAINT_CACHE=cache)
     assert code == 2, output + errors
     [line] = [x for x in errors.splitlines() if x.startswith("lightpaint solve: ")]
     assert f"cannot write {folder}" in line

@@ -9,16 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, PATH, SAME_SAMPLES, write_room
+from renderer import CORNELL, LIGHTS, PATH, SAME_SAMPLES, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
+from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.scene.scene import load_scene
 
 VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
 INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}
 
-#: Samples per pixel: a few seconds of work.
-SPP = {"one pass": 20_000, "separate renders": 2000}
+#: Samples per pixel: seconds of work, where it goes slowly.
+SPP = {"one pass": 10_000, "separate renders": 1000}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
@@ -60,20 +62,32 @@ def samples(basis: Basis) -> int:
     return sum(a + b for a, b, _, _ in each)
 
 
-@pytest.mark.parametrize("method", INTEGRATORS)
+@pytest.fixture(scope="module", params=INTEGRATORS)
+def never_stopped(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, Path, Basis]:
+    """(method, a room, the basis that nothing interrupted)."""
+    method, folder = str(request.param), tmp_path_factory.mktemp("whole")
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
+    room = write_room(folder, lights=lights, integrator=INTEGRATORS[method])
+    with start(folder, room, SPP[method], "whole") as process:
+        assert process.wait(timeout=120) == 0
+    return method, room, read_basis(folder / "whole.exr")
+
+
 @pytest.mark.parametrize("signals", [(signal.SIGINT,), (signal.SIGKILL,), (signal.SIGINT,) * 2])
 def test_stopped_and_gone_on_is_as_if_never_stopped(
-    tmp_path: Path, method: str, signals: tuple[signal.Signals, ...]
+    tmp_path: Path, never_stopped: tuple[str, Path, Basis], signals: tuple[signal.Signals, ...]
 ) -> None:
-    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
-    room, spp = write_room(tmp_path, lights=lights, integrator=INTEGRATORS[method]), SPP[method]
-    done = 0
+    method, room, whole = never_stopped
+    spp, done = SPP[method], 0
     for number in signals:
         with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
             assert process.stderr is not None
             while not process.stderr.readline().startswith("basis"):
-                pass
+                assert process.poll() is None
             while not kept(tmp_path, "stopped"):
+                assert process.poll() is None
                 time.sleep(0.01)
             time.sleep(0.7)
             assert process.poll() is None
@@ -84,20 +98,23 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         if number == signal.SIGINT:
             assert time.monotonic() - stopped_s < 3
             assert code == 130
+            assert said.startswith("lightpaint basis: interrupted")
             assert "are kept; the same command goes on" in said
+            assert said.count("\n") == 1
         [path] = kept(tmp_path, "stopped")
         part = read_basis(path)
         assert part.origin.method == method
         # Nothing of what was kept is lost, and there is more to do.
         assert done < samples(part) < spp * len(part.lights)
         done = samples(part)
-    assert not (tmp_path / "stopped.exr").exists()
+        if number == signal.SIGINT and method == "one pass":
+            assert f"{part.origin.spp} of {spp}" in said
+    assert {p.name for p in tmp_path.iterdir()} == {"stopped"}
 
-    # The same command goes on; beside it, one that was never stopped.
-    for cache in ("stopped", "whole"):
-        with start(tmp_path, room, spp, cache) as process:
-            assert process.wait(timeout=120) == 0
-    stopped, whole = (read_basis(tmp_path / f"{name}.exr") for name in ("stopped", "whole"))
+    # The same command goes on.
+    with start(tmp_path, room, spp, "stopped") as process:
+        assert process.wait(timeout=120) == 0
+    stopped = read_basis(tmp_path / "stopped.exr")
     assert stopped.origin == whole.origin
     assert stopped.origin.spp == spp
     # float32 sums of thousands of samples, written and taken apart again at each stop.
@@ -106,3 +123,57 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     assert np.abs(stopped.half_differences - whole.half_differences).max() <= tolerance
     np.testing.assert_array_equal(stopped.emitters_seen, whole.emitters_seen)
     assert len(kept(tmp_path, "stopped")) == 1
+
+
+@pytest.mark.parametrize("delay_s", [0, 0.1])
+def test_interrupted_before_much_is_done(
+    tmp_path: Path, never_stopped: tuple[str, Path, Basis], delay_s: float
+) -> None:
+    _, room, _ = never_stopped
+    with start(tmp_path, room, 1_000_000, "cache") as process:
+        assert process.stderr is not None
+        while not process.stderr.readline().startswith("basis"):
+            assert process.poll() is None
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        errors = process.stderr.read()
+        assert process.wait(timeout=60) == 130
+    assert errors.startswith("lightpaint basis: interrupted")
+    assert errors.count("\n") == 1
+    assert len(kept(tmp_path, "cache")) == ("are kept" in errors)
+    assert {p.name for p in tmp_path.iterdir()} <= {"cache"}
+
+
+@pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])
+def test_killed_at_any_moment_leaves_a_readable_basis(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float
+) -> None:
+    """However far the writing of a part has come."""
+    code = f"""
+import lightpaint.scene.render, lightpaint as lp, sys
+from lightpaint.basis.render.obtain import obtain_basis
+sys.modules["lightpaint.basis.render.budget"].KEEP_EVERY_S = 0
+lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
+scene = lp.load_scene({str(CORNELL)!r})
+print("ready", flush=True)
+obtain_basis(scene, spp=100_000)
+"""
+    environment = {**os.environ, "LIGHTPAINT_CACHE": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        while not list(tmp_path.glob("*.basis.exr")):
+            assert process.poll() is None
+            time.sleep(0.01)
+        time.sleep(delay_s)
+        process.kill()
+    [path] = tmp_path.glob("*.basis.exr")
+    basis = read_basis(path)
+    assert basis.origin.spp >= 2
+    # And the next run goes on from there, like one that was never interrupted.
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    more = basis.origin.spp + 32
+    assert more <= obtain_basis(load_scene(CORNELL), spp=more).origin.spp <= more + 1
+    assert more <= read_basis(path).origin.spp <= more + 1

@@ -11,7 +11,7 @@ from lightpaint.colour.display import encode_display
 from lightpaint.colour.view import View
 from lightpaint.errors import ViewError
 
-ocio: Any = pytest.importorskip("PyOpenColorIO")
+ocio: Any = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO")
 
 DISPLAY = "sRGB - Display"
 

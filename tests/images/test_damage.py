@@ -15,12 +15,12 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
-from damage import Outcome, counted, outcomes
+from damage import Case, cut_and_read, damaged, outcomes, wrong
 from picture_files import P3, SRGB_CURVE, icc, layered, luminance_chroma, para, png, psd
 from PIL import Image
 
 from lightpaint.errors import ImageError
-from lightpaint.images.picture import read_picture
+from lightpaint.images.picture import read_mask, read_picture
 
 RNG = np.random.default_rng(0)
 BYTES = RNG.integers(0, 256, (8, 8, 3), dtype=np.uint8)
@@ -99,36 +99,46 @@ def _exrs() -> dict[str, bytes]:
     }
 
 
-def _assert_right(results: list[Outcome], *, known: bool) -> None:
+def _outcomes(
+    samples: dict[str, bytes], folder: Path, each: int, *right: str
+) -> list[tuple[Case, str]]:
     """Every one is refused or right; of those that are cut, only what lacks nothing is read."""
-    right = ("same", "refused") if known else ("same", "refused", "agreed", "alone")
-    wrong = [r for r in results if r.said not in right]
-    assert wrong == []
-    assert [r for r in results if r.kind == "cut" and r.said not in ("same", "refused")] == []
+    cases = [
+        case
+        for k, (name, content) in enumerate(samples.items())
+        for case in damaged(name, content, k, each, each)
+    ]
+    results = outcomes("picture", samples, cases, folder)
+    assert wrong(results, ("same", "refused", *right)) == []
+    assert cut_and_read(results) == []
     assert len(results) > 1500
+    return results
 
 
 def test_what_has_checksums(tmp_path: Path):
-    results = outcomes(_checked(), tmp_path, flips=250, lies=250)
-    print(dict(counted(results)))
-    _assert_right(results, known=True)
+    _outcomes(_checked(), tmp_path, 250)
 
 
 def test_what_has_none(tmp_path: Path):
-    results = outcomes(_unchecked(), tmp_path, flips=120, lies=120)
-    print(dict(counted(results)))
-    _assert_right(results, known=False)
+    results = _outcomes(_unchecked(), tmp_path, 120, "agreed", "alone")
     # Few are such that the other reader has no opinion.
-    assert sum(r.said == "alone" for r in results) < len(results) / 50
+    assert sum(said == "alone" for _, said in results) < len(results) / 50
 
 
 def test_exr(tmp_path: Path):
-    results = outcomes(_exrs(), tmp_path, flips=100, lies=100)
-    print(dict(counted(results)))
-    _assert_right(results, known=False)
+    results = _outcomes(_exrs(), tmp_path, 100, "agreed", "alone")
     # The other reader has none of luminance and chroma.
-    alone = [r for r in results if r.said == "alone" and r.name != "chroma.exr"]
+    alone = [case for case, said in results if said == "alone" and case.file != "chroma.exr"]
     assert len(alone) < len(results) / 50
+
+
+def test_names_in_a_file_that_a_terminal_would_obey(tmp_path: Path):
+    plain = {"type": OpenEXR.scanlineimage}
+    (tmp_path / "a.exr").write_bytes(_exr((plain, {"\x1b[2J": FLOATS[..., 0].copy()}, "x")))
+    for read in (read_picture, read_mask):
+        with pytest.raises(ImageError, match=r"a\.exr .*it has \\x1b") as caught:
+            read(tmp_path / "a.exr")
+        assert str(caught.value).isprintable()
 
 
 def _declaring(content: bytes, at: int, order: Any, width: int, height: int) -> bytes:

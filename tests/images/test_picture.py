@@ -94,7 +94,7 @@ def test_an_opaque_alpha_says_nothing(tmp_path: Path):
 
 def _magick() -> str | None:
     """ImageMagick, and not what stands in for it."""
-    for name in ("magick", "convert"):
+    for name in ("magick", "convert-im6", "convert"):
         path = shutil.which(name)
         if (
             path
@@ -104,7 +104,7 @@ def _magick() -> str | None:
     return None
 
 
-@pytest.mark.skipif(_magick() is None, reason="ImageMagick is not installed")
+@pytest.mark.skipif(_magick() is None, reason="ImageMagick")
 @pytest.mark.parametrize(
     ("options", "kind"),
     [
@@ -240,7 +240,7 @@ def test_a_png_that_names_no_view(tmp_path: Path, said: bytes):
 )
 def test_tiff(tmp_path: Path, dtype: Any, options: Any):
     if options.get("compression") in ("lzw", "packbits"):
-        pytest.importorskip("imagecodecs")
+        pytest.importorskip("imagecodecs", reason="imagecodecs")
     pixels = _pixels(dtype)
     tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="rgb", **options)
     _assert_is(read_picture(tmp_path / "a.tif"), pixels, "tiff")

@@ -1,7 +1,9 @@
 """Suggested lights: a hidden one is found, and where none is missing none is named."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -49,26 +51,51 @@ def _present(path: Path, *, seed: int = 1) -> Any:
     return basis.mix(basis.present_weights)
 
 
-def _solved(
-    path: Path, target: Target, constraints: Constraints | None = None
-) -> tuple[Scene, Basis, Solution]:
+def _solved(path: Path, target: Target) -> tuple[Scene, Basis, Solution]:
     scene = load_scene(path)
     basis = render_basis(scene, spp=SPP)
-    return scene, basis, solve(basis, target, constraints=constraints)
+    return scene, basis, solve(basis, target)
+
+
+#: What lights the room that lacks a light.
+LIT = LIGHTS["panel"] + LIGHTS["sky"]
+
+
+@pytest.fixture(scope="module")
+def lacking(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Basis]:
+    """The room without the light, and its basis."""
+    scene = load_scene(write_room(tmp_path_factory.mktemp("lacking"), lights=LIT))
+    return scene, render_basis(scene, spp=SPP)
+
+
+@pytest.fixture(scope="module")
+def missing(
+    lacking: tuple[Scene, Basis], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., tuple[Target, Solution, tuple[Suggestion, ...]]]:
+    """A function: a painting with the light at this place, and what is solved and suggested."""
+
+    @cache
+    def suggested(hidden: Any = HIDDEN) -> tuple[Target, Solution, tuple[Suggestion, ...]]:
+        extra = emitter_xml("extra", hidden, INTENSITY)
+        room = write_room(tmp_path_factory.mktemp("painted"), lights=LIT + extra)
+        scene, basis = lacking
+        target = _target(_present(room))
+        solution = solve(basis, target)
+        return target, solution, suggest_lights(scene, basis, solution)
+
+    return suggested
 
 
 @pytest.mark.parametrize("hidden", [HIDDEN, (-0.9, 1.0, 2.5)])
-def test_a_light_that_is_missing_is_found(tmp_path: Path, hidden: Any):
+def test_a_light_that_is_missing_is_found(
+    tmp_path: Path, lacking: tuple[Scene, Basis], missing: Any, hidden: Any
+):
     """The painting is a render of the room with one light more; the room is solved without it.
 
     The second is beside the camera, out of the picture.
     """
-    lights = LIGHTS["panel"] + LIGHTS["sky"]
-    extra = emitter_xml("extra", hidden, INTENSITY)
-    target = _target(_present(write_room(tmp_path, lights=lights + extra, name="extra.xml")))
-    path = write_room(tmp_path, lights=lights)
-    scene, basis, solution = _solved(path, target)
-    found = suggest_lights(scene, basis, solution)
+    scene, _ = lacking
+    target, solution, found = missing(hidden)
     first = found[0]
     assert np.linalg.norm(np.subtract(first.position, hidden)) < SPACING
     assert (first.seen_at is None) == (hidden != HIDDEN)
@@ -81,27 +108,29 @@ def test_a_light_that_is_missing_is_found(tmp_path: Path, hidden: Any):
         assert one.missed_share == pytest.approx(1 - sum(x.gain_share for x in found[: k + 1]))
 
     # What is promised holds where the light is put into the scene and all is solved anew.
-    pasted = path.read_text(encoding="utf-8").replace("</scene>", f"{first.xml}</scene>")
+    pasted = scene.path.read_text(encoding="utf-8").replace("</scene>", f"{first.xml}</scene>")
     with_it = tmp_path / "pasted.xml"
     with_it.write_text(pasted, encoding="utf-8")
     _, _, again = _solved(with_it, target)
     left = sum(again.certificate.objective) / sum(solution.certificate.objective)
     assert left == pytest.approx(first.missed_share, abs=0.05)
     np.testing.assert_allclose(again.lighting.emission[first.name], first.emission, rtol=0.15)
-    # The same again for the same seed.
-    assert suggest_lights(scene, basis, solution)[0].position == first.position
 
 
-def test_the_ring_is_where_the_light_is_seen(tmp_path: Path):
+def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missing: Any):
+    _, solution, found = missing()
+    [first] = suggest_lights(*lacking, solution, count=1)
+    assert first.position == found[0].position
+
+
+def test_the_ring_is_where_the_light_is_seen(tmp_path: Path, missing: Any):
     """A small bright ball at the place of the light is brightest at that pixel."""
-    lights = LIGHTS["panel"] + LIGHTS["sky"]
-    target = _target(_present(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
-    first = suggest_lights(*_solved(write_room(tmp_path, lights=lights), target), count=1)[0]
+    first = missing()[-1][0]
     x, y, z = first.position
     ball = f"""<shape type="sphere"><point name="center" x="{x}" y="{y}" z="{z}"/>
         <float name="radius" value="0.03"/><emitter type="area"><rgb name="radiance"
         value="1000 1000 1000"/></emitter></shape>"""
-    image = _present(write_room(tmp_path, lights=ball, name="ball.xml"))
+    image = _present(write_room(tmp_path, lights=ball))
     row, column = np.unravel_index(int(image.sum(axis=-1).argmax()), image.shape[:2])
     assert first.seen_at is not None
     # Within the pixel beside it.
@@ -109,31 +138,27 @@ def test_the_ring_is_where_the_light_is_seen(tmp_path: Path):
     assert abs(first.seen_at[1] * image.shape[0] - (row + 0.5)) < 1.5
 
 
-def test_where_the_lights_can_do_it_none_is_named(tmp_path: Path):
-    path = write_room(tmp_path)
-    basis = render_basis(load_scene(path), spp=64)
+def test_where_the_lights_can_do_it_none_is_named(small_room: Scene, small_room_basis: Any):
+    basis = small_room_basis(spp=64)
     exact = _target(basis.mix(0.5 * basis.present_weights))
-    assert suggest_lights(load_scene(path), basis, solve(basis, exact)) == ()
+    assert suggest_lights(small_room, basis, solve(basis, exact)) == ()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_noise_is_not_taken_for_a_lack_of_light(tmp_path: Path, seed: int):
+def test_noise_is_not_taken_for_a_lack_of_light(
+    small_room: Scene, small_room_basis: Any, seed: int
+):
     """Few samples, of basis and painting: much is missed, and no light would help."""
-    path = write_room(tmp_path)
-    scene = load_scene(path)
-    basis = render_basis(scene, spp=4)
-    painted = render_basis(scene, spp=4, seed=seed)
+    basis, painted = small_room_basis(spp=4), small_room_basis(spp=4, seed=seed)
     solution = solve(basis, _target(painted.mix(painted.present_weights)))
     missed = sum(solution.certificate.objective) / solution.equations.target_norm2.sum()
     assert missed > 0.01**2  # else it would not look at all
-    assert suggest_lights(scene, basis, solution) == ()
+    assert suggest_lights(small_room, basis, solution) == ()
 
 
-def test_constraints_hold_beside_a_suggestion(tmp_path: Path):
-    lights = LIGHTS["panel"] + LIGHTS["sky"]
-    target = _target(_present(write_room(tmp_path, lights=lights + EXTRA, name="extra.xml")))
-    asked = Constraints.of({"*": {"lock": True}})
-    scene, basis, solution = _solved(write_room(tmp_path, lights=lights), target, asked)
+def test_constraints_hold_beside_a_suggestion(lacking: tuple[Scene, Basis], missing: Any):
+    scene, basis = lacking
+    solution = solve(basis, missing()[0], constraints=Constraints.of({"*": {"lock": True}}))
     [first] = suggest_lights(scene, basis, solution, count=1)
     assert np.linalg.norm(np.subtract(first.position, HIDDEN)) < SPACING
     assert first.gain_share > 0.7
@@ -207,16 +232,18 @@ def test_names_that_are_taken_are_not_given(tmp_path: Path):
     assert ElementTree.fromstring(first.xml).attrib == {"type": "point", "id": "suggested_2"}
 
 
-def test_what_one_pass_cannot_do_is_refused(tmp_path: Path):
+def test_what_one_pass_cannot_do_is_refused(
+    tmp_path: Path, small_room: Scene, small_room_basis: Any
+):
     scene = load_scene(write_room(tmp_path, integrator='<integrator type="ptracer"/>'))
     with pytest.raises(SceneError, match=r"suggesting lights .* the integrator is 'ptracer'"):
         check_suggestible(scene)
-    basis = render_basis(load_scene(write_room(tmp_path)), spp=2)
+    basis = small_room_basis(spp=4)
     solution = solve(basis, _target(np.ones((20, 24, 3))))
     with pytest.raises(SceneError, match="the integrator is 'ptracer'"):
         suggest_lights(scene, basis, solution)
     with pytest.raises(SceneError, match="0 lights cannot be suggested: ask for one or more"):
-        suggest_lights(load_scene(write_room(tmp_path)), basis, solution, count=0)
+        suggest_lights(small_room, basis, solution, count=0)
 
 
 def _made(name: str, gain: float, missed: float, at: Any = (0.25, 0.5)) -> Suggestion:

@@ -6,12 +6,12 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from renderer import CORNELL, LIGHTS, REPOSITORY, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.lighting.lighting import Lighting, LightSetting, combine
 from lightpaint.relit.relight import check_relightable, relight
@@ -91,17 +91,17 @@ def test_nothing_but_emissions_and_the_path_changes(tmp_path: Path) -> None:
     assert "<!--" in relit.read_text(encoding="utf-8")
 
 
-def test_same_lighting_changes_only_the_numbers_spelling(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    relit = relight(scene, lighting_of(scene, {}), tmp_path / "out" / "relit.xml")
-    assert [x.emission for x in relit.lights] == [x.emission for x in scene.lights]
+def test_same_lighting_changes_only_the_numbers_spelling(tmp_path: Path, small_room: Scene) -> None:
+    relit = relight(small_room, lighting_of(small_room, {}), tmp_path / "out" / "relit.xml")
+    assert [x.emission for x in relit.lights] == [x.emission for x in small_room.lights]
 
 
-def test_off_is_black_and_never_sampled_and_the_emitter_stays(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    dark = lighting_of(scene, {"bulb": (0, 0, 0), "panel": (0, 0, 0)})
-    relit = relight(scene, dark, tmp_path / "out" / "relit.xml")
-    assert [x.name for x in relit.lights] == [x.name for x in scene.lights]
+def test_off_is_black_and_never_sampled_and_the_emitter_stays(
+    tmp_path: Path, small_room: Scene
+) -> None:
+    dark = lighting_of(small_room, {"bulb": (0, 0, 0), "panel": (0, 0, 0)})
+    relit = relight(small_room, dark, tmp_path / "out" / "relit.xml")
+    assert [x.name for x in relit.lights] == [x.name for x in small_room.lights]
     assert relit.light("bulb").emission == (0, 0, 0)
     assert relit.light("bulb").members[0].sampling_weight == 0
     assert relit.light("beam").members[0].sampling_weight == 1
@@ -111,22 +111,22 @@ def test_off_is_black_and_never_sampled_and_the_emitter_stays(tmp_path: Path) ->
     assert again.light("bulb").members[0].sampling_weight == 1
 
 
-def test_all_lights_off_still_loads(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    black = lighting_of(scene, {light.name: (0, 0, 0) for light in scene.lights})
-    relit = relight(scene, black, tmp_path / "out" / "relit.xml")
+def test_all_lights_off_still_loads(tmp_path: Path, small_room: Scene) -> None:
+    black = lighting_of(small_room, {light.name: (0, 0, 0) for light in small_room.lights})
+    relit = relight(small_room, black, tmp_path / "out" / "relit.xml")
     assert mitsuba_render(relit, seed=0, spp=4).max() == 0
 
 
-def test_verification_agrees_and_a_tampered_scene_does_not(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    basis = render_basis(scene, spp=256)
-    lighting = random_lighting(scene, 5)
+def test_verification_agrees_and_a_tampered_scene_does_not(
+    tmp_path: Path, small_room: Scene, small_room_basis: Any
+) -> None:
+    basis = small_room_basis(spp=256)
+    lighting = random_lighting(small_room, 5)
     predicted = combine(basis, lighting)
-    relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
+    relit = relight(small_room, lighting, tmp_path / "out" / "relit.xml")
     assert verify(predicted, relit, spp=256).agrees
     brighter = {name: (r * 1.1, g, b) for name, (r, g, b) in lighting.emission.items()}
-    other = relight(scene, lighting_of(scene, brighter), tmp_path / "other" / "relit.xml")
+    other = relight(small_room, lighting_of(small_room, brighter), tmp_path / "other" / "relit.xml")
     assert not verify(predicted, other, spp=256).agrees
 
 

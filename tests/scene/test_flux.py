@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from renderer import LIGHTS, write_room
 
 from lightpaint.scene.lights import Light
 from lightpaint.scene.scene import Scene, load_scene
-from tests.renderer import LIGHTS, write_room
 
 #: The renderer's numbers are float32.
 SINGLE = 1e-5

@@ -9,25 +9,24 @@ import pytest
 from renderer import CORNELL, LIGHTS, mitsuba_render, write_room
 
 from lightpaint.errors import BackendError, SceneError
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.variant import use_variant
 
 
-def test_lights_in_document_order_with_what_they_emit(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    assert [light.name for light in scene.lights] == list(LIGHTS)
-    assert [light.plugin for light in scene.lights] == [
+def test_lights_in_document_order_with_what_they_emit(small_room: Scene) -> None:
+    assert [light.name for light in small_room.lights] == list(LIGHTS)
+    assert [light.plugin for light in small_room.lights] == [
         "area",
         "point",
         "spot",
         "directional",
         "constant",
     ]
-    emissions = [light.emission for light in scene.lights]
+    emissions = [light.emission for light in small_room.lights]
     expected = [(4, 3, 2), (0.5, 0.6, 0.7), (3, 3, 3), (1, 0.9, 0.8), (0.1, 0.2, 0.3)]
     np.testing.assert_allclose(emissions, expected, rtol=1e-6)  # float32
-    assert scene.size == (20, 24)
-    assert scene.spp == 16
+    assert small_room.size == (20, 24)
+    assert small_room.spp == 16
 
 
 def test_names_come_from_emitter_else_shape_else_plugin_and_number(tmp_path: Path) -> None:

@@ -100,11 +100,11 @@ def run(folder: Path, *command: str, **environment: str) -> None:
     assert started.returncode == 0, said.decode(errors="replace")[-2000:]
 
 
-def needs(program: str) -> str:
+def needs(command: str, program: str) -> str:
     """The path of a program. Scripts are written for the versions that these names stand for."""
-    found = shutil.which(program)
+    found = shutil.which(command)
     if found is None:
-        pytest.skip(f"{program} is not installed")
+        pytest.skip(program)
     return found
 
 
@@ -133,7 +133,7 @@ def lights(basis: lp.Basis, target: lp.Target) -> np.ndarray:
 
 
 def test_gimp(folder: Path, basis: lp.Basis) -> None:
-    gimp = needs("gimp-console-2.10")
+    gimp = needs("gimp-console-2.10", "GIMP 2.10")
     script = folder / "gimp.scm"
     paint = (SCRIPTS / "gimp.scm").read_text(encoding="utf-8")
     script.write_text(f'(define folder "{folder}/")\n{paint}', encoding="utf-8")
@@ -149,7 +149,7 @@ def test_gimp(folder: Path, basis: lp.Basis) -> None:
 
 def test_krita(folder: Path, basis: lp.Basis) -> None:
     # It wants a display, and on Linux takes no other than X11's.
-    krita, display = needs("kritarunner"), needs("xvfb-run")
+    krita, display = needs("kritarunner", "Krita"), needs("xvfb-run", "Xvfb")
     run(
         folder,
         *(display, "-a", krita, "-s", "lightpaint_krita"),
@@ -176,7 +176,7 @@ def test_krita(folder: Path, basis: lp.Basis) -> None:
 
 
 def test_imagemagick(folder: Path, basis: lp.Basis) -> None:
-    convert = needs("convert-im6")
+    convert = needs("convert-im6", "ImageMagick")
     strokes = ("-fill", "rgba(255,200,120,0.8)", "-draw", "circle 60,48 72,48")
     strokes += ("-fill", "rgba(70,110,220,0.8)", "-draw", "circle 140,92 152,92", "-blur", "0x4")
     layer = ("(", "-size", f"{WIDTH}x{HEIGHT}", "xc:none", *strokes, ")")
@@ -194,7 +194,7 @@ def test_imagemagick(folder: Path, basis: lp.Basis) -> None:
 
 
 def test_oiiotool(folder: Path, basis: lp.Basis) -> None:
-    oiiotool = needs("oiiotool")
+    oiiotool = needs("oiiotool", "oiiotool")
     make = (oiiotool, "--create", f"{WIDTH}x{HEIGHT}", "4", "-d", "float")
     make += ("--fill:color=0.8,0.5,0.2,0.8", "32x32+44+32", "--fill:color=0.06,0.15,0.6,0.8")
     make += ("32x32+124+76", "--kernel", "gaussian", "13x13", "--convolve")

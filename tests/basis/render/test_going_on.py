@@ -14,7 +14,7 @@ from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.render import plan_passes
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene import Scene, load_scene
 
 
 @pytest.fixture(autouse=True)
@@ -34,20 +34,17 @@ def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:
 
 
 @pytest.mark.parametrize("through_a_file", [True, False])
-def test_in_two_goes_as_in_one(tmp_path: Path, through_a_file: bool) -> None:
-    scene = load_scene(write_room(tmp_path))
-    first = render_basis(scene, spp=16, seed=3)
+def test_in_two_goes_as_in_one(tmp_path: Path, small_room: Scene, through_a_file: bool) -> None:
+    first = render_basis(small_room, spp=16, seed=3)
     if through_a_file:
         write_basis(tmp_path / "b.exr", first)
         first = read_basis(tmp_path / "b.exr")
-    same_basis(
-        render_basis(scene, spp=40, seed=3, start=first), render_basis(scene, spp=40, seed=3)
-    )
+    gone_on = render_basis(small_room, spp=40, seed=3, start=first)
+    same_basis(gone_on, render_basis(small_room, spp=40, seed=3))
 
 
 @pytest.mark.parametrize("after", [2, 3, 5])
-def test_an_interrupt_keeps_what_is_done(tmp_path: Path, after: int) -> None:
-    scene = load_scene(write_room(tmp_path))
+def test_an_interrupt_keeps_what_is_done(small_room: Scene, after: int) -> None:
     kept: list[Basis] = []
 
     def keep(basis: Basis) -> bool:
@@ -61,22 +58,20 @@ def test_an_interrupt_keeps_what_is_done(tmp_path: Path, after: int) -> None:
     plan = plan_passes(24 * 20, 40)
     done = sum(size for _, size in plan[:after])
     with pytest.raises(Interrupted, match=f"{done} of 40"):
-        render_basis(scene, spp=40, keep=keep, progress=press_ctrl_c)
+        render_basis(small_room, spp=40, keep=keep, progress=press_ctrl_c)
     assert kept[-1].origin.spp == done
-    same_basis(render_basis(scene, spp=40, start=kept[-1]), render_basis(scene, spp=40))
+    same_basis(render_basis(small_room, spp=40, start=kept[-1]), render_basis(small_room, spp=40))
 
 
-def test_enough_is_enough(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    basis = render_basis(scene, spp=16)
-    assert render_basis(scene, spp=8, start=basis) is basis
+def test_enough_is_enough(small_room: Scene) -> None:
+    basis = render_basis(small_room, spp=16)
+    assert render_basis(small_room, spp=8, start=basis) is basis
 
 
-def test_nothing_is_mixed(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    basis = render_basis(scene, spp=4)
+def test_nothing_is_mixed(tmp_path: Path, small_room: Scene) -> None:
+    basis = render_basis(small_room, spp=4)
     with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
-        render_basis(scene, spp=8, seed=1, start=basis)
+        render_basis(small_room, spp=8, seed=1, start=basis)
     changed = load_scene(write_room(tmp_path), parameters={"width": 20})
     with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
         render_basis(changed, spp=8, start=basis)

@@ -1,6 +1,7 @@
 """The one-pass basis against Mitsuba's own renders: its plain twin, n of them."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,13 +49,12 @@ def test_sum_of_planes_on_the_cornell_box() -> None:
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
 
 
-def test_weighted_planes_are_the_relit_render_at_the_same_seed(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    planes = one_pass(scene, seed=5, spp=16)
+def test_weighted_planes_are_the_relit_render_at_the_same_seed(small_room: Scene) -> None:
+    planes = one_pass(small_room, seed=5, spp=16)
     rng = np.random.default_rng(1)
-    weights = rng.uniform(0.1, 3, (len(scene.lights), 3))
-    emission = {x.name: tuple(w) for x, w in zip(scene.lights, weights.tolist(), strict=True)}
-    rendered = mitsuba_render(scene, emission, seed=5, spp=16)
+    weights = rng.uniform(0.1, 3, (len(small_room.lights), 3))
+    emission = {x.name: tuple(w) for x, w in zip(small_room.lights, weights.tolist(), strict=True)}
+    rendered = mitsuba_render(small_room, emission, seed=5, spp=16)
     mixed = np.einsum("nhwc,nc->hwc", planes, weights)
     # float32 throughput times weights in another order.
     assert np.abs(mixed - rendered).max() <= 1e-5 * rendered.max()
@@ -69,10 +69,11 @@ def test_plane_of_an_only_light_is_exactly_its_render(tmp_path: Path, name: str)
     assert np.abs(plane - rendered).max() <= SAME_SAMPLES * rendered.max()
 
 
-def test_each_plane_is_that_light_alone_within_noise(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    basis = render_basis(scene, spp=256, seed=0)
-    separate = _render_one_by_one(scene, Budget(256), 0, None, Keeper(None), silent)
+def test_each_plane_is_that_light_alone_within_noise(
+    small_room: Scene, small_room_basis: Any
+) -> None:
+    basis = small_room_basis(spp=256)
+    separate = _render_one_by_one(small_room, Budget(256), 0, None, Keeper(None), silent)
     images, differences = separate.images, separate.half_differences
     seen = separate.emitters_seen
     for k, name in enumerate(basis.names):
@@ -87,12 +88,11 @@ def test_each_plane_is_that_light_alone_within_noise(tmp_path: Path) -> None:
     assert not seen.all()
 
 
-def test_a_light_alone_is_black_elsewhere(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    names = [light.name for light in scene.lights]
+def test_a_light_alone_is_black_elsewhere(small_room: Scene) -> None:
+    names = [light.name for light in small_room.lights]
     only = {name: WHITE if name == "beam" else BLACK for name in names}
-    image = mitsuba_render(scene, only, seed=0, spp=16)
-    everything = mitsuba_render(scene, dict.fromkeys(names, WHITE), seed=0, spp=16)
+    image = mitsuba_render(small_room, only, seed=0, spp=16)
+    everything = mitsuba_render(small_room, dict.fromkeys(names, WHITE), seed=0, spp=16)
     assert 0 < image.sum() < everything.sum()
 
 
@@ -146,11 +146,10 @@ def test_point_light_over_a_plane_has_its_closed_form(tmp_path: Path) -> None:
     np.testing.assert_allclose(row, expected, rtol=1e-2)
 
 
-def test_the_present_look_comes_back_from_present_weights(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
-    planes = one_pass(scene, seed=9, spp=16)
-    present = np.array([light.emission for light in scene.lights])
-    rendered = mitsuba_render(scene, seed=9, spp=16)
+def test_the_present_look_comes_back_from_present_weights(small_room: Scene) -> None:
+    planes = one_pass(small_room, seed=9, spp=16)
+    present = np.array([light.emission for light in small_room.lights])
+    rendered = mitsuba_render(small_room, seed=9, spp=16)
     mixed = np.einsum("nhwc,nc->hwc", planes, present)
     assert np.abs(mixed - rendered).max() <= 1e-5 * rendered.max()
 
@@ -283,9 +282,8 @@ def test_direct_is_path_of_depth_2(tmp_path: Path) -> None:
     assert abs(gap) <= 5 * np.sqrt(noise)
 
 
-def test_equal_seeds_repeat_and_others_differ(tmp_path: Path) -> None:
-    scene: Scene = load_scene(write_room(tmp_path))
-    a, b, c = (render_basis(scene, spp=4, seed=s) for s in (0, 0, 1))
+def test_equal_seeds_repeat_and_others_differ(small_room: Scene) -> None:
+    a, b, c = (render_basis(small_room, spp=4, seed=s) for s in (0, 0, 1))
     # Threads add in any order: the last bits of float32.
     assert np.abs(a.images - b.images).max() <= SAME_SAMPLES * a.images.max()
     assert np.abs(a.images - c.images).max() > 0.01 * a.images.max()
@@ -360,7 +358,6 @@ def test_what_does_not_fit_is_refused_before_it_is_tried(tmp_path: Path) -> None
     assert memory_needed(large) > 5 * 600_000 * 20 * 3 * 4 * 6
 
 
-def test_too_few_samples_are_refused(tmp_path: Path) -> None:
-    scene = load_scene(write_room(tmp_path))
+def test_too_few_samples_are_refused(small_room: Scene) -> None:
     with pytest.raises(SceneError, match="too few for two halves"):
-        render_basis(scene, spp=1)
+        render_basis(small_room, spp=1)

@@ -124,7 +124,7 @@ class Nuke:
     """The few nodes that the script uses, over Tcl's own parser: what a pixel comes to."""
 
     def __init__(self) -> None:
-        tkinter = pytest.importorskip("tkinter")
+        tkinter = pytest.importorskip("tkinter", reason="Tk")
         self.tcl = tkinter.Tcl()
         self.stack: list[Any] = []
         self.layers = {"rgba"}
@@ -308,7 +308,7 @@ def blender() -> Iterator[list[str]]:
     elif found := shutil.which("blender"):
         yield [found, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
     else:
-        pytest.skip("no Blender: set LIGHTPAINT_BPY to a Python with the module bpy")
+        pytest.skip("Blender (LIGHTPAINT_BPY: a Python with its module bpy)")
 
 
 def _in_blender(blender: list[str], script: Path, *arguments: object) -> str:
