@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from lightpaint.basis.lightgroups.read import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.read import read_light_groups as read_light_groups
     from lightpaint.basis.render.render import render_basis as render_basis
-    from lightpaint.colour.view import View as View
+    from lightpaint.colour.transform import ViewTransform as ViewTransform
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
     from lightpaint.images.png import display_picture as display_picture
@@ -82,7 +82,7 @@ _HOMES = {
     "Suggestion": "placement.suggest",
     "Target": "target.target",
     "Verification": "relit.verify",
-    "View": "colour.view",
+    "ViewTransform": "colour.transform",
     "combine": "lighting.lighting",
     "display_picture": "images.png",
     "load_scene": "scene.scene",

@@ -15,7 +15,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.obtain import check_same_view
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.colour.display import choose_exposure
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -83,7 +83,7 @@ class Job:
     by_sensor: bool = False
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
     asked: Constraints = field(init=False, repr=False)
-    display: View | None = field(init=False, repr=False)
+    display: ViewTransform | None = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
     _relit: tuple[Path, ...] = field(init=False, repr=False)
 
@@ -223,20 +223,22 @@ class Job:
         fitted = target.fitted_to(given.size, resize=self.settings.resize)
         return scene, fitted if self.groups is None else fitted.without(self.groups.holes)
 
-    def _display(self, views: Sequence[PaintedView]) -> View | None:
+    def _display(self, views: Sequence[PaintedView]) -> ViewTransform | None:
         """The one view through which all paintings are compared, None for linear light."""
         if self.settings.space == "linear":
             return None
-        if self.settings.view is not None:
-            return self.settings.view
-        seen = {view.target.view for view in views if view.target.view is not None}
+        if self.settings.transform is not None:
+            return self.settings.transform
+        seen = {view.target.transform for view in views if view.target.transform is not None}
         if len(seen) > 1:
             told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
             raise TargetError(
                 f"the paintings were seen through {told}: say with view=... which of them is to "
                 "be fitted"
             )
-        return next(iter(seen), None) or View("srgb", choose_exposure(views[0].target.image))
+        return next(iter(seen), None) or ViewTransform(
+            "srgb", choose_exposure(views[0].target.image)
+        )
 
     def _remarks(self, targets: Sequence[Target]) -> list[str]:
         """What a person should know before this is run. targets: as they were read."""

@@ -9,7 +9,7 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.obtain import check_same_view, obtain_basis
-from lightpaint.colour.view import ViewChoice
+from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.files import restoring
 from lightpaint.images.estimate import write_estimate
@@ -57,7 +57,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         constraints=job.asked,
         unpainted=settings.unpainted,
         method=settings.method,
-        view=job.display,
+        transform=job.display,
     )
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
@@ -154,7 +154,10 @@ def _job(
     """What the arguments of `paint_with_light` ask for. scene, target: and how to read them."""
     (scenes, how), (targets, mask) = scene, target
     by_sensor = isinstance(scenes, list | tuple)
-    painted: dict[str, Any] = {"mask": mask and str(mask), "view": ViewChoice.of(settings.view)}
+    painted: dict[str, Any] = {
+        "mask": mask and str(mask),
+        "transform": TransformChoice.of(settings.transform),
+    }
     scenes = [SceneFile(str(x), **how) if _is_path(x) else x for x in _listed(scenes)]
     targets = [Painting(str(x), **painted) if _is_path(x) else x for x in _listed(targets)]
     if how and not scenes:

@@ -48,7 +48,7 @@ def remarks_of_target(
     is_asked_for = settings.resize or settings.resolution or settings.quality
     if size != target.size and not is_asked_for:
         remarks.append(f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}")
-    name = "srgb" if target.view is None else target.view.name
+    name = "srgb" if target.transform is None else target.transform.name
     if settings.space == "linear" and name not in ("srgb", "linear"):
         remarks.append(
             f"painted through {name}, whose highlights stand for very much light and rule the "

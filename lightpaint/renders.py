@@ -4,7 +4,7 @@ from pathlib import Path
 
 from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.display import choose_exposure
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.files import restoring
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.png import write_png
@@ -25,14 +25,14 @@ def render_template(
     scene: Scene,
     folder: Path,
     *,
-    view: View | None = None,
+    transform: ViewTransform | None = None,
     spp: int | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> list[Path]:
     """Render something to paint on into `folder`, and return its files (docs/targets.md).
 
-    view: how the look becomes a picture; sRGB by default, at an exposure that shows something.
+    transform: how the look becomes a picture; sRGB by default, at an exposure that shows something.
     """
     look = render(
         scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
@@ -42,7 +42,7 @@ def render_template(
     lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
     template = Template(
         look,
-        view or View("srgb", choose_exposure(look)),
+        transform or ViewTransform("srgb", choose_exposure(look)),
         scene=scene.path.name,
         content=scene.content,
         sensor=scene.sensor_names[scene.sensor],
@@ -62,7 +62,7 @@ def render_look(
     scene: Scene,
     path: Path,
     *,
-    view: View | None = None,
+    transform: ViewTransform | None = None,
     spp: int | None = None,
     seed: int = 0,
     progress: Progress = silent,
@@ -71,7 +71,7 @@ def render_look(
     look = render(
         scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
     ).image
-    return write_look(path, look, view or View("srgb", choose_exposure(look)))
+    return write_look(path, look, transform or ViewTransform("srgb", choose_exposure(look)))
 
 
 def relight_look(

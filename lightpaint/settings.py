@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from numbers import Integral, Real
 from typing import Any, get_args
 
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.problem import Space
@@ -25,8 +25,9 @@ class Settings:
     unpainted: weight of unpainted pixels against the current look.
     method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
     resize: whether a target of another size is resampled.
-    space: `linear`, or `display` to come closest in what a display shows, which is `view`; None
-    for that of the painting or, where it holds light, sRGB at an exposure that shows something.
+    space: `linear`, or `display` to come closest in what a display shows, which is `transform`;
+    None for that of the painting or, where it holds light, sRGB at an exposure that shows
+    something.
 
     What is rendered:
     spp, seed: of the basis and, with other random numbers, of the verification.
@@ -53,7 +54,7 @@ class Settings:
     method: Method = "polished"
     resize: bool = False
     space: Space = "linear"
-    view: View | None = None
+    transform: ViewTransform | None = None
     spp: int | None = None
     time_s: float | None = None
     seed: int = 0
@@ -127,7 +128,7 @@ _EXPECTED: dict[str, Check] = {
     "method": _one_of(Method),
     "resize": _SWITCH,
     "space": _one_of(Space),
-    "view": _a(View, "a View, like View('agx', 1.0)"),
+    "transform": _a(ViewTransform, "a ViewTransform, like ViewTransform('agx', 1.0)"),
     # Two halves of the samples tell the noise.
     "spp": _whole(2),
     "time_s": _number("seconds"),

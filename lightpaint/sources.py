@@ -13,7 +13,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
-from lightpaint.colour.view import View, ViewChoice
+from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints, Tie
 from lightpaint.records import strict_json
@@ -52,7 +52,7 @@ class Painting:
     path: str
     mask: str | None = None
     layer: str | None = None
-    view: ViewChoice = field(default_factory=ViewChoice)
+    transform: TransformChoice = field(default_factory=TransformChoice)
     template: str | None = None
     find: bool = True
     paint: Paint = "look"
@@ -139,13 +139,14 @@ def from_json(text: str) -> dict[str, Any]:
         if unknown := set(data) - set(FIELDS):
             raise ValueError(f"it has the keys {', '.join(sorted(unknown))}")
         settings, constraints = data["settings"], data["constraints"]
-        view = settings["view"] and View(**settings["view"])
+        transform = settings["transform"] and ViewTransform(**settings["transform"])
         return {
             "folder": Path(data["folder"]),
             "by_sensor": bool(data["by_sensor"]),
             "scenes": tuple(SceneFile(**one) for one in data["scenes"]),
             "targets": tuple(
-                Painting(**{**one, "view": ViewChoice(**one["view"])}) for one in data["targets"]
+                Painting(**{**one, "transform": TransformChoice(**one["transform"])})
+                for one in data["targets"]
             ),
             "basis": _made(data["basis"]),
             "constraints": Constraints(
@@ -155,7 +156,7 @@ def from_json(text: str) -> dict[str, Any]:
                     "ties": tuple(_tie(**one) for one in constraints["ties"]),
                 }
             ),
-            "settings": Settings(**{**settings, "view": view}),
+            "settings": Settings(**{**settings, "transform": transform}),
         }
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         said = " ".join(str(error).split())

@@ -38,7 +38,7 @@ class Reader:
             from lightpaint.target.template import read_template
 
             template = read_template(path.parent)
-            return template.view, template.scene, template.content, template.sensor
+            return template.transform, template.scene, template.content, template.sensor
         if self.kind == "basis":
             from lightpaint.basis.file import read_basis, read_origin
 
@@ -54,7 +54,7 @@ class Reader:
         from lightpaint.scene.scene import load_scene
 
         scene = load_scene(path)
-        return scene.view, scene.spp, scene.integrator, scene.emitters
+        return scene.transform, scene.spp, scene.integrator, scene.emitters
 
     def opinion(self, path: Path, read: Any) -> str:
         """What is to be said of a damaged file that was read as something else than before."""

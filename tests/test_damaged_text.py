@@ -19,7 +19,7 @@ from damage_readers import Reader, contents, contents_of_json
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
 from lightpaint.files import MAX_TEXT
 from lightpaint.lighting.bound import Bound
@@ -85,7 +85,7 @@ def lights(tmp_path: Path) -> Path:
 
 def _write_template(folder: Path) -> Path:
     image = np.ones((4, 5, 3), np.float32)
-    template = Template(image, View("srgb", 0.5), "hall.xml", "12ab", "camera", image)
+    template = Template(image, ViewTransform("srgb", 0.5), "hall.xml", "12ab", "camera", image)
     write_template(folder, template, normals=image, depth=image[..., 0], mattes={}, lights={})
     return folder / "template.json"
 

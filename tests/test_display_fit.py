@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.cli import main
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.images.exr import write_rgb
 from lightpaint.images.png import write_png_16
@@ -41,7 +41,7 @@ def folder(basis: Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     monkeypatch.chdir(tmp_path)
     write_basis(tmp_path / "room.basis.exr", basis)
     image = basis.mix(TRUTH)
-    codes = np.round(255 * View("srgb", 2.0).encode(image)).astype(np.uint8)
+    codes = np.round(255 * ViewTransform("srgb", 2.0).encode(image)).astype(np.uint8)
     assert 0.02 < (codes == 255).mean() < 0.8
     Image.fromarray(codes).save("clip.png")
     y = np.linspace(0, 1, image.shape[0], dtype=np.float32)[:, None, None]
@@ -63,7 +63,7 @@ def test_the_light_of_a_picture_that_clips_is_found(folder: Path):
     # Codes are light to 1 %, where they are some hundred.
     np.testing.assert_allclose(_weights("a"), TRUTH, rtol=0.02, atol=0.02)
     # Taken by its word, it asks for less light.
-    target = lp.read_target("clip.png", view=View("srgb", 2.0))
+    target = lp.read_target("clip.png", transform=ViewTransform("srgb", 2.0))
     plain = lp.Target("t", target.image, target.importance, target.everything)
     found = lp.solve(lp.read_basis("room.basis.exr"), plain)
     dimmer = found.lighting.weights_for(lp.read_basis("room.basis.exr"))
@@ -95,11 +95,11 @@ def test_display_space_on_the_command_line(folder: Path, capsys: pytest.CaptureF
     # On the display it is closer, and in light it cannot be.
     basis, painted = lp.read_basis("room.basis.exr"), lp.read_target("odd.exr").image
     D = ~basis.emitters_seen[..., None]
-    view = View("srgb", 1.0)
+    transform = ViewTransform("srgb", 1.0)
     off = {}
     for name in ("lin", "dis"):
         x = basis.mix(_weights(name))
-        shown = np.square(view.encode(x) - view.encode(painted))
+        shown = np.square(transform.encode(x) - transform.encode(painted))
         off[name] = (D * shown).sum(), (D * np.square(x - painted)).sum()
     assert off["dis"][0] < off["lin"][0]
     assert off["dis"][1] > off["lin"][1]
@@ -116,17 +116,17 @@ def test_the_view_is_that_of_the_picture(folder: Path):
 
 def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Basis):
     """And a view alone is at the template's exposure: half of what is asked is the template's."""
-    image, view = basis.mix(TRUTH), View("agx", -3.0)
+    image, transform = basis.mix(TRUTH), ViewTransform("agx", -3.0)
     nothing = np.zeros_like(image)
     write_template(
         folder,
-        Template(image / 2, view),
+        Template(image / 2, transform),
         normals=nothing,
         depth=nothing[..., 0],
         mattes={},
         lights={},
     )
-    write_png_16(folder / "painted.png", view.encode(image))
+    write_png_16(folder / "painted.png", transform.encode(image))
     for asked, shown in (
         ([], "agx at -3.0 stops"),
         (["--exposure", "-2.5"], "agx at -2.5 stops"),
@@ -143,8 +143,8 @@ def test_an_exposure_alone_is_one_of_the_templates_view(folder: Path, basis: Bas
 def test_noise_is_corrected_and_the_scene_refined(room: Path, folder: Path):
     """Steps of the last linear problem: towards what a good basis gives."""
     target = lp.read_target("odd.exr")
-    how: dict[str, Any] = {"space": "display", "view": View("srgb", 1.0)}
-    best = lp.solve(lp.read_basis("room.basis.exr"), target, view=how["view"])
+    how: dict[str, Any] = {"space": "display", "transform": ViewTransform("srgb", 1.0)}
+    best = lp.solve(lp.read_basis("room.basis.exr"), target, transform=how["transform"])
     truth = best.lighting.weights_for(lp.read_basis("room.basis.exr"))
     for more in ({}, {"noise_correction": True}, {"refine": 1}):
         look = lp.paint_with_light(

@@ -17,7 +17,7 @@ from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_wi
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
-from lightpaint.colour.view import View, ViewChoice
+from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.images.exr import write_rgb
 from lightpaint.scene.scene import load_scene
@@ -71,8 +71,12 @@ ASKED = Constraints.of(
     "how",
     [
         {},
-        {"targets": (Painting("p.exr", mask="mask.exr", view=ViewChoice("agx", None)),)},
-        {"settings": Settings(unpainted=0.1, view=View("agx", 1 / 3), space="display")},
+        {"targets": (Painting("p.exr", mask="mask.exr", transform=TransformChoice("agx", None)),)},
+        {
+            "settings": Settings(
+                unpainted=0.1, transform=ViewTransform("agx", 1 / 3), space="display"
+            )
+        },
         {"settings": Settings(seed=np.int64(3), cd_per_unit=np.float32(0.1))},  # type: ignore[arg-type]
         {"constraints": replace(ASKED, ties=())},
         {"basis": GroupsFile("groups.exr", "RGBA_{name}"), "targets": (Painting("g.exr"),)},
@@ -246,7 +250,7 @@ def test_remarks_say_what_was_done_to_a_painting(here: Path, make_basis: Any):
         everything=True,
         not_finite=3,
         notes=("a note",),
-        view=View("agx"),
+        transform=ViewTransform("agx"),
     )
     job = _from_basis(targets=(target,))
     assert job.remarks == (

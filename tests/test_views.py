@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.cli import main
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
@@ -224,15 +224,15 @@ def test_no_pixel_is_held_twice(room: Path, tmp_path: Path) -> None:
 
 def test_paintings_of_two_views_seen_through_two_transforms(room: Path, tmp_path: Path) -> None:
     scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
-    shown = [View("agx", 1.0), View("srgb")]
+    shown = [ViewTransform("agx", 1.0), ViewTransform("srgb")]
     targets = [
-        replace(painting(render_basis(s, spp=4), np.ones((4, 3)), "x"), view=view)
+        replace(painting(render_basis(s, spp=4), np.ones((4, 3)), "x"), transform=view)
         for s, view in zip(scenes, shown, strict=True)
     ]
     with pytest.raises(TargetError, match=r"seen through agx at \+1 stops and srgb"):
         paint_with_light(scenes, targets, tmp_path / "out", spp=4, space="display")
     looks = paint_with_light(
-        scenes, targets, tmp_path / "out", spp=4, space="display", view=View("srgb")
+        scenes, targets, tmp_path / "out", spp=4, space="display", transform=ViewTransform("srgb")
     )
     assert len(looks) == 2
 

@@ -12,7 +12,7 @@ from lightpaint.basis.file import write_basis
 from lightpaint.cli import tables, terminal
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.options import folders_of, is_folder
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import OutputError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
@@ -66,14 +66,19 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> int:
 
 
 def template(
-    *, scene: SceneFile, output: Path, view: View | None, settings: Settings, force: bool
+    *,
+    scene: SceneFile,
+    output: Path,
+    transform: ViewTransform | None,
+    settings: Settings,
+    force: bool,
 ) -> int:
     """`lightpaint template SCENE -o DIR`"""
     _check_template(output, force=force)
     loaded = _loaded(scene)
     if settings.resolution:
         loaded = loaded.reduced(settings.resolution)
-    how: dict[str, Any] = {"view": view, "spp": settings.spp, "seed": settings.seed}
+    how: dict[str, Any] = {"transform": transform, "spp": settings.spp, "seed": settings.seed}
     linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:
         if is_folder(output):

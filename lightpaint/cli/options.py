@@ -14,7 +14,7 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.read import is_light_groups
-from lightpaint.colour.view import ViewChoice
+from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.job import Job, check_needed
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -38,13 +38,13 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             output = output or Path(Path(options.scene).stem + ".basis.exr")
             return {"scene": scene_of(options), "output": output, "settings": settings}
         case "template":
-            output, view = output or Path("template"), view_of(options)
+            output, transform = output or Path("template"), transform_of(options)
             # Which lights go together is shown in the folder, and nowhere else.
             tied = is_folder(output)
             return {
                 "scene": scene_of(options, is_to_solve=False, use_lights_file=tied),
                 "output": output,
-                "view": None if view.is_open else view.over(None),
+                "transform": None if transform.is_open else transform.over(None),
                 "settings": settings,
                 "force": options.force,
             }
@@ -106,7 +106,7 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
             path,
             mask=mask,
             layer=options.layer,
-            view=view_of(options),
+            transform=transform_of(options),
             template=options.template,
             find=options.find_template,
             paint=options.paint,
@@ -193,9 +193,9 @@ def _check_light_groups(given: str) -> None:
         )
 
 
-def view_of(options: Namespace) -> ViewChoice:
+def transform_of(options: Namespace) -> TransformChoice:
     """What --view and --exposure ask for, each alone or both."""
-    return ViewChoice(options.view, options.exposure)
+    return TransformChoice(options.view, options.exposure)
 
 
 def constraints_of(options: Namespace) -> Constraints:

@@ -1,1 +1,1 @@
-"""Colours as numbers: spaces, temperatures, views and what a display shows. Knows no files."""
+"""Colours as numbers: spaces, temperatures, view transforms, displays. Knows no files."""

@@ -38,7 +38,7 @@ class Bitmap:
     grey is repeated. alpha: (h, w) of the same type, None if there is none or all is opaque.
     premultiplied: whether `values` are multiplied by it. codes: largest integer there can be;
     None for floats. profile: what the numbers mean; None is sRGB. lossy: whether compression
-    changed them. shown: the view that the file says it was made with, as `name stops`.
+    changed them. shown: the view transform that the file says it was made with, as `name stops`.
     """
 
     kind: str

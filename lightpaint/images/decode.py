@@ -1,4 +1,4 @@
-"""From the numbers of a bitmap to linear Rec.709, through its profile and a view."""
+"""From the numbers of a bitmap to linear Rec.709, through its profile and a view transform."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.display import encode_display
 from lightpaint.colour.icc import Profile
 from lightpaint.colour.primaries import converted
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap
 
@@ -18,15 +18,17 @@ from lightpaint.images.bitmap import Bitmap
 STRIP = 2**18
 
 
-def view_of(bitmap: Bitmap) -> View | None:
-    """The view that a file says it was made with."""
+def transform_of(bitmap: Bitmap) -> ViewTransform | None:
+    """The view transform that a file says it was made with."""
     if bitmap.shown is None:
         return None
     name, _, stops = bitmap.shown.rpartition(" ")
     try:
-        return View(name, float(stops))
+        return ViewTransform(name, float(stops))
     except ValueError:
-        raise ImageError(f"says that it was shown through {bitmap.shown!r}, no view") from None
+        raise ImageError(
+            f"says that it was shown through {bitmap.shown!r}, no view transform"
+        ) from None
 
 
 def light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
@@ -44,7 +46,7 @@ def light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
     return image
 
 
-def light_of_integers(bitmap: Bitmap, alpha: Floats | None, view: View) -> Floats:
+def light_of_integers(bitmap: Bitmap, alpha: Floats | None, transform: ViewTransform) -> Floats:
     """Linear Rec.709 of the integers, strip by strip."""
     assert bitmap.codes is not None
     profile = bitmap.profile
@@ -52,7 +54,7 @@ def light_of_integers(bitmap: Bitmap, alpha: Floats | None, view: View) -> Float
         profile = None
     image = np.empty(bitmap.values.shape, np.float32)
     rows = max(1, STRIP // bitmap.values.shape[1])
-    decode = _decoder(bitmap.codes, profile, view, by_table=not bitmap.premultiplied)
+    decode = _decoder(bitmap.codes, profile, transform, by_table=not bitmap.premultiplied)
     for top in range(0, len(image), rows):
         strip = slice(top, top + rows)
         values = bitmap.values[strip]
@@ -65,7 +67,7 @@ def light_of_integers(bitmap: Bitmap, alpha: Floats | None, view: View) -> Float
 
 
 def _decoder(
-    codes: int, profile: Profile | None, view: View, *, by_table: bool
+    codes: int, profile: Profile | None, transform: ViewTransform, *, by_table: bool
 ) -> Callable[[npt.NDArray[Any]], Floats]:
     """From numbers (h, w, 3) to light: from integers by table, else from values in [0, 1]."""
 
@@ -76,29 +78,29 @@ def _decoder(
         table = np.asarray(of(np.arange(codes + 1) / codes), np.float32)
         return lambda values: table[values]
 
-    if profile is None and view.is_per_channel:
-        return curve(view.decode)
+    if profile is None and transform.is_per_channel:
+        return curve(transform.decode)
     if profile is None:
         display = curve(lambda values: values)
-        return lambda values: view.decode(display(values))
+        return lambda values: transform.decode(display(values))
     curves = [curve(own) for own in profile.curves]
 
     def through_profile(values: npt.NDArray[Any]) -> Floats:
         light = np.stack([own(values[..., k]) for k, own in enumerate(curves)], axis=-1)
         shown = converted(light, profile.matrix)
-        return _through(view, shown, is_linear=profile.is_linear, name=profile.name)
+        return _through(transform, shown, is_linear=profile.is_linear, name=profile.name)
 
     return through_profile
 
 
-def _through(view: View, shown: Floats, *, is_linear: bool, name: str) -> Floats:
+def _through(transform: ViewTransform, shown: Floats, *, is_linear: bool, name: str) -> Floats:
     """Scene light of what a display is to show, in linear Rec.709."""
-    scale = np.float32(2.0**view.stops)
-    if view.name == "srgb" or (view.name == "linear" and is_linear):
+    scale = np.float32(2.0**transform.stops)
+    if transform.name == "srgb" or (transform.name == "linear" and is_linear):
         return shown / scale  # Beyond Rec.709 as well, for which display values have no room.
-    if view.name == "linear":
+    if transform.name == "linear":
         raise ImageError(f"has the colour profile {name!r}, but its numbers are said to be linear")
-    return view.decode(encode_display(shown))
+    return transform.decode(encode_display(shown))
 
 
 def unpremultiply(image: Floats, alpha: Floats) -> None:

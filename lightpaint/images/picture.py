@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.view import View, ViewChoice
+from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
 from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.decode import light_of_floats, light_of_integers, unpremultiply, view_of
+from lightpaint.images.decode import light_of_floats, light_of_integers, transform_of, unpremultiply
 from lightpaint.images.exr import Part, read_parts
 from lightpaint.images.exr_layers import ALPHA_NAMES, Layer, choose_layer
 from lightpaint.images.kinds import head_of, kind_of, name_of
@@ -34,7 +34,7 @@ class Picture:
     weight: (h, w) float32, an EXR's channel W; RGB is then taken as it is.
     stored: (h, w), where the file has a pixel; None if everywhere.
     saturated: (h, w, 3), where the file cannot say more: the light is at least that of `image`.
-    view: what the numbers were decoded by; None if the file holds light.
+    transform: what the numbers were decoded by; None if the file holds light.
     codes: largest integer of the file's numbers; None for floats.
     lossy: whether compression changed the numbers beyond that rounding.
     notes: what a person should know, a line each.
@@ -47,7 +47,7 @@ class Picture:
     weight: Floats | None = None
     stored: Mask | None = None
     saturated: Mask | None = None
-    view: View | None = None
+    transform: ViewTransform | None = None
     codes: int | None = None
     lossy: bool = False
     notes: tuple[str, ...] = field(default=())
@@ -62,14 +62,14 @@ def read_picture(
     path: str | Path,
     *,
     layer: str | None = None,
-    view: View | ViewChoice | None = None,
-    otherwise: View | None = None,
+    transform: ViewTransform | TransformChoice | None = None,
+    otherwise: ViewTransform | None = None,
 ) -> Picture:
     """Read a picture of any kind that paint programs write.
 
-    layer: of an EXR, the layer, part or view to take; needed if there are several. view: what
+    layer: of an EXR, the layer, part or view to take; needed if there are several. transform: what
     integers were encoded by; what it leaves open is what a PNG of lightpaint's own says, else
-    `otherwise`, else sRGB. Files of floats hold light, and no view applies to them.
+    `otherwise`, else sRGB. Files of floats hold light, and no transform applies to them.
 
     Raises ImageError, with one line that names the file, for all that cannot be read as what
     it should be.
@@ -81,7 +81,7 @@ def read_picture(
             return _of_layer(choose_layer(read_parts(path), layer))
         if layer is not None:
             raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
-        return _of_bitmap(_bitmap(path, kind), ViewChoice.of(view), otherwise)
+        return _of_bitmap(_bitmap(path, kind), TransformChoice.of(transform), otherwise)
     except ImageError as error:
         raise ImageError(_naming(path, error)) from error
     except MemoryError:
@@ -166,7 +166,7 @@ def _stored(part: Part) -> Mask | None:
     return ones.in_display_window().channels["Y"]
 
 
-def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Picture:
+def _of_bitmap(bitmap: Bitmap, asked: TransformChoice, otherwise: ViewTransform | None) -> Picture:
     alpha: Floats | None = None
     if bitmap.alpha is not None:
         alpha = np.asarray(bitmap.alpha / np.float32(bitmap.codes or 1), np.float32)
@@ -177,7 +177,7 @@ def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Pic
         image = light_of_floats(bitmap, alpha)
         saturated, used = None, None
     else:
-        used = asked.over(None if asked.is_whole else view_of(bitmap) or otherwise)
+        used = asked.over(None if asked.is_whole else transform_of(bitmap) or otherwise)
         image = light_of_integers(bitmap, alpha, used)
         saturated = _saturated(bitmap)
     return Picture(
@@ -186,7 +186,7 @@ def _of_bitmap(bitmap: Bitmap, asked: ViewChoice, otherwise: View | None) -> Pic
         finite=_only_finite(image),
         alpha=alpha,
         saturated=saturated,
-        view=used,
+        transform=used,
         codes=bitmap.codes,
         lossy=bitmap.lossy,
         notes=notes,

@@ -22,8 +22,8 @@ from lightpaint.files import replacing, write_bytes
 #: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
 MAX_CHUNK = 2**24
 
-#: Text in a PNG that names the view it was shown through.
-VIEW_KEY = "lightpaint.view"
+#: Text in a PNG that names the view transform it was shown through.
+TRANSFORM_KEY = "lightpaint.view"
 
 
 def write_png_16(
@@ -74,7 +74,7 @@ def write_png(path: Path, image: Floats, *, stops: float = 0.0) -> None:
 
 
 def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
-    """What the small chunks of a PNG say: the view it was made with, and its colours.
+    """What the small chunks of a PNG say: the transform it was made with, and its colours.
 
     The order is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
     """
@@ -113,7 +113,7 @@ def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
             content, checksum = file.read(length), file.read(4)
             if zlib.crc32(content, zlib.crc32(head[4:])) != int.from_bytes(checksum, "big"):
                 raise ImageError("is damaged: a checksum is wrong")
-            if head[4:] != b"tEXt" or content.startswith(VIEW_KEY.encode() + b"\0"):
+            if head[4:] != b"tEXt" or content.startswith(TRANSFORM_KEY.encode() + b"\0"):
                 yield head[4:], content
 
 

@@ -87,7 +87,7 @@ class Certificate:
     bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
     objective_error: standard error of `objective`, from the noise it was solved with, where that
     is known.
-    display: the view through which the objective is seen; "" where it is of linear light.
+    display: the view transform through which the objective is seen; "" where it is of linear light.
     rounds: linear problems solved one after the other, the last of which is the certified one.
     """
 

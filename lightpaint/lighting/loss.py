@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 
-#: Pixels that go through the view at once.
+#: Pixels that go through the transform at once.
 STRIP = 2**16
 
 #: From arrays of all views to the part of one of them.
@@ -26,14 +26,15 @@ Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
 class Loss(Protocol):
     """F, of pictures x, (h, w, 3) linear.
 
-    importance: (h, w) >= 0, where it counts. view: through which it sees x; None for linear light.
+    importance: (h, w) >= 0, where it counts. transform: through which it sees x; None for linear
+    light.
     """
 
     @property
     def importance(self) -> Floats: ...
 
     @property
-    def view(self) -> View | None: ...
+    def transform(self) -> ViewTransform | None: ...
 
     @property
     def norm2(self) -> Doubles:
@@ -71,7 +72,7 @@ class Squares:
     share: Floats
 
     #: Light itself is compared.
-    view = None
+    transform = None
 
     @cached_property
     def importance(self) -> Floats:
@@ -111,7 +112,8 @@ class Squares:
 
 @dataclass(frozen=True)
 class PaintingLoss:
-    """With the importance D, the part q of it that is for the current look C, and the view V:
+    """With the importance D, the part q of it that is for the current look C, and the view
+    transform V:
 
         F(x) = Σ D [(1 − q) ‖V(ψ) − V(x)‖² + q ‖V(C) − V(x)‖²]
 
@@ -119,7 +121,7 @@ class PaintingLoss:
     V is the identity in linear light, and F then is convex.
 
     painted: (h, w, 3), Ψ, linear. importance: (h, w), D. share: (h, w), q. current: (h, w, 3), C,
-    linear. at_least: (h, w, 3), where brighter is as good. view: V, None for linear light.
+    linear. at_least: (h, w, 3), where brighter is as good. transform: V, None for linear light.
     """
 
     painted: Floats
@@ -127,7 +129,7 @@ class PaintingLoss:
     share: Floats
     current: Floats
     at_least: Bools
-    view: View | None = None
+    transform: ViewTransform | None = None
 
     def cut(self, part: Cut) -> "PaintingLoss":
         """That of some of the pixels."""
@@ -143,9 +145,9 @@ class PaintingLoss:
     def shown(self, image: Floats) -> Doubles:
         """V of linear pixels, (…, 3)."""
         out = np.array(image, np.float64)
-        if self.view is not None:
+        if self.transform is not None:
             for its in _strips(out):
-                its[:] = self.view.encode(its)
+                its[:] = self.transform.encode(its)
         return out
 
     def objective(self, x: Floats) -> Doubles:
@@ -178,7 +180,7 @@ class PaintingLoss:
 
     def same_squares(self, a: Floats, b: Floats) -> bool:
         """Whether the squares made for two pictures are the same, and so exact between them."""
-        if self.view is not None:
+        if self.transform is not None:
             return False
         differ = self._exceeds(a) != self._exceeds(b)
         return not differ[self.importance > 0].any()
@@ -212,27 +214,28 @@ class PaintingLoss:
         from_clipping: bool,
     ) -> tuple[Floats, Floats, Floats]:
         """image, factor and share of some pixels, (p, 3) each. As of `squares`."""
-        if self.view is None:
+        if self.transform is None:
             counts = (1 - q) * ~exceeds
             factor, gradient = counts + q, counts * (wanted - x) + q * (current - x)
             from_current = q * np.ones(3)
         else:
-            own, shown = self.view.jacobian(x), self.view.encode(x)
+            own, shown = self.transform.jacobian(x), self.transform.encode(x)
             factor, gradient, from_current = np.zeros((3, *x.shape))
             for part, goal, moves in ((1 - q, wanted, exceeds), (q, current, None)):
                 if not part.any():
                     continue
-                missed = self.view.encode(goal) - shown
+                missed = self.transform.encode(goal) - shown
                 slope = _with_chords(own, missed, goal - x) if from_clipping else own
                 if moves is not None and moves.any():
                     # What is wanted there moves along with x.
-                    slope = slope - self.view.jacobian(goal) * moves[:, None, :]
+                    slope = slope - self.transform.jacobian(goal) * moves[:, None, :]
                 gradient += part * np.einsum("pkc,pk->pc", slope, missed)
-                # The squares of channels that the view mixes, from above by those of single ones.
+                # The squares of channels that the transform mixes, from above by those of single
+                # ones.
                 mixed = np.einsum("pkc,pkd->pcd", slope, slope)
                 factor += part * np.abs(mixed).sum(axis=-1)
             if q.any():
-                steep = np.einsum("pkc,pkc->pc", own, self.view.jacobian(current))
+                steep = np.einsum("pkc,pkc->pc", own, self.transform.jacobian(current))
                 from_current = q * steep
         some = factor > 0
         safe = np.where(some, factor, 1)

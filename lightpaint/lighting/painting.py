@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -94,7 +94,7 @@ def joint_squares(views: Views, *, unpainted: float) -> Squares:
 def loss_of(
     word: Squares,
     at_least: Bools,
-    view: View | None,
+    transform: ViewTransform | None,
     *,
     painted: Callable[[], Doubles],
     current: Callable[[], Floats],
@@ -104,7 +104,7 @@ def loss_of(
     at_least: (h, w, 3), where brighter is as good. painted, current: Ψ and the present look, asked
     for where they are needed.
     """
-    if view is None and not (at_least.any() and at_least[word.weight[..., 0] > 0].any()):
+    if transform is None and not (at_least.any() and at_least[word.weight[..., 0] > 0].any()):
         return word
     return PaintingLoss(
         painted=painted(),
@@ -112,7 +112,7 @@ def loss_of(
         share=word.share[..., 0],
         current=current(),
         at_least=at_least,
-        view=view,
+        transform=transform,
     )
 
 
@@ -155,10 +155,10 @@ class Painting:
         """The present look, of all views."""
         return self.whole.mix(self.whole.present_weights)
 
-    def loss(self, word: Squares, view: View | None) -> Loss:
+    def loss(self, word: Squares, transform: ViewTransform | None) -> Loss:
         """What a picture costs, with `word` for its squares."""
         light, current = lambda: self.light, lambda: self.current
-        return loss_of(word, self.at_least, view, painted=light, current=current)
+        return loss_of(word, self.at_least, transform, painted=light, current=current)
 
     @property
     def equations(self) -> NormalEquations:

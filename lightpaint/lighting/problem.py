@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import ConstraintError, TargetError
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -93,7 +93,7 @@ class Problem:
         unpainted: float = 0.0,
         start: Doubles | None = None,
         method: Method = "polished",
-        view: View | None = None,
+        transform: ViewTransform | None = None,
     ) -> "Problem":
         """Of one view, or of several: their bases and targets in the same order. As of `solve`."""
         bases = [basis] if isinstance(basis, Basis) else list(basis)
@@ -113,7 +113,7 @@ class Problem:
         loss = loss_of(
             word,
             brighter_will_do(views),
-            view,
+            transform,
             painted=lambda: painted_light(views),
             current=lambda: whole.mix(whole.present_weights),
         )
@@ -145,7 +145,7 @@ class Problem:
     @property
     def space(self) -> Space:
         """In which the prediction is brought close to the painting."""
-        return "linear" if self.loss.view is None else "display"
+        return "linear" if self.loss.transform is None else "display"
 
     @property
     def solved(self) -> NormalEquations:
@@ -155,8 +155,10 @@ class Problem:
     @cached_property
     def pull_strength(self) -> float:
         """That of the pull to the present, of light as bright as the view makes it."""
-        view = self.loss.view
-        return self.constraints.prefer_current * (1.0 if view is None else 4.0**view.stops)
+        transform = self.loss.transform
+        return self.constraints.prefer_current * (
+            1.0 if transform is None else 4.0**transform.stops
+        )
 
     @cached_property
     def pull(self) -> NormalEquations | None:
@@ -236,7 +238,7 @@ class Problem:
         return replace(
             self,
             views=painting.views,
-            loss=painting.loss(word, self.loss.view),
+            loss=painting.loss(word, self.loss.transform),
             squares=word,
             equations=painting.equations,
             reduction=self.full,

@@ -78,7 +78,7 @@ def descend(
     w, x = start, predicted(basis, start)
     value = _value(loss, pull, w, x)
     # First with what is drawn back from clipping, then with the loss's own slope.
-    from_clipping = loss.view is not None
+    from_clipping = loss.transform is not None
     count = 0
     while True:
         squares = loss.squares(x, from_clipping=from_clipping)
@@ -90,7 +90,7 @@ def descend(
         fall = _fall(squares, pull, x, ahead, w, best)
         # A problem that is exact all the way has its optimum where the true one has it.
         is_exact = loss.same_squares(x, ahead)
-        done = is_exact if loss.view is None else step <= STEP or fall <= FALL * value
+        done = is_exact if loss.transform is None else step <= STEP or fall <= FALL * value
         part, reached = _part_of_step(loss, pull, (w, best), (x, ahead), value, fall)
         if from_clipping and (done or part == 0):
             from_clipping = False

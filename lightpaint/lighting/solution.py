@@ -75,7 +75,7 @@ class Solution:
         """What is missed in the problem that `equations` are, all channels together.
 
         After reweighting that is the last linear one: gains of its solutions are beside this, and
-        not beside the objective in the certificate, which may be that of a view.
+        not beside the objective in the certificate, which may be that of a display.
         """
         return float(self.equations.objective(self.weights).sum())
 

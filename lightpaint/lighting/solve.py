@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import (
@@ -36,7 +36,7 @@ def solve(
     unpainted: float = 0.0,
     start: Lighting | None = None,
     method: Method = "polished",
-    view: View | None = None,
+    transform: ViewTransform | None = None,
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
@@ -49,7 +49,8 @@ def solve(
     answer is the same, but for what no painted pixel tells: lights that reach none keep the start.
     method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
     certificate of the answer then says that it has not converged.
-    view: for an answer that comes closest in what this view shows, instead of in linear light.
+    transform: for an answer that comes closest in what this view transform shows, instead of in
+    linear light.
 
     Lights that are kept have weight 1; the others make up what they leave of the target.
 
@@ -57,7 +58,12 @@ def solve(
     ConstraintError if a constraint does not fit the lights, BasisError if views differ in lights.
     """
     problem = Problem.of(
-        basis, target, constraints=constraints, unpainted=unpainted, method=method, view=view
+        basis,
+        target,
+        constraints=constraints,
+        unpainted=unpainted,
+        method=method,
+        transform=transform,
     )
     begin = problem.start if start is None else start.weights_for(problem.basis)
     return solution_of(replace(problem, start=begin))
@@ -169,7 +175,7 @@ def _solution(
     problem: Problem, optimum: ReducedOptimum, weights: Doubles, equations: NormalEquations
 ) -> Solution:
     """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull."""
-    view, names = problem.loss.view, problem.basis.names
+    transform, names = problem.loss.transform, problem.basis.names
     certificate = Certificate(
         kkt_residual=_rgb(optimum.kkt_residual),
         objective=(0, 0, 0),
@@ -177,7 +183,7 @@ def _solution(
         sweeps=optimum.sweeps,
         converged=optimum.converged,
         unreached=tuple(n for n, ok in zip(names, optimum.reached, strict=True) if not ok),
-        display="" if view is None else view.spoken,
+        display="" if transform is None else transform.spoken,
     ).of(problem.objective(weights), problem.norm2)
     labels = problem.reduction.labels
     asked = [(label, False) for label in labels]

@@ -23,7 +23,7 @@ from lightpaint.report.pictures import (
     residual_picture,
     spoken_view,
     target_picture,
-    view_of,
+    transform_of,
 )
 from lightpaint.report.verdict import relative_residual
 from lightpaint.target.target import Target
@@ -64,19 +64,19 @@ def comparison_image(
     """
     target = target.fitted_to(basis.size, resize=False)
     current = combine(basis, Lighting.present(basis)).image
-    view = view_of(target, predicted, verified)
+    transform = transform_of(target, predicted, verified)
     share = float(painted(target, solution).mean())
-    at = f" ({spoken_view(view)})" if spoken_view(view) else ""
+    at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [
         Tile(
             f"target: {target.name}",
             f"{_percent(share)} painted{', the rest hatched' if share < 0.995 else ''}",
-            target_picture(target, solution, current, view=view),
+            target_picture(target, solution, current, transform=transform),
         ),
         Tile(
             f"predicted{at}",
             f"misses {_percent(relative_residual(solution))} of the target (RMS, with noise)",
-            view.encode(predicted),
+            transform.encode(predicted),
         ),
     ]
     if verified is not None:
@@ -87,11 +87,11 @@ def comparison_image(
             Tile(
                 f"verified{at}",
                 f"independent render, {rmse:.2g} RMS off the prediction",
-                view.encode(verified),
+                transform.encode(verified),
             )
         )
-    limit = residual_limit(solution, predicted, view=view)
-    picture = residual_picture(solution, predicted, current, view=view, limit=limit)
+    limit = residual_limit(solution, predicted, transform=transform)
+    picture = residual_picture(solution, predicted, current, transform=transform, limit=limit)
     tiles.append(Tile("residual", "luminance, predicted - target", picture, limit))
     return compose(tiles)
 

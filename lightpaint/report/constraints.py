@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure
@@ -19,7 +19,7 @@ AROUND = 2
 
 
 def constraints_section(
-    basis: Basis, solution: Solution, free: Solution | None, *, view: View
+    basis: Basis, solution: Solution, free: Solution | None, *, transform: ViewTransform
 ) -> str:
     """The best lighting without constraints, `free`, beside the one as asked, from the basis.
 
@@ -38,7 +38,8 @@ def constraints_section(
         f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
         f"painted light (RMS). As asked, they miss {asked}. Both pictures are sums of the "
         f"basis images.</p></div>{_curve(solution, free)}</div>"
-        f'<div class="maps">{_figures(basis, pictures, view)}{_numbers(basis, solution, view)}'
+        f'<div class="maps">{_figures(basis, pictures, transform)}'
+        f"{_numbers(basis, solution, transform)}"
         "</div></section>"
     )
 
@@ -68,7 +69,7 @@ def _row(what: str, missed: float) -> str:
     )
 
 
-def _numbers(basis: Basis, solution: Solution, view: View) -> str:
+def _numbers(basis: Basis, solution: Solution, transform: ViewTransform) -> str:
     """With `sparse`, pictures with fewer and with more lights."""
     used, missed_with = _used(solution), dict(solution.certificate.curve)
     pictures = [
@@ -76,10 +77,12 @@ def _numbers(basis: Basis, solution: Solution, view: View) -> str:
         for count, weights in solution.tried
         if count in missed_with and 0 < abs(count - used) <= AROUND
     ]
-    return _figures(basis, pictures, view)
+    return _figures(basis, pictures, transform)
 
 
-def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], view: View) -> str:
+def _figures(
+    basis: Basis, pictures: list[tuple[Doubles, str, str]], transform: ViewTransform
+) -> str:
     """Pictures of weights (n, 3), each with its name and a caption."""
     height, width = basis.size
     factor = max(1, width // WIDTH)
@@ -88,7 +91,7 @@ def _figures(basis: Basis, pictures: list[tuple[Doubles, str, str]], view: View)
     for weights, name, caption in pictures:
         # What does not make a whole block at the border is left out; it is for looking at.
         image = block_mean(basis.mix(weights)[whole], factor)
-        pixels = view.encode(np.asarray(image, np.float32))
+        pixels = transform.encode(np.asarray(image, np.float32))
         figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
     return "".join(figures)
 

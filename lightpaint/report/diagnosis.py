@@ -7,7 +7,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
@@ -84,7 +84,7 @@ def _steps(solution: Solution) -> str:
 
 
 def missed_section(
-    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, view: View
+    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, transform: ViewTransform
 ) -> str:
     """Why it does not look like the painting: sentences, shares, maps and bounds."""
     if diagnosis is None:
@@ -93,7 +93,7 @@ def missed_section(
     return (
         f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"
-        f'<div class="maps">{_maps(solution, diagnosis, current, view=view)}</div>'
+        f'<div class="maps">{_maps(solution, diagnosis, current, transform=transform)}</div>'
         f"{_bounds(diagnosis)}</section>"
     )
 
@@ -123,7 +123,9 @@ def _shares(diagnosis: Diagnosis) -> str:
     return f"<table><tbody>{''.join(rows)}</tbody></table>"
 
 
-def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, view: View) -> str:
+def _maps(
+    solution: Solution, diagnosis: Diagnosis, current: Floats, *, transform: ViewTransform
+) -> str:
     parts = [
         (
             "Out of reach",
@@ -139,9 +141,11 @@ def _maps(solution: Solution, diagnosis: Diagnosis, current: Floats, *, view: Vi
     ]
     counted = solution.importance > 0
     sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]
-    limit = round_up(max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-view.stops))
+    limit = round_up(
+        max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-transform.stops)
+    )
     share = coverage(solution.importance)[..., None]
-    grey = unpainted_look(current, view=view)
+    grey = unpainted_look(current, transform=transform)
     figures = []
     for name, image, caption in parts:
         if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:

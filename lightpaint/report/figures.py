@@ -10,7 +10,7 @@ from PIL import Image
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import encode_display, to_8_bit
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verify import LIMIT, Verification
@@ -114,14 +114,14 @@ def maps(
     current: Floats,
     *,
     verification: Verification | None,
-    view: View,
+    transform: ViewTransform,
 ) -> str:
     """False-colour pictures: what is missed, what counts, and where the render disagrees.
 
     predicted, current: (h, w, 3) linear.
     """
-    limit = residual_limit(solution, predicted, view=view)
-    picture = residual_picture(solution, predicted, current, view=view, limit=limit)
+    limit = residual_limit(solution, predicted, transform=transform)
+    picture = residual_picture(solution, predicted, current, transform=transform, limit=limit)
     figures = [
         figure(
             Picture("Residual", "False-colour map of the residual.", picture),
@@ -132,7 +132,7 @@ def maps(
             Picture(
                 "Importance",
                 "Map of how much each pixel counts.",
-                importance_picture(solution.importance, current, view=view),
+                importance_picture(solution.importance, current, transform=transform),
             ),
             f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
             f"{solution.importance.max():.3g} at most.",

@@ -11,7 +11,7 @@ from string import Template
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -23,7 +23,7 @@ from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import amounts_heading, lights_table
-from lightpaint.report.pictures import target_picture, view_of
+from lightpaint.report.pictures import target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.verdict import verdict
@@ -55,8 +55,8 @@ def report_page(
     target = target.fitted_to(basis.size, resize=False)
     current = combine(basis, Lighting.present(basis)).image
     verified = None if verification is None else verification.verified.image
-    view = view_of(target, predicted.image, verified)
-    looks = _looks(target, solution, current, predicted.image, verified, view=view)
+    transform = transform_of(target, predicted.image, verified)
+    looks = _looks(target, solution, current, predicted.image, verified, transform=transform)
     template = resources.files("lightpaint.report").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(f"{target.name} · {basis.origin.scene}"),
@@ -65,12 +65,14 @@ def report_page(
         verdict=escape(verdict(solution, predicted, verification)),
         banner=_banner(verification),
         wipe=wipe(looks),
-        exposure=_exposure(view, predicted.image),
-        maps=maps(solution, predicted.image, current, verification=verification, view=view),
-        missed=missed_section(solution, diagnosis, current, view=view)
-        + constraints_section(basis, solution, unconstrained, view=view),
+        exposure=_exposure(transform, predicted.image),
+        maps=maps(
+            solution, predicted.image, current, verification=verification, transform=transform
+        ),
+        missed=missed_section(solution, diagnosis, current, transform=transform)
+        + constraints_section(basis, solution, unconstrained, transform=transform),
         suggestions=suggestion_section(
-            suggestions, view=view, cd_per_unit=solution.lighting.cd_per_unit
+            suggestions, transform=transform, cd_per_unit=solution.lighting.cd_per_unit
         ),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
@@ -91,24 +93,24 @@ def _looks(
     predicted: Floats,
     verified: Floats | None,
     *,
-    view: View,
+    transform: ViewTransform,
 ) -> list[Picture]:
     """What can be put side by side under the wipe, in the order of its lists."""
     looks = [
-        Picture("current look", "The scene as it is.", view.encode(current)),
+        Picture("current look", "The scene as it is.", transform.encode(current)),
         Picture(
             "target",
             "The painting. Unpainted pixels are grey, dim and hatched.",
-            target_picture(target, solution, current, view=view),
+            target_picture(target, solution, current, transform=transform),
         ),
         Picture(
             "predicted",
             "The solved lighting, as the sum of the basis images.",
-            view.encode(predicted),
+            transform.encode(predicted),
         ),
     ]
     if verified is not None:
-        shown = view.encode(verified)
+        shown = transform.encode(verified)
         looks.append(Picture("verified", "An independent render of the relit scene.", shown))
     return looks
 
@@ -130,11 +132,11 @@ def _banner(verification: Verification | None) -> str:
     )
 
 
-def _exposure(view: View, predicted: Floats) -> str:
+def _exposure(transform: ViewTransform, predicted: Floats) -> str:
     """How linear light became these pictures, and what of it they cannot show."""
-    at = f"exposure {view.stops:+.1f} stops" if view.stops else "the scene's own exposure"
-    clipped = float((predicted.max(axis=-1) > view.white).mean())
-    text = f"All at {at}, {'sRGB' if view.name == 'srgb' else view.name}."
+    at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
+    clipped = float((predicted.max(axis=-1) > transform.white).mean())
+    text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
     return text

@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display import choose_exposure
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 
@@ -31,12 +31,15 @@ DIVERGING = np.array(
 FINEST_SCALE = 0.01
 
 
-def view_of(target: Target, predicted: Floats, verified: Floats | None) -> View:
-    """The one view for all pictures of a result: that of the painting, if it was seen through one.
+def transform_of(target: Target, predicted: Floats, verified: Floats | None) -> ViewTransform:
+    """The one transform for all pictures of a result: that of the painting, if it was seen through
+    one.
 
     Else sRGB at the exposure that suits its best render.
     """
-    return target.view or View("srgb", choose_exposure(predicted if verified is None else verified))
+    return target.transform or ViewTransform(
+        "srgb", choose_exposure(predicted if verified is None else verified)
+    )
 
 
 def coverage(importance: Floats) -> Floats:
@@ -53,10 +56,10 @@ def painted(target: Target, solution: Solution) -> Floats:
     return np.where(solution.importance > 0, coverage(target.importance), 0)
 
 
-def unpainted_look(current: Floats, *, view: View) -> Floats:
+def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
     """The current look as the background of what counts: grey, dim, with diagonal lines."""
     height, width = current.shape[:2]
-    grey = luminance(view.encode(current))
+    grey = luminance(transform.encode(current))
     period = max(6, width // 80)
     y, x = np.mgrid[:height, :width]
     lines = (x + y) % period < max(1, period // 5)
@@ -64,23 +67,25 @@ def unpainted_look(current: Floats, *, view: View) -> Floats:
     return np.repeat(dim[..., None], 3, axis=-1)
 
 
-def target_picture(target: Target, solution: Solution, current: Floats, *, view: View) -> Floats:
+def target_picture(
+    target: Target, solution: Solution, current: Floats, *, transform: ViewTransform
+) -> Floats:
     """The painting, laid over the dimmed current look by its importance.
 
     current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
     display encoding of the target.
     """
     share = painted(target, solution)[..., None]
-    paint = view.encode(target.image)
-    return np.asarray(share * paint + (1 - share) * unpainted_look(current, view=view))
+    paint = transform.encode(target.image)
+    return np.asarray(share * paint + (1 - share) * unpainted_look(current, transform=transform))
 
 
-def importance_picture(importance: Floats, current: Floats, *, view: View) -> Floats:
+def importance_picture(importance: Floats, current: Floats, *, transform: ViewTransform) -> Floats:
     """The current look in pale yellow where it counts; dimmed and hatched where not."""
     share = coverage(importance)[..., None]
-    grey = luminance(view.encode(current))[..., None]
+    grey = luminance(transform.encode(current))[..., None]
     counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
-    return np.asarray(share * counted + (1 - share) * unpainted_look(current, view=view))
+    return np.asarray(share * counted + (1 - share) * unpainted_look(current, transform=transform))
 
 
 def residual(solution: Solution, predicted: Floats) -> Floats:
@@ -88,19 +93,24 @@ def residual(solution: Solution, predicted: Floats) -> Floats:
     return luminance(predicted.astype(np.float64) - solution.meant(predicted))
 
 
-def residual_limit(solution: Solution, predicted: Floats, *, view: View) -> float:
+def residual_limit(solution: Solution, predicted: Floats, *, transform: ViewTransform) -> float:
     """The end of the residual's scale: its 99th percentile where it counts, rounded up."""
     counted = np.abs(residual(solution, predicted))[solution.importance > 0]
-    return round_up(max(float(np.percentile(counted, 99)), FINEST_SCALE * 2.0**-view.stops))
+    return round_up(max(float(np.percentile(counted, 99)), FINEST_SCALE * 2.0**-transform.stops))
 
 
 def residual_picture(
-    solution: Solution, predicted: Floats, current: Floats, *, view: View, limit: float
+    solution: Solution,
+    predicted: Floats,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    limit: float,
 ) -> Floats:
     """False colours of the residual from −limit to +limit, dimmed where it does not count."""
     share = coverage(solution.importance)[..., None]
     colours = diverging(residual(solution, predicted) / limit)
-    return np.asarray(share * colours + (1 - share) * unpainted_look(current, view=view))
+    return np.asarray(share * colours + (1 - share) * unpainted_look(current, transform=transform))
 
 
 def diverging(values: Floats) -> Floats:
@@ -120,7 +130,9 @@ def round_up(value: float) -> float:
     return 10 * power
 
 
-def spoken_view(view: View) -> str:
+def spoken_view(transform: ViewTransform) -> str:
     """`agx, exposure +1.5 stops`, or nothing where sRGB shows the picture as it is."""
-    name = [] if view.name == "srgb" else [view.name]
-    return ", ".join([*name, *([f"exposure {view.stops:+.1f} stops"] if view.stops else [])])
+    name = [] if transform.name == "srgb" else [transform.name]
+    return ", ".join(
+        [*name, *([f"exposure {transform.stops:+.1f} stops"] if transform.stops else [])]
+    )

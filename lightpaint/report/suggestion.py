@@ -5,7 +5,7 @@ from html import escape
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.placement.suggest import Suggestion
 from lightpaint.report.figures import data_uri
 from lightpaint.report.sentences import spoken_percent
@@ -38,7 +38,7 @@ def spoken_position(suggestion: Suggestion) -> str:
 def suggestion_section(
     suggestions: Sequence[Suggestion] | None,
     *,
-    view: View,
+    transform: ViewTransform,
     cd_per_unit: float | None = None,
 ) -> str:
     """Each suggested light: the picture without and with it, where it is, what to paste.
@@ -55,7 +55,7 @@ def suggestion_section(
         else ""
     )
     shown = "".join(
-        _shown(x, before=k > 0, view=view, cd_per_unit=cd_per_unit)
+        _shown(x, before=k > 0, transform=transform, cd_per_unit=cd_per_unit)
         for k, x in enumerate(suggestions)
     )
     return (
@@ -64,7 +64,9 @@ def suggestion_section(
     )
 
 
-def _shown(suggestion: Suggestion, *, before: bool, view: View, cd_per_unit: float | None) -> str:
+def _shown(
+    suggestion: Suggestion, *, before: bool, transform: ViewTransform, cd_per_unit: float | None
+) -> str:
     """before: whether others are suggested before it, which then are in both pictures."""
     seen = suggestion.photometry(cd_per_unit)
     amounts = ", ".join(filter(None, seen.amounts))
@@ -87,22 +89,22 @@ def _shown(suggestion: Suggestion, *, before: bool, view: View, cd_per_unit: flo
     name = escape(suggestion.name)
     return (
         f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
-        f"{_picture(suggestion.without, f'Without {name}', without, None, view)}"
-        f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, view)}"
+        f"{_picture(suggestion.without, f'Without {name}', without, None, transform)}"
+        f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, transform)}"
         f"<div>{swatch}<dl>{listed}</dl></div></div>"
         f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'
     )
 
 
 def _picture(
-    image: Floats, name: str, caption: str, at: tuple[float, float] | None, view: View
+    image: Floats, name: str, caption: str, at: tuple[float, float] | None, transform: ViewTransform
 ) -> str:
     height, width = image.shape[:2]
     ring = ""
     if at is not None:
         place = f"left:{100 * at[0]:.2f}%;top:{100 * at[1]:.2f}%"
         ring = f'<span style="{RING};{place}" aria-hidden="true"></span>'
-    source = data_uri(to_8_bit(view.encode(image)))
+    source = data_uri(to_8_bit(transform.encode(image)))
     return (
         f'<figure><div style="position:relative"><img width="{width}" height="{height}" '
         f'alt="{name}: {caption}." src="{source}">{ring}</div>'

@@ -63,12 +63,12 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
     """(h, w), in display values, largest of the channels; and what the file alone makes."""
     if picture.codes is None:
         # It may have been painted on the EXR, or on the PNG, without what is brighter than white.
-        looks = template.image, template.view.decode(template.shown)
+        looks = template.image, template.transform.decode(template.shown)
         found = [_difference_of_light(picture, look, template) for look in looks]
         return max(found, key=lambda one: float((one <= ROUNDING).mean())), ROUNDING
-    view = picture.view
-    assert view is not None  # That of a file of integers is known.
-    mine, its = view.encode(picture.image), view.encode(template.image)
+    transform = picture.transform
+    assert transform is not None  # That of a file of integers is known.
+    mine, its = transform.encode(picture.image), transform.encode(template.image)
     if picture.lossy:
         rough = np.asarray(mine - _compressed_like(path, its), np.float64)
         near, wide = (
@@ -80,9 +80,9 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
 
 def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:
     """As a display shows it; and relative, of what is brighter than that."""
-    view = template.view
-    shown = np.abs(view.encode(picture.image) - view.encode(look))
-    size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), view.white)
+    transform = template.transform
+    shown = np.abs(transform.encode(picture.image) - transform.encode(look))
+    size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), transform.white)
     relative = BEYOND_WHITE * np.abs(picture.image - look) / size
     return np.asarray(np.maximum(shown, relative).max(axis=-1), np.float64)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.color import luminance
-from lightpaint.colour.view import View, ViewChoice
+from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.target.painted import painted_where
@@ -30,14 +30,14 @@ BEYOND, FEW = 10.0, 0.01
 class _Reading:
     """What is known on the way.
 
-    template, folder: what it was painted on, if that is known. view: what it was seen through.
+    template, folder: what it was painted on, if that is known. transform: what it was seen through.
     """
 
     path: Path
     picture: Picture
     template: Template | None
     folder: Path | None
-    view: View | None
+    transform: ViewTransform | None
     notes: tuple[str, ...]
 
 
@@ -46,7 +46,7 @@ def read_target(
     *,
     mask: str | Path | None = None,
     layer: str | None = None,
-    view: View | ViewChoice | None = None,
+    transform: ViewTransform | TransformChoice | None = None,
     template: str | Path | None = None,
     find: bool = True,
     paint: Paint = "look",
@@ -57,7 +57,7 @@ def read_target(
     from the template it was painted on; without any of them, every pixel alike. Where alpha is 0
     no colour was painted, and a mask does not make one.
 
-    layer: which layer, part or view of an EXR. view: what 8 and 16 bits were encoded by. What
+    layer: which layer, part or view of an EXR. transform: what 8 and 16 bits were encoded by. What
     it leaves open is what `template` says, else the file, else a template that was found for it,
     else sRGB. template: folder that `lightpaint template` wrote; find: whether one is looked for
     beside the painting if none is given.
@@ -67,7 +67,7 @@ def read_target(
     Raises ImageError for files that cannot be read, TargetError for what cannot be solved for,
     SizeError if target and mask or template differ in size.
     """
-    reading = _opened(Path(path), layer, view, template, find=find)
+    reading = _opened(Path(path), layer, transform, template, find=find)
     picture, made = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever a mask says.
@@ -88,31 +88,31 @@ def read_target(
         notes=(*picture.notes, *reading.notes, *notes, *note),
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
-        view=reading.view,
+        transform=reading.transform,
     )
 
 
 def _opened(
     path: Path,
     layer: str | None,
-    view: View | ViewChoice | None,
+    transform: ViewTransform | TransformChoice | None,
     template: str | Path | None,
     *,
     find: bool,
 ) -> _Reading:
     """The picture, and the template it was painted on. Arguments as of `read_target`."""
-    asked, made = ViewChoice.of(view), None
+    asked, made = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()
     folder = None if template is None else Path(template)
     if folder is not None:
         # Whoever names a file in it means the folder.
         folder = folder.parent if folder.is_file() else folder
         made = read_template(folder)
-        asked = ViewChoice.of(asked.over(made.view))
+        asked = TransformChoice.of(asked.over(made.transform))
     elif find and (folder := find_template(path)) is not None:
         made = read_template(folder)
-    otherwise = None if made is None else made.view
-    picture = read_picture(path, layer=layer, view=asked, otherwise=otherwise)
+    otherwise = None if made is None else made.transform
+    picture = read_picture(path, layer=layer, transform=asked, otherwise=otherwise)
     if made is not None and made.size != picture.size:
         if template is not None:
             raise SizeError(
@@ -120,10 +120,10 @@ def _opened(
                 f"{made.size[1]}x{made.size[0]}: give the one it was painted on"
             )
         notes = (f"not compared with {folder}, which has another size",)
-        # It was painted on something else, and so was not shown through that view either.
+        # It was painted on something else, and so was not shown through its transform either.
         made, otherwise = None, None
-        picture = read_picture(path, layer=layer, view=asked)
-    shown = picture.view or (otherwise if asked.is_open else asked.over(otherwise))
+        picture = read_picture(path, layer=layer, transform=asked)
+    shown = picture.transform or (otherwise if asked.is_open else asked.over(otherwise))
     return _Reading(path, picture, made, folder, shown, notes)
 
 
@@ -143,9 +143,9 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     if picture.weight is not None:
         return picture.weight, []
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
-    if template is None and picture.alpha is None and picture.view is not None:
+    if template is None and picture.alpha is None and picture.transform is not None:
         # Numbers of a display, and nobody said what they mean: a template would know.
-        seen = f"{picture.view.name} at {picture.view.stops:+g} stops"
+        seen = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
         return None, [f"no template is known: all of it counts, as seen through {seen}"]
     if template is None or not is_opaque:
         return picture.alpha, []
@@ -196,7 +196,7 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
     bright = float(np.percentile(there[template.albedo.max(axis=-1) > 0], 95))
     # What is nearly black anyway needs little, however it is divided.
-    asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.view.white)
+    asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.transform.white)
     share = float((asks.any(axis=-1) & painted).sum() / painted.sum())
     if share <= FEW:
         return []

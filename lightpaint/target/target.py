@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_mean, whole_factor
 
@@ -27,7 +27,7 @@ class Target:
         this or anything brighter was meant; None if it can say everything.
     notes: what a person should know of how it was read, a sentence each.
     content, sensor: of the scene and view that it was painted on, where a template says.
-    view: what a display showed it through when it was painted; None if nobody knows.
+    transform: what a display showed it through when it was painted; None if nobody knows.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Target:
     notes: tuple[str, ...] = ()
     content: str = ""
     sensor: str = ""
-    view: View | None = None
+    transform: ViewTransform | None = None
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
@@ -89,7 +89,7 @@ class Target:
         if given.dtype.kind != "f":
             raise TargetError(
                 f"target {name}: an image of {given.dtype}: expected floats, linear Rec.709; "
-                "display values of 8 bits are View().decode(image / 255)"
+                "display values of 8 bits are ViewTransform().decode(image / 255)"
             )
         counts = np.ones(given.shape[:2]) if importance is None else np.asarray(importance)
         if counts.dtype.kind not in "bfui":
@@ -109,8 +109,8 @@ class Target:
         if self.at_least is not None:
             brighter = 100 * np.mean(self.at_least.any(axis=-1), where=counts)
             lines.append(f"  at least {brighter:.3g} % of what counts, or anything brighter")
-        if self.view is not None:
-            lines.append(f"  seen     through {self.view.spoken}")
+        if self.transform is not None:
+            lines.append(f"  seen     through {self.transform.spoken}")
         return "\n".join([*lines, *(f"  note     {note}" for note in self.notes)])
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.files import (
     one_line,
@@ -21,7 +21,7 @@ from lightpaint.files import (
     write_text,
 )
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
-from lightpaint.images.png import VIEW_KEY, png_bytes, write_png_16
+from lightpaint.images.png import TRANSFORM_KEY, png_bytes, write_png_16
 from lightpaint.records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
@@ -38,13 +38,13 @@ MAX_ABOUT = 2**20
 class Template:
     """The look that is painted over.
 
-    image: (h, w, 3) linear Rec.709. view: how template.png shows it. scene: name of the file,
+    image: (h, w, 3) linear Rec.709. transform: how template.png shows it. scene: name of the file,
     content: its hash (see `Scene.content`), sensor: what it is seen through.
     albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
     """
 
     image: Floats
-    view: View
+    transform: ViewTransform
     scene: str = ""
     content: str = ""
     sensor: str = ""
@@ -58,7 +58,7 @@ class Template:
     @property
     def shown(self) -> Floats:
         """The values in [0, 1] that template.png holds, rounded to its 16 bits."""
-        return np.round(self.view.encode(self.image) * 65535) / 65535
+        return np.round(self.transform.encode(self.image) * 65535) / 65535
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def write_template(
     plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
     written = [*plain, *matte_files, *light_files]
     with restoring(folder, [*written, *earlier_files(folder)]):
-        write_look(folder / LIGHT, template.image, template.view)
+        write_look(folder / LIGHT, template.image, template.transform)
         if template.albedo is not None:
             write_rgb(folder / ALBEDO, template.albedo)
         write_rgb(folder / NORMALS, normals)
@@ -108,22 +108,22 @@ def write_template(
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
-            write_bytes(file, _thumbnail(look, template.view.name))
+            write_bytes(file, _thumbnail(look, template.transform.name))
         # Last: a folder without it is no template.
         write_text(folder / ABOUT, _about(template))
     return written
 
 
-def _thumbnail(look: Floats, view: str) -> bytes:
+def _thumbnail(look: Floats, transform: str) -> bytes:
     """A linear picture as PNG, whatever its brightness."""
     bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
-    shown = View(view, float(np.clip(-np.log2(bright), -60, 60)))
+    shown = ViewTransform(transform, float(np.clip(-np.log2(bright), -60, 60)))
     return png_bytes(to_8_bit(shown.encode(look)))
 
 
 def _about(template: Template) -> str:
     height, width = template.size
-    shown = _Shown(template.view.name, template.view.stops)
+    shown = _Shown(template.transform.name, template.transform.stops)
     of = (template.scene, template.content, template.sensor)
     about = asdict(_About(FORMAT, *of, (width, height), shown))
     return json.dumps(about, indent=2, ensure_ascii=False) + "\n"
@@ -137,11 +137,11 @@ def earlier_files(folder: Path) -> list[Path]:
     return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
 
 
-def write_look(path: Path, image: Floats, view: View) -> Path:
+def write_look(path: Path, image: Floats, transform: ViewTransform) -> Path:
     """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG."""
     write_rgb(path, image)
     picture = path.with_suffix(".png")
-    write_png_16(picture, view.encode(image), texts=_texts(view))
+    write_png_16(picture, transform.encode(image), texts=_texts(transform))
     return picture
 
 
@@ -150,7 +150,7 @@ def read_template(folder: Path) -> Template:
     try:
         text = read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT)
         about = read_record(_About, strict_json(text), others=True)
-        view = View(about.view.name, about.view.stops)
+        transform = ViewTransform(about.view.name, about.view.stops)
         image = _read_picture(folder / LIGHT, about.size)
         albedo = None
         if (folder / ALBEDO).exists():
@@ -160,7 +160,7 @@ def read_template(folder: Path) -> Template:
         raise TargetError(
             f"{folder} is no template: {said}; make one with lightpaint template"
         ) from None
-    return Template(image, view, about.scene, about.content, about.sensor, albedo)
+    return Template(image, transform, about.scene, about.content, about.sensor, albedo)
 
 
 def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
@@ -196,5 +196,5 @@ def file_names(names: Iterable[str]) -> list[str]:
     return made
 
 
-def _texts(view: View) -> dict[str, str]:
-    return {VIEW_KEY: f"{view.name} {view.stops!r}"}
+def _texts(transform: ViewTransform) -> dict[str, str]:
+    return {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}

@@ -17,7 +17,7 @@ from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, layered, para,
 from PIL import Image, ImageCms
 
 from lightpaint.colour.display import decode_display
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import ImageError
 from lightpaint.images.picture import Picture, read_mask, read_picture
 
@@ -148,7 +148,7 @@ def test_profiles_are_converted(tmp_path: Path, dtype: Any, curve: Any, columns:
     np.testing.assert_allclose(picture.image, expected, rtol=0, atol=1e-3)
     # Colours beyond Rec.709 stay what they are.
     assert picture.image.min() < -0.05
-    brighter = _read(tmp_path, content, view=View("srgb", 2.0))
+    brighter = _read(tmp_path, content, transform=ViewTransform("srgb", 2.0))
     np.testing.assert_allclose(brighter.image, picture.image / 4, rtol=1e-6)
 
 
@@ -190,29 +190,34 @@ def test_linear_numbers(tmp_path: Path):
     pixels = _pixels(np.uint16)
     linear = (b"iCCP", b"x\0\0" + zlib.compress(icc(curv(), SRGB)))
     for content in (png(pixels), png(pixels, linear)):
-        picture = _read(tmp_path, content, view=View("linear"))
+        picture = _read(tmp_path, content, transform=ViewTransform("linear"))
         np.testing.assert_allclose(picture.image, pixels / 65535, atol=2e-3)
     np.testing.assert_allclose(
         _read(tmp_path, png(pixels, linear)).image, pixels / 65535, atol=2e-3
     )
     gamma = (b"iCCP", b"x\0\0" + zlib.compress(icc(para(0, 1.8), SRGB)))
     with pytest.raises(ImageError, match="its numbers are said to be linear"):
-        _read(tmp_path, png(pixels, gamma), view=View("linear"))
+        _read(tmp_path, png(pixels, gamma), transform=ViewTransform("linear"))
 
 
-@pytest.mark.parametrize("view", [View("agx", 1.0), View("filmic", -2.0), View("srgb", 3.0)])
-def test_views(tmp_path: Path, view: View):
+@pytest.mark.parametrize(
+    "transform",
+    [ViewTransform("agx", 1.0), ViewTransform("filmic", -2.0), ViewTransform("srgb", 3.0)],
+)
+def test_views(tmp_path: Path, transform: ViewTransform):
     pixels = _pixels(np.uint16)
-    expected = view.decode(pixels / 65535)
-    picture = _read(tmp_path, png(pixels), view=view)
+    expected = transform.decode(pixels / 65535)
+    picture = _read(tmp_path, png(pixels), transform=transform)
     np.testing.assert_allclose(picture.image, expected, rtol=2e-4, atol=1e-6)
-    assert picture.view == view
+    assert picture.transform == transform
     # What a PNG says of itself holds unless another is given.
-    said = (b"tEXt", b"lightpaint.view\0" + f"{view.name} {view.stops!r}".encode())
+    said = (b"tEXt", b"lightpaint.view\0" + f"{transform.name} {transform.stops!r}".encode())
     own = _read(tmp_path, png(pixels, said))
     np.testing.assert_array_equal(own.image, picture.image)
-    assert own.view == view
-    assert _read(tmp_path, png(pixels, said), view=View()).view == View()
+    assert own.transform == transform
+    assert (
+        _read(tmp_path, png(pixels, said), transform=ViewTransform()).transform == ViewTransform()
+    )
 
 
 @pytest.mark.parametrize("said", [b"nothing", b"agx much", b"rec709 1.0", b"srgb nan", b" "])
@@ -295,12 +300,12 @@ def test_a_tiff_of_floats_is_light(tmp_path: Path, dtype: Any):
     pixels = (np.random.default_rng(0).standard_normal((*SIZE, 3)) * 50).astype(dtype)
     pixels[1, 1, 0], pixels[2, 2, 1] = np.nan, np.inf
     tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="rgb")
-    picture = read_picture(tmp_path / "a.tif", view=View("agx"))
+    picture = read_picture(tmp_path / "a.tif", transform=ViewTransform("agx"))
     assert (~picture.finite).sum() == 2
     np.testing.assert_array_equal(picture.image[picture.finite], pixels[picture.finite])
     np.testing.assert_array_equal(picture.image[~picture.finite], 0)
     assert picture.saturated is None
-    assert picture.view is None
+    assert picture.transform is None
     assert picture.codes is None
     profile = icc(para(3, *SRGB_CURVE), SRGB)
     tifffile.imwrite(tmp_path / "b.tif", pixels, photometric="rgb", iccprofile=profile)
@@ -361,7 +366,7 @@ def test_jpeg(tmp_path: Path, options: Any):
     with Image.open(tmp_path / "a.jpg") as file:
         decoded = np.asarray(file)
     # Two builds of one library may round apart by a code.
-    shown = View().encode(picture.image) * 255
+    shown = ViewTransform().encode(picture.image) * 255
     np.testing.assert_allclose(shown, decoded, atol=1.01)
     np.testing.assert_array_equal(picture.saturated, np.round(shown) >= 253)
 
@@ -377,7 +382,7 @@ def test_pictures_are_upright(tmp_path: Path, orientation: int, suffix: str):
     Image.fromarray(_smooth()).save(path, exif=exif, **({"quality": 98} if suffix == "jpg" else {}))
     with Image.open(path) as file:
         upright = np.asarray(ImageOps.exif_transpose(file))
-    shown = View().encode(read_picture(path).image) * 255
+    shown = ViewTransform().encode(read_picture(path).image) * 255
     assert shown.shape == upright.shape
     np.testing.assert_allclose(shown, upright, atol=1.01)
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
@@ -80,47 +80,52 @@ def _same_problem(one: Problem, other: Problem, *, rtol: float) -> None:
     st.integers(1, 6),
     st.sampled_from([0.0, 0.3]),
     st.booleans(),
-    st.sampled_from([None, View("srgb")]),
+    st.sampled_from([None, ViewTransform("srgb")]),
 )
 def test_painting_is_a_rebuild(
-    make_basis: Any, seed: int, count: int, unpainted: float, everything: bool, view: View | None
+    make_basis: Any,
+    seed: int,
+    count: int,
+    unpainted: float,
+    everything: bool,
+    transform: ViewTransform | None,
 ) -> None:
     basis, target = _basis(make_basis), _target(seed, everything=everything)
     strokes = _strokes(seed, count)
-    problem = Problem.of(basis, target, unpainted=unpainted, view=view)
+    problem = Problem.of(basis, target, unpainted=unpainted, transform=transform)
     for region, image, importance, at_least in strokes:
         problem = problem.painted(region, image, importance, at_least=at_least)
     by_hand = _painted_by_hand(target, basis.emitters_seen, strokes)
-    rebuilt = Problem.of(basis, by_hand, unpainted=unpainted, view=view)
+    rebuilt = Problem.of(basis, by_hand, unpainted=unpainted, transform=transform)
     # float64 sums of the same products in another order.
     _same_problem(problem, rebuilt, rtol=1e-12)
     # Bit for bit those of one stroke over all of it.
-    at_once = Problem.of(basis, _target(seed + 1), unpainted=unpainted, view=view).painted(
-        WHOLE, by_hand.image, by_hand.importance, at_least=by_hand.at_least
-    )
+    at_once = Problem.of(
+        basis, _target(seed + 1), unpainted=unpainted, transform=transform
+    ).painted(WHOLE, by_hand.image, by_hand.importance, at_least=by_hand.at_least)
     np.testing.assert_array_equal(problem.equations.M, at_once.equations.M)
     np.testing.assert_array_equal(problem.equations.b, at_once.equations.b)
 
 
-@pytest.mark.parametrize("view", [None, View("srgb")])
+@pytest.mark.parametrize("transform", [None, ViewTransform("srgb")])
 @pytest.mark.parametrize(
     "asked", [{}, {"light 1": {"lock": True}}, {"*": {"kelvin": [2700, 6500]}}]
 )
 def test_the_answer_is_that_of_the_rebuilt_problem(
-    make_basis: Any, asked: dict[str, Any], view: View | None
+    make_basis: Any, asked: dict[str, Any], transform: ViewTransform | None
 ) -> None:
     basis, target, strokes = _basis(make_basis), _target(3), _strokes(5, 5)
     constraints = Constraints.of(asked)
-    problem = Problem.of(basis, target, constraints=constraints, unpainted=0.1, view=view)
+    problem = Problem.of(basis, target, constraints=constraints, unpainted=0.1, transform=transform)
     for region, image, importance, at_least in strokes:
         # As a painter does: from the answer before the stroke.
         solution = solution_of(problem)
         problem = solution.problem.painted(region, image, importance, at_least=at_least)
     by_hand = _painted_by_hand(target, basis.emitters_seen, strokes)
-    expected = solve(basis, by_hand, constraints=constraints, unpainted=0.1, view=view)
+    expected = solve(basis, by_hand, constraints=constraints, unpainted=0.1, transform=transform)
     found = solution_of(problem)
     # Of one convex problem; in display space as near as rounds end.
-    np.testing.assert_allclose(found.weights, expected.weights, atol=1e-5 if view else 1e-7)
+    np.testing.assert_allclose(found.weights, expected.weights, atol=1e-5 if transform else 1e-7)
 
 
 def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:

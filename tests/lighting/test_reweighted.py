@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize, nnls
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import reweighted
 from lightpaint.lighting.analysis.diagnosis import diagnose
@@ -27,7 +27,7 @@ from lightpaint.lighting.solve import again, solve
 from lightpaint.target.target import Target
 
 SIZE = (8, 9)
-SRGB = View("srgb")
+SRGB = ViewTransform("srgb")
 
 
 def _target(image: Any, importance: Any = None, *, top: float | None = None) -> Target:
@@ -65,13 +65,13 @@ def _hinge(basis: Basis, target: Target, unpainted: float) -> Any:
     return value
 
 
-def _displayed(basis: Basis, target: Target, view: View, unpainted: float) -> Any:
+def _displayed(basis: Basis, target: Target, transform: ViewTransform, unpainted: float) -> Any:
     a = target.importance[..., None].astype(np.float64)
-    painted = view.encode(target.image.astype(np.float64))
-    current = view.encode(basis.mix(basis.present_weights).astype(np.float64))
+    painted = transform.encode(target.image.astype(np.float64))
+    current = transform.encode(basis.mix(basis.present_weights).astype(np.float64))
 
     def value(w: Any) -> float:
-        x = view.encode(_pictures(basis, w))
+        x = transform.encode(_pictures(basis, w))
         return float((a * (painted - x) ** 2 + unpainted * (1 - a) * (current - x) ** 2).sum())
 
     return value
@@ -119,21 +119,23 @@ def test_at_least_is_the_optimum_of_the_hinge(make_basis: Any, seed: int, unpain
     assert sum(solution.certificate.objective) <= value(w) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("view", [None, SRGB, View("agx", 1.0), View("filmic", -1.0)])
+@pytest.mark.parametrize(
+    "transform", [None, SRGB, ViewTransform("agx", 1.0), ViewTransform("filmic", -1.0)]
+)
 @pytest.mark.parametrize("seed", range(6))
 def test_the_objective_never_rises(
-    make_basis: Any, seed: int, view: View | None, monkeypatch: pytest.MonkeyPatch
+    make_basis: Any, seed: int, transform: ViewTransform | None, monkeypatch: pytest.MonkeyPatch
 ):
     basis, image, importance = _random(make_basis, seed)
-    target = _target(image, importance, top=0.3 if view is None else None)
-    loss = solve(basis, target, view=view).problem.loss
+    target = _target(image, importance, top=0.3 if transform is None else None)
+    loss = solve(basis, target, transform=transform).problem.loss
     plain = solve(basis, replace(target, at_least=None))
     values = [loss.objective(predicted(basis, plain.weights)).sum()]
     for rounds in range(1, 12):
         monkeypatch.setattr(reweighted, "ROUNDS", rounds)
-        solution = solve(basis, target, view=view)
+        solution = solve(basis, target, transform=transform)
         values.append(sum(solution.certificate.objective))
-        assert solution.certificate.converged or view is not None or rounds < 6
+        assert solution.certificate.converged or transform is not None or rounds < 6
     assert (np.diff(values) <= 1e-12 * values[0]).all()
 
 
@@ -143,11 +145,11 @@ def test_running_out_of_rounds_keeps_what_was_won(
 ):
     """Whole steps would be for the worse here, parts of them are not; labels stay as well."""
     basis, image, importance = _random(make_basis, seed)
-    target, view = _target(image, importance), View("srgb", 2.0)
+    target, transform = _target(image, importance), ViewTransform("srgb", 2.0)
     asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
     problem = solve(basis, target, constraints=asked)
     monkeypatch.setattr(reweighted, "ROUNDS", 1)
-    solution = solve(basis, target, constraints=asked, view=view)
+    solution = solve(basis, target, constraints=asked, transform=transform)
     assert not solution.certificate.converged
     begin = predicted(basis, problem.lighting.weights_for(basis))
     assert (
@@ -189,20 +191,26 @@ def test_only_a_lower_end_is_black(make_basis: Any):
     assert solution.certificate.converged
 
 
-VIEWS = [SRGB, View("srgb", 2.0), View("filmic"), View("linear", 0.5), View("agx", 1.0)]
+VIEWS = [
+    SRGB,
+    ViewTransform("srgb", 2.0),
+    ViewTransform("filmic"),
+    ViewTransform("linear", 0.5),
+    ViewTransform("agx", 1.0),
+]
 
 
-@pytest.mark.parametrize("view", VIEWS, ids=lambda v: v.spoken)
+@pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
 @pytest.mark.parametrize("unpainted", [0.0, 0.3])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_display_fit_is_stationary_and_no_worse(
-    make_basis: Any, seed: int, view: View, unpainted: float
+    make_basis: Any, seed: int, transform: ViewTransform, unpainted: float
 ):
     basis, image, importance = _random(make_basis, seed)
     target = _target(image, importance)
-    value = _displayed(basis, target, view, unpainted)
+    value = _displayed(basis, target, transform, unpainted)
     linear = solve(basis, target, unpainted=unpainted).lighting.weights_for(basis)
-    solution = solve(basis, target, unpainted=unpainted, view=view)
+    solution = solve(basis, target, unpainted=unpainted, transform=transform)
     w = solution.lighting.weights_for(basis)
     assert value(w) <= value(linear) * (1 + 1e-12)
     if not unpainted:
@@ -221,7 +229,7 @@ def test_most_display_fits_are_the_best_there_are(make_basis: Any):
         basis, image, importance = _random(make_basis, seed)
         target = _target(image, importance)
         value = _displayed(basis, target, SRGB, 0.0)
-        w = solve(basis, target, view=SRGB).lighting.weights_for(basis)
+        w = solve(basis, target, transform=SRGB).lighting.weights_for(basis)
         rng = np.random.default_rng(seed)
         best = _best(value, [3 * rng.random(w.shape) for _ in range(4)] + [w])
         worse.append(value(w) / best - 1)
@@ -234,7 +242,7 @@ def test_what_is_clipped_comes_back(make_basis: Any):
     rng = np.random.default_rng(0)
     basis = make_basis(images=0.2 + rng.random((2, *SIZE, 3)))
     truth = np.array([[0.2, 0.1, 0.3], [0.1, 0.2, 0.1]])
-    problem = Problem.of(basis, _target(_pictures(basis, truth)), view=SRGB)
+    problem = Problem.of(basis, _target(_pictures(basis, truth)), transform=SRGB)
 
     def linear(equations: Any, begin: Any) -> Any:
         return solve_reduced(equations, problem.reduction, begin).weights
@@ -243,13 +251,15 @@ def test_what_is_clipped_comes_back(make_basis: Any):
     np.testing.assert_allclose(found.weights, truth, rtol=1e-5)
 
 
-@pytest.mark.parametrize("view", [None, *VIEWS], ids=str)
-def test_squares_have_the_gradient_of_the_loss(make_basis: Any, view: View | None):
+@pytest.mark.parametrize("transform", [None, *VIEWS], ids=str)
+def test_squares_have_the_gradient_of_the_loss(make_basis: Any, transform: ViewTransform | None):
     """At pictures where nothing clips, by differences of each pixel's own loss."""
     rng = np.random.default_rng(2)
-    top = 0.5 / 2.0 ** (view.stops if view else 0)
+    top = 0.5 / 2.0 ** (transform.stops if transform else 0)
     image, current, x = rng.uniform(0.1, 1, (3, *SIZE, 3)) * top
-    loss = PaintingLoss(image, rng.random(SIZE), rng.random(SIZE), current, image > 0.6 * top, view)
+    loss = PaintingLoss(
+        image, rng.random(SIZE), rng.random(SIZE), current, image > 0.6 * top, transform
+    )
     squares = loss.squares(x)
     gradient = -2 * squares.weight * (squares.image - x)
     step = 1e-6 * top
@@ -280,16 +290,16 @@ ASKED: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("view", [None, SRGB])
+@pytest.mark.parametrize("transform", [None, SRGB])
 @pytest.mark.parametrize("asked", ASKED, ids=lambda a: next(iter(a)))
 def test_constraints_hold_and_nothing_near_is_better(
-    make_basis: Any, asked: dict[str, Any], view: View | None
+    make_basis: Any, asked: dict[str, Any], transform: ViewTransform | None
 ):
     basis, image, importance = _random(make_basis, 7)
     target = _target(image, importance, top=0.3)
     asked = dict(asked)
     constraints = Constraints.of(asked.pop("lights", {}), **asked)
-    solution = solve(basis, target, constraints=constraints, view=view)
+    solution = solve(basis, target, constraints=constraints, transform=transform)
     assert solution.certificate.converged
     w = solution.lighting.weights_for(basis)
     plain = solve(basis, target, constraints=constraints).lighting.weights_for(basis)
@@ -315,8 +325,8 @@ def test_constraints_hold_and_nothing_near_is_better(
             assert value(w + 1e-3 * (there - w)) >= value(w) * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("view", [None, SRGB])
-def test_views_together_are_one_picture(make_basis: Any, view: View | None):
+@pytest.mark.parametrize("transform", [None, SRGB])
+def test_views_together_are_one_picture(make_basis: Any, transform: ViewTransform | None):
     """Two views, of which one alone has saturated paint, against one view of both pictures."""
     basis, image, importance = _random(make_basis, 1)
     present = [light.emission for light in basis.lights]
@@ -331,8 +341,8 @@ def test_views_together_are_one_picture(make_basis: Any, view: View | None):
         (first, replace(_target(image[:5], importance[:5]), at_least=at_least[:5])),
         (second, _target(image[5:], importance[5:])),
     ]
-    expected = solve(basis, whole, unpainted=0.2, view=view)
-    found = solve(*zip(*parts, strict=True), unpainted=0.2, view=view).views
+    expected = solve(basis, whole, unpainted=0.2, transform=transform)
+    found = solve(*zip(*parts, strict=True), unpainted=0.2, transform=transform).views
     w = expected.lighting.weights_for(basis)
     # As exactly as rounds end.
     np.testing.assert_allclose(found[0].lighting.weights_for(first), w, atol=1e-5)
@@ -359,18 +369,18 @@ def _of_any_sign(A: Any, y: Any) -> Any:
     return np.linalg.lstsq(A, y, rcond=None)[0]
 
 
-@pytest.mark.parametrize("view", [None, SRGB, View("agx", 1.0)], ids=str)
+@pytest.mark.parametrize("transform", [None, SRGB, ViewTransform("agx", 1.0)], ids=str)
 @pytest.mark.parametrize("seed", range(4))
 def test_what_each_of_several_views_misses_is_split_on_one_scale(
-    make_basis: Any, seed: int, view: View | None
+    make_basis: Any, seed: int, transform: ViewTransform | None
 ):
     """Each part from its own optimum, of the view's own squares: nnls, and lstsq for any sign."""
     bases, targets = [], []
     for k in range(2):
         basis, image, importance = _random(make_basis, seed + 50 * k)
         bases.append(replace(basis, lights=bases[0].lights if bases else basis.lights))
-        targets.append(_target(image, importance + 0.01, top=None if view else 0.6))
-    joint = solve(bases, targets, view=view)
+        targets.append(_target(image, importance + 0.01, top=None if transform else 0.6))
+    joint = solve(bases, targets, transform=transform)
     told, energies = [], []
     for b, its in zip(bases, joint.views, strict=True):
         found = diagnose(its)
@@ -398,11 +408,11 @@ def _as_solved(joint: Solution, channels: Any, A: Any, y: Any) -> Any:
     return np.array([light.weight[c] for light in joint.lighting.lights])
 
 
-@pytest.mark.parametrize("view", [SRGB, View("agx", 1.0)], ids=str)
-def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, view: View):
+@pytest.mark.parametrize("transform", [SRGB, ViewTransform("agx", 1.0)], ids=str)
+def test_gains_are_beside_what_the_same_squares_miss(make_basis: Any, transform: ViewTransform):
     basis, image, importance = _random(make_basis, 2)
     target = _target(image, importance)
-    solution = solve(basis, target, view=view)
+    solution = solve(basis, target, transform=transform)
     found = diagnose(solution)
     # As pixels have it in float32, and normal equations in float64.
     assert solution.energy == pytest.approx(found.total, rel=1e-5)
@@ -419,8 +429,8 @@ def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any)
     assert a.lighting == b.lighting
 
 
-@pytest.mark.parametrize("view", [None, SRGB])
-def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | None):
+@pytest.mark.parametrize("transform", [None, SRGB])
+def test_error_bars_hold_the_answer_without_noise(make_basis: Any, transform: ViewTransform | None):
     """95 % intervals over seeds, taken from the last linear problem; and less bias, corrected."""
     size, sigma = (24, 24), 0.15
     y, x = np.mgrid[: size[0], : size[1]] / size[0]
@@ -430,7 +440,7 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | 
     image = np.einsum("n,nhwc->hwc", [1, 0.5, 0.1, 0.3], clean) * [1, 0.7, 0.3] + 0.1 * y[..., None]
     target = _target(image, top=0.8)
     quiet = make_basis(images=clean)
-    truth = solve(quiet, target, view=view).lighting.weights_for(quiet)
+    truth = solve(quiet, target, transform=transform).lighting.weights_for(quiet)
     held, off, corrected_off = [], [], []
     for seed in range(30):
         rng = np.random.default_rng(seed)
@@ -439,7 +449,7 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | 
             for _ in range(2)
         )
         basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2)
-        solution = solve(basis, target, view=view)
+        solution = solve(basis, target, transform=transform)
         low, high = error_bars(solution).interval
         held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
         off.append(solution.lighting.weights_for(basis) - truth)
@@ -449,9 +459,11 @@ def test_error_bars_hold_the_answer_without_noise(make_basis: Any, view: View | 
     assert np.square(corrected_off).mean() < np.square(off).mean()
 
 
-@pytest.mark.parametrize("view", [None, SRGB])
+@pytest.mark.parametrize("transform", [None, SRGB])
 @pytest.mark.parametrize("seed", range(12))
-def test_lights_once_chosen_stay_chosen(make_basis: Any, seed: int, view: View | None):
+def test_lights_once_chosen_stay_chosen(
+    make_basis: Any, seed: int, transform: ViewTransform | None
+):
     """With `sparse` the choice is taken as given by all that improves an answer.
 
     The squares of the last linear problem hold near the answer only: other lights would be
@@ -462,9 +474,9 @@ def test_lights_once_chosen_stay_chosen(make_basis: Any, seed: int, view: View |
     halves = 1e-4 * rng.normal(size=images.shape)
     basis = make_basis(images=images, half_differences=halves, emission=rng.random((6, 3)))
     image = rng.random((*SIZE, 3)) ** 2 * rng.choice([0.5, 1, 2])
-    target = _target(image, top=None if view else 0.3)
+    target = _target(image, top=None if transform else 0.3)
     asked = Constraints.of({}, sparse=2)
-    solution = solve(basis, target, constraints=asked, view=view)
+    solution = solve(basis, target, constraints=asked, transform=transform)
     w = solution.lighting.weights_for(basis)
     mix = combine(basis, solution.lighting)
     refined = refine(solution, Estimate(mix.image, 0.5 * mix.half_difference))

@@ -14,7 +14,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -253,10 +253,10 @@ def _made(name: str, gain: float, missed: float, at: Any = (0.25, 0.5)) -> Sugge
 
 
 def test_the_section_says_what_was_found():
-    assert suggestion_section(None, view=View()) == ""
-    assert "No point light would surely" in suggestion_section((), view=View())
+    assert suggestion_section(None, transform=ViewTransform()) == ""
+    assert "No point light would surely" in suggestion_section((), transform=ViewTransform())
     two = (_made("a", 0.4, 0.6), _made("b & c", 0.2, 0.4, None))
-    page = suggestion_section(two, view=View(), cd_per_unit=100)
+    page = suggestion_section(two, transform=ViewTransform(), cd_per_unit=100)
     assert "would take away 40 % of what is missed" in page
     assert "together, 60 %" in page
     assert page.count("<img") == 4

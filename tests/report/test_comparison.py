@@ -10,7 +10,7 @@ from PIL import Image
 
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
@@ -139,12 +139,12 @@ def test_what_is_not_painted_is_grey_and_not_the_paintings(make_basis: Any):
     look = _look(make_basis)
     target, solution = look["target"], look["solution"]
     current = combine(look["basis"], Lighting.present(look["basis"])).image
-    picture = target_picture(target, solution, current, view=View())
+    picture = target_picture(target, solution, current, transform=ViewTransform())
     right = picture[:, 16:]
     assert np.ptp(right, axis=-1).max() == 0
-    np.testing.assert_array_equal(right, unpainted_look(current, view=View())[:, 16:])
+    np.testing.assert_array_equal(right, unpainted_look(current, transform=ViewTransform())[:, 16:])
     # The lines across it: neighbours of an even look differ.
-    even = unpainted_look(np.full((*SIZE, 3), 0.2), view=View())
+    even = unpainted_look(np.full((*SIZE, 3), 0.2), transform=ViewTransform())
     assert len(np.unique(even)) == 2
 
 
@@ -154,8 +154,10 @@ def test_half_importance_is_half_shown(make_basis: Any):
     importance[0] = 1
     target = Target("half", look["target"].image, importance, everything=False)
     current = np.zeros((*SIZE, 3))
-    picture = target_picture(target, solve(look["basis"], target), current, view=View())
-    mean = (encode_display(target.image) + unpainted_look(current, view=View())) / 2
+    picture = target_picture(
+        target, solve(look["basis"], target), current, transform=ViewTransform()
+    )
+    mean = (encode_display(target.image) + unpainted_look(current, transform=ViewTransform())) / 2
     np.testing.assert_allclose(picture[1:], mean[1:], rtol=1e-6)  # the image is float32
 
 
@@ -165,7 +167,9 @@ def test_emitters_nobody_painted_are_not_shown_as_target(make_basis: Any):
     basis = make_basis(3, SIZE, seen=seen)
     image = np.full((*SIZE, 3), 0.5, np.float32)
     target = Target("all", image, np.ones(SIZE, np.float32), everything=True)
-    picture = target_picture(target, solve(basis, target), np.zeros(image.shape), view=View())
+    picture = target_picture(
+        target, solve(basis, target), np.zeros(image.shape), transform=ViewTransform()
+    )
     shown = np.isclose(picture, encode_display(image)).all(axis=-1)
     np.testing.assert_array_equal(shown, ~seen)
 
@@ -180,7 +184,7 @@ def test_coverage_is_alpha(importance: list[float], expected: list[float]):
 
 def test_importance_is_brighter_where_it_counts(make_basis: Any):
     ramp = np.tile(np.linspace(0, 1, SIZE[1]), (SIZE[0], 1))
-    picture = importance_picture(ramp, np.full((*SIZE, 3), 0.3), view=View())
+    picture = importance_picture(ramp, np.full((*SIZE, 3), 0.3), transform=ViewTransform())
     # By whole columns: the lines cross all of them alike.
     assert (np.diff(luminance(picture).mean(axis=0)) > 0).all()
 
@@ -197,21 +201,25 @@ def test_residual_is_prediction_minus_target(make_basis: Any):
     offset = np.zeros((*SIZE, 3))
     offset[:12], offset[12:] = 0.2, -0.2
     predicted = solution.image + offset
-    assert residual_limit(solution, predicted, view=View()) == pytest.approx(0.2)
-    picture = residual_picture(solution, predicted, current, view=View(), limit=0.4)
+    assert residual_limit(solution, predicted, transform=ViewTransform()) == pytest.approx(0.2)
+    picture = residual_picture(solution, predicted, current, transform=ViewTransform(), limit=0.4)
     above, below = diverging(np.array([0.5, -0.5]))
     # The prediction is float64 here; sums of the luminance weights round in the last digits.
     np.testing.assert_allclose(picture[:12, :16], np.broadcast_to(above, (12, 16, 3)), rtol=1e-9)
     np.testing.assert_allclose(picture[12:, :16], np.broadcast_to(below, (12, 16, 3)), rtol=1e-9)
-    np.testing.assert_array_equal(picture[:, 16:], unpainted_look(current, view=View())[:, 16:])
+    np.testing.assert_array_equal(
+        picture[:, 16:], unpainted_look(current, transform=ViewTransform())[:, 16:]
+    )
 
 
 def test_residual_scale_is_never_finer_than_sight(make_basis: Any):
     solution = _look(make_basis)["solution"]
     almost = solution.image + 1e-7
-    assert residual_limit(solution, almost, view=View()) == 0.01
+    assert residual_limit(solution, almost, transform=ViewTransform()) == 0.01
     # Three stops brighter on the display, an eighth of it can be seen: 0.00125, rounded up.
-    assert residual_limit(solution, almost, view=View("srgb", 3)) == pytest.approx(0.002)
+    assert residual_limit(solution, almost, transform=ViewTransform("srgb", 3)) == pytest.approx(
+        0.002
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -30,7 +30,9 @@ def _missed(solution: Any) -> float:
 
 
 def _section(basis: Any, target: Target, solution: Any) -> str:
-    return constraints_section(basis, solution, without_constraints(solution), view=View())
+    return constraints_section(
+        basis, solution, without_constraints(solution), transform=ViewTransform()
+    )
 
 
 def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:

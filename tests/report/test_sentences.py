@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import Place, diagnose
 from lightpaint.lighting.analysis.uncertainty import error_bars
 from lightpaint.lighting.bound import Bound
@@ -158,11 +158,13 @@ def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
     basis, solution, _, found = _solved(make_basis)
     bound = _bound("limits", "a", gain=0.5 * found.total, multiplier=(-2.5,))
     current = basis.mix(basis.present_weights)
-    page = missed_section(solution, replace(found, bounds=(bound,)), current, view=View())
+    page = missed_section(
+        solution, replace(found, bounds=(bound,)), current, transform=ViewTransform()
+    )
     assert "−2.5<small>per unit of luminance" in page
     assert "not looked into" not in page
     found = replace(found, bounds=(bound,), bounds_left_out=7)
-    page = missed_section(solution, found, current, view=View())
+    page = missed_section(solution, found, current, transform=ViewTransform())
     assert "7 more seem to matter less, and were not looked into" in page
 
 
@@ -173,6 +175,6 @@ def test_names_are_escaped(make_basis: Any):
     diagnosis = replace(diagnosis, bounds=(bound,))
     current = basis.mix(basis.present_weights)
     page = sure_section(basis, solution, found)
-    page += missed_section(solution, diagnosis, current, view=View())
+    page += missed_section(solution, diagnosis, current, transform=ViewTransform())
     assert "<b>" not in page
     assert "&lt;b&gt;2" in page

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from lightpaint.colour.display import decode_display
-from lightpaint.colour.view import View, ViewChoice
+from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError, ViewError
 from lightpaint.images.exr import Part, write_parts, write_rgb
 from lightpaint.images.png import write_png_16
@@ -19,14 +19,14 @@ from lightpaint.target.template import Template, write_look, write_template
 SIZE = (60, 80)
 
 
-def template_of(view: View = View("srgb")) -> Template:  # noqa: B008 (frozen)
+def template_of(transform: ViewTransform = ViewTransform("srgb")) -> Template:  # noqa: B008 (frozen)
     """A red wall and a grey one, like a render of few samples, a little of it beyond white."""
     rng = np.random.default_rng(0)
     ramp = np.linspace(0.02, 0.9, SIZE[1])[None, :, None] * np.array([1, 0.8, 0.6])
     albedo = np.broadcast_to(np.float32([0.6, 0.06, 0.05]), (*SIZE, 3)).copy()
     albedo[:, 40:] = 0.7
     image = (2 * ramp * albedo * rng.gamma(8, 1 / 8, (*SIZE, 3))).astype(np.float32)
-    return Template(image, view, "room.xml", "abc", "camera", albedo)
+    return Template(image, transform, "room.xml", "abc", "camera", albedo)
 
 
 def write(folder: Path, template: Template) -> Path:
@@ -50,10 +50,10 @@ def brushed(shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return shown + coverage[..., None] * (paint - shown), coverage
 
 
-def save(path: Path, display: np.ndarray, view: View) -> None:
+def save(path: Path, display: np.ndarray, transform: ViewTransform) -> None:
     eight = np.round(display * 255).astype(np.uint8)
     if path.suffix == ".exr":
-        light = view.decode(display).astype(np.float16 if "half" in path.stem else np.float32)
+        light = transform.decode(display).astype(np.float16 if "half" in path.stem else np.float32)
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         OpenEXR.File(header, {"RGB": light}).write(str(path))
     elif "16" in path.stem:
@@ -64,13 +64,17 @@ def save(path: Path, display: np.ndarray, view: View) -> None:
         Image.fromarray(eight).save(path)
 
 
-@pytest.mark.parametrize("view", [View("srgb"), View("srgb", -1.5), View("agx", 0.5)])
+@pytest.mark.parametrize(
+    "transform", [ViewTransform("srgb"), ViewTransform("srgb", -1.5), ViewTransform("agx", 0.5)]
+)
 @pytest.mark.parametrize("name", ["p16.png", "p8.png", "p8.tif", "p.jpg", "half.exr", "float.exr"])
-def test_in_every_format_the_brush_is_found(tmp_path: Path, name: str, view: View) -> None:
-    template = template_of(view)
+def test_in_every_format_the_brush_is_found(
+    tmp_path: Path, name: str, transform: ViewTransform
+) -> None:
+    template = template_of(transform)
     write(tmp_path, template)
     display, coverage = brushed(template.shown)
-    save(tmp_path / name, display, view)
+    save(tmp_path / name, display, transform)
     target = read_target(tmp_path / name)
     assert not target.everything
     assert "painted" in target.notes[0]
@@ -90,7 +94,7 @@ def test_a_file_that_was_only_saved_again_is_no_painting(tmp_path: Path) -> None
     template = template_of()
     write(tmp_path, template)
     for name in ("p16.png", "p8.png", "p8.tif", "p.jpg", "half.exr", "float.exr"):
-        save(tmp_path / name, template.shown, template.view)
+        save(tmp_path / name, template.shown, template.transform)
         with pytest.raises(TargetError, match=r"nothing in .* differs from the template"):
             read_target(tmp_path / name)
         assert read_target(tmp_path / name, find=False).everything
@@ -100,7 +104,7 @@ def test_mask_and_alpha_go_before(tmp_path: Path) -> None:
     template = template_of()
     write(tmp_path, template)
     display, _ = brushed(template.shown)
-    save(tmp_path / "p8.png", display, template.view)
+    save(tmp_path / "p8.png", display, template.transform)
     mask = np.zeros(SIZE, np.uint8)
     mask[:5] = 255
     Image.fromarray(mask).save(tmp_path / "mask.png")
@@ -120,7 +124,7 @@ def test_the_template_is_found_where_people_keep_it(
     for folder, painting in (("a/template", "a/p8.png"), ("template", "elsewhere/p8.png")):
         write(tmp_path / folder, template)
         (tmp_path / painting).parent.mkdir(exist_ok=True)
-        save(tmp_path / painting, display, template.view)
+        save(tmp_path / painting, display, template.transform)
     monkeypatch.chdir(tmp_path)
     for painting in ("a/p8.png", "elsewhere/p8.png"):
         assert not read_target(painting).everything
@@ -144,7 +148,7 @@ def test_of_another_size(tmp_path: Path) -> None:
         read_target(tmp_path / "layer.png", template=tmp_path / "template", paint="light")
     # A file in it stands for the folder.
     same = tmp_path / "same.png"
-    save(same, brushed(template.shown)[0], template.view)
+    save(same, brushed(template.shown)[0], template.transform)
     for named in ("template", "template/template.png", "template/template.json"):
         assert not read_target(same, template=tmp_path / named).everything
 
@@ -154,74 +158,85 @@ def test_of_another_size(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("asked", "expected"),
     [
-        (None, View("agx", 0.5)),
-        (ViewChoice(), View("agx", 0.5)),
-        (ViewChoice(stops=2.0), View("agx", 2.0)),
-        (ViewChoice(stops=0.0), View("agx", 0.0)),
-        (ViewChoice(name="filmic"), View("filmic", 0.5)),
-        (ViewChoice("linear", 1.0), View("linear", 1.0)),
-        (View("linear", 1.0), View("linear", 1.0)),
+        (None, ViewTransform("agx", 0.5)),
+        (TransformChoice(), ViewTransform("agx", 0.5)),
+        (TransformChoice(stops=2.0), ViewTransform("agx", 2.0)),
+        (TransformChoice(stops=0.0), ViewTransform("agx", 0.0)),
+        (TransformChoice(name="filmic"), ViewTransform("filmic", 0.5)),
+        (TransformChoice("linear", 1.0), ViewTransform("linear", 1.0)),
+        (ViewTransform("linear", 1.0), ViewTransform("linear", 1.0)),
     ],
 )
 def test_what_is_left_open_of_a_view_is_the_templates(
-    tmp_path: Path, asked: View | ViewChoice | None, expected: View, name: str, given: bool
+    tmp_path: Path,
+    asked: ViewTransform | TransformChoice | None,
+    expected: ViewTransform,
+    name: str,
+    given: bool,
 ) -> None:
-    write(tmp_path, template_of(View("agx", 0.5)))
+    write(tmp_path, template_of(ViewTransform("agx", 0.5)))
     shown = np.random.default_rng(1).integers(0, 256, (*SIZE, 3)) / 255
-    save(tmp_path / name, shown, View("agx", 0.5))
-    target = read_target(tmp_path / name, view=asked, template=tmp_path if given else None)
-    assert target.view == expected
+    save(tmp_path / name, shown, ViewTransform("agx", 0.5))
+    target = read_target(tmp_path / name, transform=asked, template=tmp_path if given else None)
+    assert target.transform == expected
     if name == "p8.png":
         np.testing.assert_allclose(target.image, expected.decode(shown), rtol=1e-4, atol=1e-6)
 
 
 def test_what_nobody_says_of_a_view_is_srgbs(tmp_path: Path) -> None:
     for name in ("p8.png", "half.exr"):
-        save(tmp_path / name, np.full((4, 4, 3), 0.5), View())
+        save(tmp_path / name, np.full((4, 4, 3), 0.5), ViewTransform())
         for asked, expected in (
-            (ViewChoice(stops=2.0), View("srgb", 2.0)),
-            (ViewChoice(name="agx"), View("agx")),
-            (ViewChoice(), View() if name == "p8.png" else None),
+            (TransformChoice(stops=2.0), ViewTransform("srgb", 2.0)),
+            (TransformChoice(name="agx"), ViewTransform("agx")),
+            (TransformChoice(), ViewTransform() if name == "p8.png" else None),
         ):
-            assert read_target(tmp_path / name, view=asked).view == expected
+            assert read_target(tmp_path / name, transform=asked).transform == expected
 
 
 def test_what_no_view_has_cannot_be_asked() -> None:
     with pytest.raises(ViewError, match=r"^no view transform 'srgbb'"):
-        ViewChoice(name="srgbb")
+        TransformChoice(name="srgbb")
     with pytest.raises(ViewError, match="out of range"):
-        ViewChoice(stops=1e9)
+        TransformChoice(stops=1e9)
 
 
 def test_a_template_of_another_size_says_nothing_of_the_view(tmp_path: Path) -> None:
     """It is not what was painted on: neither compared with nor decoded by."""
-    write(tmp_path, template_of(View("agx", 2.0)))
-    save(tmp_path / "p8.png", np.full((8, 8, 3), 0.5), View())
-    for asked, view in ((None, View()), (ViewChoice(stops=1.0), View("srgb", 1.0))):
-        target = read_target(tmp_path / "p8.png", view=asked)
-        assert target.view == view
-        np.testing.assert_allclose(target.image, view.decode(np.float32(128 / 255)), rtol=1e-4)
+    write(tmp_path, template_of(ViewTransform("agx", 2.0)))
+    save(tmp_path / "p8.png", np.full((8, 8, 3), 0.5), ViewTransform())
+    for asked, transform in (
+        (None, ViewTransform()),
+        (TransformChoice(stops=1.0), ViewTransform("srgb", 1.0)),
+    ):
+        target = read_target(tmp_path / "p8.png", transform=asked)
+        assert target.transform == transform
+        np.testing.assert_allclose(target.image, transform.decode(np.float32(128 / 255)), rtol=1e-4)
         assert "another size" in target.notes[0]
     assert "no template is known" in target.notes[1]
     # An EXR holds light: only --space display asks for a view.
-    save(tmp_path / "half.exr", np.full((8, 8, 3), 0.5), View())
-    assert read_target(tmp_path / "half.exr").view is None
+    save(tmp_path / "half.exr", np.full((8, 8, 3), 0.5), ViewTransform())
+    assert read_target(tmp_path / "half.exr").transform is None
 
 
 def test_what_a_picture_says_of_its_view_goes_before_a_template_that_was_found(
     tmp_path: Path,
 ) -> None:
     """Painted on the look that a template of another view has replaced since."""
-    old = View("filmic", -1.0)
-    write(tmp_path, template_of(View("agx", 2.0)))
+    old = ViewTransform("filmic", -1.0)
+    write(tmp_path, template_of(ViewTransform("agx", 2.0)))
     light = np.full((*SIZE, 3), 0.2)
     write_look(tmp_path / "old.exr", light, old)
     target = read_target(tmp_path / "old.png")
-    assert target.view == old
+    assert target.transform == old
     np.testing.assert_allclose(target.image, light, rtol=1e-3)
-    assert read_target(tmp_path / "old.png", view=ViewChoice("srgb")).view == View("srgb", -1.0)
+    assert read_target(
+        tmp_path / "old.png", transform=TransformChoice("srgb")
+    ).transform == ViewTransform("srgb", -1.0)
     # A template that is given is meant.
-    assert read_target(tmp_path / "old.png", template=tmp_path).view == View("agx", 2.0)
+    assert read_target(tmp_path / "old.png", template=tmp_path).transform == ViewTransform(
+        "agx", 2.0
+    )
 
 
 def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> None:
@@ -254,7 +269,7 @@ def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> Non
 def test_nearly_all_painted_is_doubted(tmp_path: Path) -> None:
     template = template_of()
     write(tmp_path, template)
-    save(tmp_path / "p16.png", 0.8 * template.shown, template.view)
+    save(tmp_path / "p16.png", 0.8 * template.shown, template.transform)
     assert "another view or profile" in read_target(tmp_path / "p16.png").notes[0]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import ImageError, TargetError
 from lightpaint.target.template import Template, write_template
 
@@ -68,7 +68,7 @@ def folder(basis: lp.Basis, tmp_path_factory: pytest.TempPathFactory) -> Path:
     image[120:136, 12:28] = 3, 2.5, 2
     write_template(
         folder / "template",
-        Template(image.astype(np.float32), View("srgb")),
+        Template(image.astype(np.float32), ViewTransform("srgb")),
         normals=np.zeros((HEIGHT, WIDTH, 3)),
         depth=np.ones((HEIGHT, WIDTH)),
         mattes={},

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display import encode_display
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.exr import read_parts
@@ -103,7 +103,10 @@ def test_a_target_is_shown_in_a_few_lines():
         "  light    0 to 3",
     ]
     target = replace(
-        target, at_least=image == 2, view=View("agx", 1.5), notes=("painted on nothing",)
+        target,
+        at_least=image == 2,
+        transform=ViewTransform("agx", 1.5),
+        notes=("painted on nothing",),
     )
     assert repr(target).splitlines() == [
         *said.splitlines(),
@@ -221,7 +224,7 @@ def test_resampling_keeps_everything_else():
 
 def test_template(tmp_path: Any):
     image = np.random.default_rng(0).random((4, 5, 3)).astype(np.float32)
-    picture = write_look(tmp_path / "a.template.exr", image, View("srgb"))
+    picture = write_look(tmp_path / "a.template.exr", image, ViewTransform("srgb"))
     assert picture == tmp_path / "a.template.png"
     np.testing.assert_array_equal(read_parts(tmp_path / "a.template.exr")[0].rgb(), image)
     from PIL import Image
@@ -232,16 +235,22 @@ def test_template(tmp_path: Any):
 
 
 @pytest.mark.parametrize(
-    "view", [View("srgb", 1.0), View("agx", 1.5), View("filmic", -0.25), View("linear")]
+    "transform",
+    [
+        ViewTransform("srgb", 1.0),
+        ViewTransform("agx", 1.5),
+        ViewTransform("filmic", -0.25),
+        ViewTransform("linear"),
+    ],
 )
-def test_a_painted_template_is_read_through_its_own_view(tmp_path: Any, view: View):
+def test_a_painted_template_is_read_through_its_own_view(tmp_path: Any, transform: ViewTransform):
     image = np.exp2(np.random.default_rng(0).uniform(-4, 2, (9, 7, 1))) * [[[0.8, 0.9, 1]]] / 64
-    picture = write_look(tmp_path / "a.template.exr", image, view)
+    picture = write_look(tmp_path / "a.template.exr", image, transform)
     target = read_target(picture)
-    shown = view.encode(image)
+    shown = transform.encode(image)
     np.testing.assert_array_equal(target.at_least, shown >= 65534.5 / 65535)
     # What 16 bits round away in display values.
-    np.testing.assert_allclose(view.encode(target.image), shown, atol=0.51 / 65535)
+    np.testing.assert_allclose(transform.encode(target.image), shown, atol=0.51 / 65535)
 
 
 @pytest.mark.parametrize("size", [(4, 6), (6, 9), (1, 1), (5, 7), (11, 17), (7, 9)])

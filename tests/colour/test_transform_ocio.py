@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display import encode_display
-from lightpaint.colour.view import View
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import ViewError
 
 ocio: Any = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO")
@@ -27,9 +27,9 @@ def _colours(seed: int = 0) -> Any:
 
 
 def test_the_default_view_by_name():
-    view = View.parse("ocio")
-    assert view.name.startswith(f"ocio:{DISPLAY}/")
-    assert View.parse(view.name) == view
+    transform = ViewTransform.parse("ocio")
+    assert transform.name.startswith(f"ocio:{DISPLAY}/")
+    assert ViewTransform.parse(transform.name) == transform
 
 
 def test_encoding_is_the_librarys_own():
@@ -39,29 +39,33 @@ def test_encoding_is_the_librarys_own():
     cpu = config.getProcessor(shown).getDefaultCPUProcessor()
     colours = _colours()
     expected = [cpu.applyRGB((2 * c).tolist()) for c in colours]
-    got = View(f"ocio:{DISPLAY}/{name}", 1.0).encode(colours)
+    got = ViewTransform(f"ocio:{DISPLAY}/{name}", 1.0).encode(colours)
     # Pixel by pixel and many at once, the library rounds in another order.
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-5)
 
 
 def test_the_plain_view_of_srgb_is_srgb():
-    view = View(f"ocio:{DISPLAY}/Un-tone-mapped")
+    transform = ViewTransform(f"ocio:{DISPLAY}/Un-tone-mapped")
     colours = _colours()
     # By way of XYZ with matrices of some seven digits.
-    np.testing.assert_allclose(view.encode(colours), encode_display(colours), atol=2e-5)
-    np.testing.assert_allclose(view.decode(view.encode(colours)), colours, rtol=1e-3, atol=1e-6)
-    assert view.white == pytest.approx(1, abs=1e-3)
+    np.testing.assert_allclose(transform.encode(colours), encode_display(colours), atol=2e-5)
     np.testing.assert_allclose(
-        view.jacobian(colours), View().jacobian(colours), rtol=2e-2, atol=2e-2
+        transform.decode(transform.encode(colours)), colours, rtol=1e-3, atol=1e-6
+    )
+    assert transform.white == pytest.approx(1, abs=1e-3)
+    np.testing.assert_allclose(
+        transform.jacobian(colours), ViewTransform().jacobian(colours), rtol=2e-2, atol=2e-2
     )
 
 
 def test_a_tone_mapped_view_has_a_way_back():
-    view = View.parse("ocio")
+    transform = ViewTransform.parse("ocio")
     colours = _colours()
     # ACES 2.0's inverse is numerical in part.
-    np.testing.assert_allclose(view.decode(view.encode(colours)), colours, rtol=2e-2, atol=1e-4)
-    assert view.white > 10
+    np.testing.assert_allclose(
+        transform.decode(transform.encode(colours)), colours, rtol=2e-2, atol=1e-4
+    )
+    assert transform.white > 10
 
 
 def _own(path: Path, transform: Any) -> None:
@@ -81,11 +85,11 @@ def _own(path: Path, transform: Any) -> None:
 def test_a_configuration_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     _own(tmp_path / "own.ocio", ocio.ExponentTransform([2.0, 2.0, 2.0, 1.0]))
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
-    view = View.parse("ocio")
-    assert view.name == "ocio:Screen/Film/dark"
+    transform = ViewTransform.parse("ocio")
+    assert transform.name == "ocio:Screen/Film/dark"
     # The library's fast powers are good to five digits.
-    np.testing.assert_allclose(view.encode(np.full((1, 3), 0.5)), 0.25, atol=1e-5)
-    np.testing.assert_allclose(view.decode(np.full((1, 3), 0.25)), 0.5, atol=1e-5)
+    np.testing.assert_allclose(transform.encode(np.full((1, 3), 0.5)), 0.25, atol=1e-5)
+    np.testing.assert_allclose(transform.decode(np.full((1, 3), 0.25)), 0.5, atol=1e-5)
 
 
 def test_a_view_without_a_way_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -93,7 +97,7 @@ def test_a_view_without_a_way_back(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     _own(tmp_path / "own.ocio", flat)
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
     with pytest.raises(ViewError, match=r"ocio:Screen/Film/dark cannot be undone"):
-        View.parse("ocio")
+        ViewTransform.parse("ocio")
 
 
 def test_a_view_that_forgets_greys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -101,14 +105,14 @@ def test_a_view_that_forgets_greys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     _own(tmp_path / "own.ocio", clipped)
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
     with pytest.raises(ViewError, match=r"cannot be undone: a grey comes back 0\.35 off"):
-        View.parse("ocio")
+        ViewTransform.parse("ocio")
 
 
 def test_what_is_there_is_named():
     with pytest.raises(ViewError, match=rf"no view ocio:Cinema/Film: .*{DISPLAY}"):
-        View("ocio:Cinema/Film")
+        ViewTransform("ocio:Cinema/Film")
     with pytest.raises(ViewError, match=r"has no view 'Film': it has .*Un-tone-mapped"):
-        View(f"ocio:{DISPLAY}/Film")
+        ViewTransform(f"ocio:{DISPLAY}/Film")
 
 
 @pytest.mark.parametrize("content", [None, "", "ocio_profile_version: 2\nroles: [", "\0\1\2"])
@@ -117,10 +121,10 @@ def test_no_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, conte
         (tmp_path / "own.ocio").write_text(content)
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
     with pytest.raises(ViewError, match=r"own\.ocio is no OpenColorIO configuration"):
-        View.parse("ocio")
+        ViewTransform.parse("ocio")
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
     with pytest.raises(ViewError, match=r"pip install 'lightpaint\[ocio\]'"):
-        View.parse("ocio")
+        ViewTransform.parse("ocio")

@@ -1,16 +1,16 @@
 """View transforms: from linear light to what a display is sent, and back.
 
 Every picture that is shown, and every painting of 8 or 16 bits that is read, goes through a
-`View`. A view is an exposure and one of
+`ViewTransform`: an exposure and one of
 
     srgb      the display's own curve, IEC 61966-2-1; white at 1
     linear    no curve: the numbers are light; white at 1
     filmic    a shoulder up to 7.2, then the sRGB curve
     agx       AgX's base: colours drawn together, 16.5 stops in one sigmoid; white at 16.3
-    ocio:DISPLAY/VIEW   of the OpenColorIO configuration (`lightpaint.colour.view_ocio`)
+    ocio:DISPLAY/VIEW   of the OpenColorIO configuration (`lightpaint.colour.transform_ocio`)
 
 Display values lie in [0, 1]. Encoding clips what the display cannot show: what is brighter than
-`View.white`, and negative light.
+`ViewTransform.white`, and negative light.
 """
 
 import math
@@ -45,8 +45,8 @@ class Encoding(Protocol):
 
 
 @dataclass(frozen=True)
-class View:
-    """A view transform at an exposure. Build it with `View.parse`, or by its name.
+class ViewTransform:
+    """A view transform at an exposure. Build it with `ViewTransform.parse`, or by its name.
 
     name: `srgb`, `linear`, `filmic`, `agx` or `ocio:DISPLAY/VIEW`. stops: light is scaled by
     2^stops before it is encoded. Raises ViewError for a name that there is none of.
@@ -64,17 +64,18 @@ class View:
         _encoding(self.name)
 
     @staticmethod
-    def parse(text: str, stops: float = 0.0) -> "View":
-        """The view that `text` names. `ocio` is the default display and view of the configuration.
+    def parse(text: str, stops: float = 0.0) -> "ViewTransform":
+        """The transform that `text` names. `ocio` is the default display and view of the
+        configuration.
 
-        `View.parse(view.name, view.stops) == view`.
+        `ViewTransform.parse(t.name, t.stops) == t`.
         """
         name = text.strip()
         if name.lower() == "ocio":
-            from lightpaint.colour.view_ocio import default_name
+            from lightpaint.colour.transform_ocio import default_name
 
-            return View(default_name(), stops)
-        return View(name if name.lower().startswith("ocio:") else name.lower(), stops)
+            return ViewTransform(default_name(), stops)
+        return ViewTransform(name if name.lower().startswith("ocio:") else name.lower(), stops)
 
     @property
     def spoken(self) -> str:
@@ -112,11 +113,11 @@ class View:
 
 
 @dataclass(frozen=True)
-class ViewChoice:
-    """What somebody asks of a view, maybe half of one; the rest is what a picture says.
+class TransformChoice:
+    """What somebody asks of a transform, maybe half of one; the rest is what a picture says.
 
-    name: as of `View.parse`. stops: of exposure. None for what is left open. Raises ViewError for
-    what no view has.
+    name: as of `ViewTransform.parse`. stops: of exposure. None for what is left open. Raises
+    ViewError for what no transform has.
     """
 
     name: str | None = None
@@ -126,11 +127,11 @@ class ViewChoice:
         self.over(None)
 
     @staticmethod
-    def of(view: "View | ViewChoice | None") -> "ViewChoice":
-        """A whole view, a choice as it is, or nothing asked."""
-        if isinstance(view, View):
-            return ViewChoice(view.name, view.stops)
-        return view or ViewChoice()
+    def of(transform: "ViewTransform | TransformChoice | None") -> "TransformChoice":
+        """A whole transform, a choice as it is, or nothing asked."""
+        if isinstance(transform, ViewTransform):
+            return TransformChoice(transform.name, transform.stops)
+        return transform or TransformChoice()
 
     @property
     def is_open(self) -> bool:
@@ -142,10 +143,10 @@ class ViewChoice:
         """Whether nothing is left open."""
         return self.name is not None and self.stops is not None
 
-    def over(self, said: View | None) -> View:
-        """The view asked for, where that is open the one `said`, where nobody says it sRGB's."""
-        said = said or View()
-        return View.parse(
+    def over(self, said: ViewTransform | None) -> ViewTransform:
+        """The one asked for, where that is open the one `said`, where nobody says it sRGB's."""
+        said = said or ViewTransform()
+        return ViewTransform.parse(
             said.name if self.name is None else self.name,
             said.stops if self.stops is None else self.stops,
         )
@@ -153,7 +154,7 @@ class ViewChoice:
 
 def _encoding(name: str) -> Encoding:
     if name.lower().startswith("ocio:"):
-        from lightpaint.colour.view_ocio import ocio_encoding
+        from lightpaint.colour.transform_ocio import ocio_encoding
 
         return ocio_encoding(name[len("ocio:") :])
     if name not in BUILT_IN:

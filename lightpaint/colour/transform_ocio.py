@@ -32,14 +32,14 @@ STEP = 1e-2
 
 
 def default_name() -> str:
-    """Name of the view that the configuration shows first: `ocio:DISPLAY/VIEW`."""
+    """Name of the transform that the configuration shows first: `ocio:DISPLAY/VIEW`."""
     _, config = _library_and_config(os.environ.get("OCIO", ""))
     display = config.getDefaultDisplay()
     return f"ocio:{display}/{config.getDefaultView(display)}"
 
 
 def ocio_encoding(display_and_view: str) -> "OcioEncoding":
-    """The view `DISPLAY/VIEW` of the configuration. Raises ViewError."""
+    """The transform `ocio:DISPLAY/VIEW` of the configuration. Raises ViewError."""
     return _cached(display_and_view, os.environ.get("OCIO", ""))
 
 
