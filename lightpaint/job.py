@@ -233,8 +233,8 @@ class Job:
         if len(seen) > 1:
             told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
             raise TargetError(
-                f"the paintings were seen through {told}: say with view=... which of them is to "
-                "be fitted"
+                f"the paintings were seen through {told}: say with transform=... which of them "
+                "is to be fitted"
             )
         return next(iter(seen), None) or ViewTransform(
             "srgb", choose_exposure(views[0].target.image)

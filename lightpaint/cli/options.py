@@ -70,8 +70,8 @@ def is_folder(output: Path) -> bool:
 
 def settings_of(options: Namespace, given: Sequence[str]) -> Settings:
     """What the options say of `Settings`; those without an option are as by default."""
-    # A view is of the painting, which has it; the command is the whole line.
-    names = {field.name for field in fields(Settings)} - {"view", "command"}
+    # A transform is of the painting, which has it; the command is the whole line.
+    names = {field.name for field in fields(Settings)} - {"transform", "command"}
     said = {name: value for name, value in vars(options).items() if name in names}
     return Settings(**said, command=shlex.join(["lightpaint", *given]))
 

@@ -24,8 +24,8 @@ OPTIONS = {
     "suggest": "--suggest",
     "template": "--template",
     "time_s": "--time",
+    "transform": "--view",
     "variant": "-m",
-    "view": "--view",
 }
 
 #: What is spelled otherwise than by an option and a value.

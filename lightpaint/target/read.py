@@ -159,7 +159,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     note = f"{100 * share:.3g} % painted: what differs from the template in {reading.folder}"
     if share > NEARLY_ALL:
         note += (
-            "; if you painted less, it was saved through another view or profile (view=..., "
+            "; if you painted less, it was saved through another view or profile (transform=..., "
             "mask=...), or moved, cropped or flipped"
         )
     return importance, [note]
