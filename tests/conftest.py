@@ -4,6 +4,7 @@ Where the renderer is needed there is one small room, loaded and rendered once, 
 """
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from typing import Any
@@ -27,8 +28,11 @@ BasisFactory = Callable[..., Basis]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Workers of pytest-xdist share the cores: there, BLAS and children's BLAS have one thread."""
+    """Let tests press Ctrl-C, and workers of pytest-xdist share the cores."""
+    # What a shell starts in the background ignores it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if hasattr(config, "workerinput"):
+        # For BLAS in this process, and in what is loaded or started later.
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
         threadpool_limits(1, "blas")
 

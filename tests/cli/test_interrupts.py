@@ -24,11 +24,9 @@ SPP = {"one pass": 10_000, "separate renders": 1000}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
-import os, signal, sys, time
+import os, sys, time
 import lightpaint.basis.render.budget as budget, lightpaint.scene.render as render
 from lightpaint.cli import main
-# What a shell starts in the background ignores Ctrl-C, and so would this.
-signal.signal(signal.SIGINT, signal.default_int_handler)
 budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**17
 if "SLOWLY" in os.environ:
     # However fast the machine is, there is a middle to be stopped in.
