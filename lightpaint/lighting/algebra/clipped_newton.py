@@ -61,11 +61,15 @@ def _newton(M: Doubles, gradient: Doubles, free: Bools) -> tuple[Doubles, Double
     # has a row of the identity, which moves nothing.
     rows = np.flatnonzero(free.any(axis=0))
     here = free[:, rows]
-    matrix = M if rows.size == M.shape[1] else M[:, rows][:, :, rows]
+    matrix = M.copy() if rows.size == M.shape[1] else M[:, rows][:, :, rows]
+    diagonal = np.einsum("cii->ci", matrix)  # which looks at its memory
+    right = -gradient[:, rows]
     if not here.all():
-        matrix = np.where(here[:, :, None] & here[:, None, :], matrix, np.eye(rows.size))
-    matrix = matrix + RIDGE * np.sqrt(rows.size) * np.eye(rows.size)
-    right = np.where(here, -gradient[:, rows], 0)
+        matrix *= here[:, :, None]
+        matrix *= here[:, None, :]
+        diagonal += ~here
+        right *= here
+    diagonal += RIDGE * rows.size**0.5
     move = np.zeros_like(gradient)
     move[:, rows] = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
     return move, matrix

@@ -32,8 +32,9 @@ def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
     f = np.flatnonzero(free)
     if f.size < 2:
         return x
-    A = q.A[:, f]
-    matrix = q.M[np.ix_(f, f)] + A.T @ A
+    matrix = q.M[f][:, f]
+    if q.groups:
+        matrix = matrix + q.A[:, f].T @ q.A[:, f]
     if not is_suspect(matrix):
         return x
     values, vectors = np.linalg.eigh(matrix)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.capped_newton import capped_newton
 from lightpaint.lighting.algebra.clipped_newton import clipped_newton
@@ -20,6 +20,9 @@ __all__ = ["Cap", "Method", "Optimum", "minimise", "minimise_each"]
 
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]
+
+#: What there is to say of caps where there are none.
+NO_CAPS = np.zeros(0)
 
 #: Unknowns up to which several problems are solved in the same calls; beyond, each on a thread.
 FEW = 64
@@ -158,10 +161,11 @@ def _at_once(
     if not (asks.any() and np.isfinite(M).all() and np.isfinite(b).all()):
         return {}
     # What changes nothing is left out: the others then have the bits that they have without it.
-    rows = np.flatnonzero(counts.any(axis=0))
-    if rows.size < counts.shape[1]:
-        M, b, counts = np.ascontiguousarray(M[:, rows][:, :, rows]), b[:, rows], counts[:, rows]
-        power = power[:, rows]
+    rows: slice | Indices = slice(None)
+    if not (reached := counts.any(axis=0)).all():
+        rows = np.flatnonzero(reached)
+        M, b = np.ascontiguousarray(M[:, rows][:, :, rows]), b[:, rows]
+        counts, power = counts[:, rows], power[:, rows]
     its = counts & asks[:, None]
     root = np.sqrt(np.where(its, power, 1))
     scale = np.where(its, 1 / root, 0)
@@ -182,14 +186,13 @@ def _at_once(
         gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b
     value = np.where(x <= low, lower[:, rows], x * scale)
     value = np.where(x >= high, upper[:, rows], value)
-    found, none = {}, np.zeros(0)
-    for c in np.flatnonzero(asks & (residuals <= tolerance)).tolist():
-        answer = np.clip(start[c], lower[c], upper[c])
-        answer[rows] = np.where(counts[c], value[c], answer[rows])
-        multipliers = np.zeros(answer.size)
-        multipliers[rows] = gradient[c] * root[c]
-        found[c] = Optimum(answer, multipliers, none, float(residuals[c]), 0, steps, tolerance)
-    return found
+    answers, multipliers = np.minimum(np.maximum(start, lower), upper), np.zeros(start.shape)
+    answers[:, rows] = np.where(counts, value, answers[:, rows])
+    multipliers[:, rows] = gradient * root
+    return {
+        c: Optimum(answers[c], multipliers[c], NO_CAPS, float(residuals[c]), 0, steps, tolerance)
+        for c in np.flatnonzero(asks & (residuals <= tolerance)).tolist()
+    }
 
 
 def _polished(

@@ -5,8 +5,8 @@ every set of channels that the unknowns couple. Where nothing is asked C is the 
 problems in the lights themselves.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -99,20 +99,18 @@ def solve_reduced(
     """
     lit = equations.reached
     reached = np.ones(len(lit), dtype=bool)
-    for knob in reduction.knobs:
-        reached[list(knob.lights)] = lit[list(knob.lights)].any()
+    if not lit.any(axis=1).all():
+        for knob in reduction.knobs:
+            reached[list(knob.lights)] = lit[list(knob.lights)].any()
     x = nearest(reduction, start, reached) if x is None else x.copy()
-    multipliers = np.zeros(x.size)
-    cap_multipliers = np.zeros(len(reduction.caps))
-    cap_at = {cap.unknowns[0]: k for k, cap in enumerate(reduction.caps)}
+    how: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
+    optima = _optima(_left(equations, reduction, lit, start), reduction, x, how)
+    multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
     residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
-    parts = problems(equations, reduction, lit=lit, start=start)
-    optima = _optima(parts, x, method=method, tolerance=tolerance, max_sweeps=max_sweeps)
-    for problem, optimum in zip(parts, optima, strict=True):
-        x[problem.its], multipliers[problem.its] = optimum.x, optimum.multipliers
-        for cap, multiplier in zip(problem.caps, optimum.cap_multipliers, strict=True):
-            cap_multipliers[cap_at[int(problem.its[cap.unknowns[0]])]] = multiplier
-        for c in problem.channels:
+    for block, optimum in zip(reduction.blocks, optima, strict=True):
+        x[block.its], multipliers[block.its] = optimum.x, optimum.multipliers
+        cap_multipliers[block.cap_its] = optimum.cap_multipliers
+        for c in block.channels:
             residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
             tolerances[c] = optimum.tolerance
     return ReducedOptimum(
@@ -127,14 +125,18 @@ def solve_reduced(
     )
 
 
-def problems(
+def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
+    """One problem for every set of channels that the unknowns couple."""
+    return _problems(_left(equations, reduction), reduction)
+
+
+def _left(
     equations: NormalEquations,
     reduction: Reduction,
-    *,
     lit: Bools | None = None,
     start: Doubles | None = None,
-) -> list[ReducedProblem]:
-    """One problem for every set of channels that the unknowns couple.
+) -> tuple[Doubles, Doubles]:
+    """M and b of what is held taken to the right-hand side.
 
     lit, start: (n, 3), what reaches something that counts, and weights: an unknown of several
     channels of which a light reaches some is drawn to its start in the others, faintly.
@@ -143,15 +145,17 @@ def problems(
     if lit is not None and start is not None and not lit.all():
         is_coupled = len(reduction.channel_groups) < 3
         M, b = _in_the_dark(equations, lit, start, is_coupled=is_coupled)
-    if reduction.held.any():
+    if reduction.holds_any:
         b = b - np.einsum("cij,jc->ci", M, reduction.held)
+    return M, b
+
+
+def _problems(left: tuple[Doubles, Doubles], reduction: Reduction) -> list[ReducedProblem]:
     made = []
     for block in reduction.blocks:
         lower, upper = reduction.lower[block.its], reduction.upper[block.its]
-        own_M, own_b = _of_block(M, b, block)
-        made.append(
-            ReducedProblem(block.channels, block.its, own_M, own_b, lower, upper, block.caps)
-        )
+        M, b = _of_block(*left, block)
+        made.append(ReducedProblem(block.channels, block.its, M, b, lower, upper, block.caps))
     return made
 
 
@@ -183,7 +187,11 @@ def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
     x = np.zeros(len(reduction.unknowns))
     for kind in reduction.kinds:
         low, high = reduction.lower[kind.places], reduction.upper[kind.places]
-        wanted = np.einsum("kue,ke->ku", kind.columns, start[kind.lights].reshape(len(low), -1))
+        present = start[kind.lights].reshape(len(low), -1)
+        if kind.is_free:
+            x[kind.places] = np.minimum(np.maximum(present, low), high)
+            continue
+        wanted = np.einsum("kue,ke->ku", kind.columns, present)
         if kind.is_orthogonal:
             its = wanted / np.square(kind.columns).sum(axis=2)
         else:
@@ -227,39 +235,21 @@ def _within(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
 
 
 def _optima(
-    parts: Sequence[ReducedProblem],
-    x: Doubles,
-    *,
-    method: Method,
-    tolerance: float,
-    max_sweeps: int,
+    left: tuple[Doubles, Doubles], reduction: Reduction, x: Doubles, how: dict[str, Any]
 ) -> list[Optimum]:
-    """The optimum of each, begun at its part of x; together where they are of one kind."""
-    if len({p.its.size for p in parts}) == 1 and not any(p.caps for p in parts):
-        return minimise_each(
-            np.stack([p.M for p in parts]),
-            np.stack([p.b for p in parts]),
-            lower=np.stack([p.lower for p in parts]),
-            upper=np.stack([p.upper for p in parts]),
-            start=np.stack([x[p.its] for p in parts]),
-            method=method,
-            tolerance=tolerance,
-            max_sweeps=max_sweeps,
-        )
+    """The optimum of each block, begun at its part of x; of three alike by the same calls."""
+    if (alike := reduction.alike) is not None:
+        (M, b), lights = left, alike.lights
+        if lights is not None:
+            M, b = M[:, lights[:, None], lights], b[:, lights]
+        begin = x[alike.its]
+        return minimise_each(M, b, lower=alike.lower, upper=alike.upper, start=begin, **how)
 
-    def solve(problem: ReducedProblem) -> Optimum:
-        return minimise(
-            problem.M,
-            problem.b,
-            lower=problem.lower,
-            upper=problem.upper,
-            caps=problem.caps,
-            start=x[problem.its],
-            method=method,
-            tolerance=tolerance,
-            max_sweeps=max_sweeps,
-        )
+    def solve(p: ReducedProblem) -> Optimum:
+        begin = x[p.its]
+        return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **how)
 
+    parts = _problems(left, reduction)
     return side_by_side(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
 
 

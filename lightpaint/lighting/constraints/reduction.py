@@ -88,13 +88,14 @@ class Entries:
 class Block:
     """Channels that unknowns couple, which x these are, their entries by channel, and their caps.
 
-    The unknowns of the caps are numbered within the block.
+    The unknowns of the caps are numbered within the block; cap_its are their own numbers.
     """
 
     channels: list[int]
     its: Indices
     entries: tuple[Entries, ...]
     caps: tuple[Cap, ...]
+    cap_its: list[int]
 
     @cached_property
     def is_plain(self) -> bool:
@@ -110,6 +111,19 @@ class Block:
 
 
 @dataclass(frozen=True)
+class Alike:
+    """Three blocks of weights of the same lights: by one call what would take three.
+
+    lights: (k,), None for all of them in order. its, lower, upper: (3, k).
+    """
+
+    lights: Indices | None
+    its: Indices
+    lower: Doubles
+    upper: Doubles
+
+
+@dataclass(frozen=True)
 class Kind:
     """K knobs of as many unknowns, u, and lights, l, each.
 
@@ -119,6 +133,11 @@ class Kind:
     places: Indices
     lights: Indices
     columns: Doubles
+
+    @cached_property
+    def is_free(self) -> bool:
+        """Whether these are lights of any colour: an unknown is the emission in a channel."""
+        return self.columns.shape[1:] == (3, 3) and bool((self.columns == np.eye(3)).all())
 
     @cached_property
     def is_orthogonal(self) -> bool:
@@ -253,13 +272,30 @@ class Reduction:
                 here, first = np.unique(place[unknown[there]], return_index=True)
                 entries.append(Entries(here, light[there], rgb[there, c], first))
             within = set(its.tolist())
+            cap_its = [k for k, cap in enumerate(self.caps) if cap.unknowns[0] in within]
             caps = tuple(
                 replace(cap, unknowns=tuple(int(place[i]) for i in cap.unknowns))
-                for cap in self.caps
-                if cap.unknowns[0] in within
+                for cap in (self.caps[k] for k in cap_its)
             )
-            made.append(Block(channels, its, tuple(entries), caps))
+            made.append(Block(channels, its, tuple(entries), caps, cap_its))
         return tuple(made)
+
+    @cached_property
+    def alike(self) -> Alike | None:
+        """The three blocks together, where they are of the same lights and nothing joins them."""
+        if len(self.blocks) < 3 or self.caps or not all(block.is_plain for block in self.blocks):
+            return None
+        first, *others = (block.entries[0].lights for block in self.blocks)
+        if not all(np.array_equal(first, lights) for lights in others):
+            return None
+        its = np.stack([block.its for block in self.blocks])
+        every = np.array_equal(first, np.arange(len(self.held)))
+        return Alike(None if every else first, its, self.lower[its], self.upper[its])
+
+    @cached_property
+    def holds_any(self) -> bool:
+        """Whether some light shines that has no knob."""
+        return bool(self.held.any())
 
     def weights(self, x: Doubles) -> Doubles:
         """w = C x + w₀, (n, 3)."""
