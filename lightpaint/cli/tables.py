@@ -9,8 +9,8 @@ from rich.markup import escape
 
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
-from lightpaint.placement.suggest import Suggestion
-from lightpaint.relit.verify import Verification
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import Verification
 from lightpaint.report.sentences import (
     how_sure,
     relative_errors,
