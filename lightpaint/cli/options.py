@@ -17,7 +17,7 @@ from lightpaint.basis.lightgroups.read import is_light_groups
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.job import Job, check_needed
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
@@ -201,7 +201,7 @@ def transform_of(options: Namespace) -> TransformChoice:
 def constraints_of(options: Namespace) -> Constraints:
     """What the options ask of the lights."""
     lights: dict[str, dict[str, Any]] = {}
-    for key in ("lock", "limits", "color", "kelvin", "duv", "primaries"):
+    for key in (key for key in LIGHT_KEYS if key != "off"):
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
     for name in options.off:
