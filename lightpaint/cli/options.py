@@ -118,7 +118,7 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
         asked = read_constraints(options.lights_file).and_then(asked)
     if options.views:
         if options.sensor:
-            raise TargetError("-s cannot be had with --target, which names the sensors")
+            raise TargetError("-s cannot be used with --target, which names the sensors")
         scenes = tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
         folder = Path(options.output or Path(paths[0]).stem)
         return [Job(scenes, tuple(paintings), folder, None, asked, settings, by_sensor=True)]
@@ -157,7 +157,7 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
         return None
     if options.views:
         raise BasisError(
-            f"--target cannot be had from {basis.path}, which has one view only: give the scene, "
+            f"--target cannot be used with {basis.path}, which has one view only: give the scene, "
             "to solve for several"
         )
     is_groups = isinstance(basis, GroupsFile)
