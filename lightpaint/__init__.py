@@ -46,11 +46,11 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.pipeline import paint_with_light as paint_with_light
     from lightpaint.pipeline import run as run
-    from lightpaint.placement.suggest import Suggestion as Suggestion
     from lightpaint.placement.suggest import suggest_lights as suggest_lights
+    from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
-    from lightpaint.relit.verify import Verification as Verification
+    from lightpaint.relit.verification import Verification as Verification
     from lightpaint.relit.verify import verify as verify
     from lightpaint.renders import render_template as render_template
     from lightpaint.report.verdict import verdict as verdict
@@ -79,9 +79,9 @@ _HOMES = {
     "SceneFile": "sources",
     "Settings": "settings",
     "Solution": "lighting.solution",
-    "Suggestion": "placement.suggest",
+    "Suggestion": "placement.suggestion",
     "Target": "target.target",
-    "Verification": "relit.verify",
+    "Verification": "relit.verification",
     "ViewTransform": "colour.transform",
     "combine": "lighting.lighting",
     "display_picture": "images.png",

@@ -16,3 +16,6 @@ Indices = npt.NDArray[np.intp]
 
 #: One colour, linear Rec.709.
 RGB = tuple[float, float, float]
+
+#: One place, in units of the scene.
+Position = tuple[float, float, float]

@@ -260,7 +260,7 @@ def check_needed(given: Iterable[str], basis: Any) -> None:
         return
     if isinstance(basis, LightGroups | GroupsFile):
         raise BasisError(
-            f"{', '.join(idle)} cannot be had from {basis.path}: its light groups are rendered "
+            f"{', '.join(idle)} cannot be used with {basis.path}: its light groups are rendered "
             "already, and say nothing of samples, noise or units; leave it out"
         )
     raise BasisError(

@@ -164,9 +164,9 @@ def _job(
         check_needed(how, basis)
     if how and not any(isinstance(x, SceneFile) for x in scenes):
         named = ", ".join(f"{name}=..." for name in how)
-        raise SceneError(f"{named} cannot change a scene that is loaded: give its path")
+        raise SceneError(f"{named} cannot change a scene that is already loaded: give its path")
     if mask is not None and not any(isinstance(x, Painting) for x in targets):
-        raise TargetError("mask=... cannot change a target that is read: give its path")
+        raise TargetError("mask=... cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
     return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, by_sensor)
 

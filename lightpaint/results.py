@@ -13,11 +13,12 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.suggest import Suggestion
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.records import read_record, strict_json
 from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.relit.verify import Verification, verify
+from lightpaint.relit.verification import Verification
+from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import write_comparison
 from lightpaint.report.page import report_page
 from lightpaint.scene.render import Stream

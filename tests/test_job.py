@@ -173,7 +173,7 @@ def test_what_is_no_job_is_refused_in_one_line():
         (
             {"basis": GroupsFile("groups.exr"), "settings": Settings(seed=1)},
             BasisError,
-            r"^seed=\.\.\. cannot be had from groups.exr",
+            r"^seed=\.\.\. cannot be used with groups.exr",
         ),
     ],
 )
@@ -214,7 +214,7 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     )
     refused(
         SceneError,
-        r"^lights=\.\.\. cannot change a scene that is loaded",
+        r"^lights=\.\.\. cannot change a scene that is already loaded",
         scene,
         target,
         lights=["bulb"],

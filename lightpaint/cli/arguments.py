@@ -81,7 +81,7 @@ def kelvin(text: str) -> tuple[str, list[float], float | None]:
         return name, ends, float(duv) if comma else None
     except (ValueError, AttributeError):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not NAME=2700:6500 or NAME=3200, with or without ,duv=0.003 behind"
+            f"{text!r} is not NAME=2700:6500 or NAME=3200, with or without ,duv=0.003 after it"
         ) from None
 
 

@@ -17,7 +17,7 @@ from lightpaint.basis.lightgroups.read import is_light_groups
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.job import Job, check_needed
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
@@ -118,7 +118,7 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
         asked = read_constraints(options.lights_file).and_then(asked)
     if options.views:
         if options.sensor:
-            raise TargetError("-s cannot be had with --target, which names the sensors")
+            raise TargetError("-s cannot be used with --target, which names the sensors")
         scenes = tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
         folder = Path(options.output or Path(paths[0]).stem)
         return [Job(scenes, tuple(paintings), folder, None, asked, settings, by_sensor=True)]
@@ -157,7 +157,7 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
         return None
     if options.views:
         raise BasisError(
-            f"--target cannot be had from {basis.path}, which has one view only: give the scene, "
+            f"--target cannot be used with {basis.path}, which has one view only: give the scene, "
             "to solve for several"
         )
     is_groups = isinstance(basis, GroupsFile)
@@ -201,7 +201,7 @@ def transform_of(options: Namespace) -> TransformChoice:
 def constraints_of(options: Namespace) -> Constraints:
     """What the options ask of the lights."""
     lights: dict[str, dict[str, Any]] = {}
-    for key in ("lock", "limits", "color", "kelvin", "duv", "primaries"):
+    for key in (key for key in LIGHT_KEYS if key != "off"):
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
     for name in options.off:

@@ -9,8 +9,8 @@ from rich.markup import escape
 
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
-from lightpaint.placement.suggest import Suggestion
-from lightpaint.relit.verify import Verification
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import Verification
 from lightpaint.report.sentences import (
     how_sure,
     relative_errors,
@@ -140,21 +140,23 @@ def show_look(look: Look, folder: Path) -> None:
     if look.uncertainty is not None:
         terminal.write(how_sure(look.basis, look.solution, look.uncertainty))
     terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    quality = look.solution.certificate
-    if quality.curve:
-        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in quality.curve)
+    certificate = look.solution.certificate
+    if certificate.curve:
+        listed = ", ".join(
+            f"{100 * missed:.1f} % with {count}" for count, missed in certificate.curve
+        )
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
-    if quality.unreached:
+    if certificate.unreached:
         terminal.say(
-            f"no painted pixel sees {', '.join(quality.unreached)}: kept as it is; "
+            f"no painted pixel sees {', '.join(certificate.unreached)}: kept as it is; "
             "paint where it shines, or pass --unpainted"
         )
     for ambiguity in look.analysis.ambiguities:
         terminal.say(ambiguity.sentence)
-    if not quality.converged:
+    if not certificate.converged:
         terminal.say(
-            f"the solve stopped after {max(quality.sweeps)} sweeps at a KKT residual of "
-            f"{max(quality.kkt_residual):.1e}"
+            f"the solve stopped after {max(certificate.sweeps)} sweeps at a KKT residual of "
+            f"{max(certificate.kkt_residual):.1e}"
         )
     if look.verification is not None and not look.verification.agrees:
         terminal.say(f"WARNING: {spoken_agreement(look.verification)}")

@@ -63,7 +63,7 @@ class OcioEncoding:
             self._to_light = _processors(ocio, config, display, view, inverse=True)
         except (ocio.Exception, ocio.ExceptionMissingFile) as error:
             raise ViewError(
-                f"{self._name} cannot be undone, which reading paintings takes: "
+                f"{self._name} cannot be undone, and reading a painting undoes it: "
                 f"{_first_line(error)}"
             ) from error
         self._check_way_back()

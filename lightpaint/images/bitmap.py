@@ -77,7 +77,7 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
     alpha = _alpha(spec, pixels)
     if alpha is not None and not transparency:
         raise ImageError(
-            "has a channel beside its colours that is no transparency: delete it, or export a PNG"
+            "has a channel beside its colours that is not transparency: delete it, or export a PNG"
         )
     integer = np.issubdtype(pixels.dtype, np.integer)
     return Bitmap(

@@ -93,7 +93,7 @@ def linear_rgb(part: Part, layer: str = "") -> Floats:
     luminance = part.channels.get(_joined(layer, "Y"))
     if luminance is None:
         raise ImageError(
-            f"no channel {', '.join(_joined(layer, c) for c in 'RGB')} nor {_joined(layer, 'Y')} "
+            f"no channel {', '.join(_joined(layer, c) for c in 'RGB')} or {_joined(layer, 'Y')} "
             f"in part {part.name!r}, which has {', '.join(part.channels)}"
         )
     luminance = luminance.astype(np.float32, copy=False)
@@ -125,7 +125,9 @@ def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
     layers = colour_layers(parts)
     if not layers:
         channels = dict.fromkeys(name for part in parts for name in part.channels)
-        raise ImageError(f"is no RGB image: no channel R, G, B nor Y; it has {', '.join(channels)}")
+        raise ImageError(
+            f"is not an RGB image: no channels R, G, B or Y; it has {', '.join(channels)}"
+        )
     if wanted is None:
         if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
             raise ImageError(

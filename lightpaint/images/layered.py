@@ -39,7 +39,7 @@ def layered_kind(path: Path, head: bytes) -> str:
     for mark, kind in LAYERED.items():
         if said.startswith(mark):
             return kind
-    raise ImageError(f"{path} is a zip archive, but neither of OpenRaster nor of Krita")
+    raise ImageError(f"{path} is a zip archive, but neither OpenRaster's nor Krita's")
 
 
 def read_merged(path: Path, kind: str) -> Bitmap:

@@ -65,7 +65,8 @@ class LightSetting:
                 )
             if self.is_fixed and rgb != (1, 1, 1):
                 raise LightingError(
-                    f"light {self.name!r} is kept as it is, so its {what} is 1 1 1, not {list(rgb)}"
+                    f"light {self.name!r} is kept as it is, so its {what} must be 1 1 1, "
+                    f"not {list(rgb)}"
                 )
         if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
             raise LightingError(

@@ -50,7 +50,7 @@ class Loss(Protocol):
         """What was to be there, (h, w, 3) linear, of a picture x: x itself where that will do."""
 
     def missed(self, x: Floats) -> Doubles:
-        """What a picture misses of the painting, (h, w, 3), as the view shows it."""
+        """What a picture misses of the painting, (h, w, 3), as the view transform shows it."""
 
     def same_squares(self, a: Floats, b: Floats) -> bool:
         """Whether the squares made for two pictures are the same, and so exact between them."""

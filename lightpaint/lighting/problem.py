@@ -154,7 +154,7 @@ class Problem:
 
     @cached_property
     def pull_strength(self) -> float:
-        """That of the pull to the present, of light as bright as the view makes it."""
+        """That of the pull to the present, of light as bright as the view transform makes it."""
         transform = self.loss.transform
         return self.constraints.prefer_current * (
             1.0 if transform is None else 4.0**transform.stops

@@ -202,5 +202,5 @@ def _tiles(along: slice, length: int, side: int) -> range:
     """Numbers of the tiles that a slice of pixels touches."""
     start, stop, step = along.indices(length)
     if step < 0:
-        raise ValueError("a region is painted from its first row and column on")
+        raise ValueError("the slices of a region go forwards: give steps > 0")
     return range(start // side, -(-stop // side)) if stop > start else range(0)

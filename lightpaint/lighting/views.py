@@ -106,7 +106,7 @@ def check_same_lights(a: Basis, b: Basis) -> None:
     """Raise BasisError unless two bases have the same lights, which do and emit the same."""
     if a.names != b.names:
         raise BasisError(
-            f"the bases of {a.origin.sensor} and {b.origin.sensor} have other lights, "
+            f"the bases of {a.origin.sensor} and {b.origin.sensor} have different lights, "
             f"{', '.join(a.names)} and {', '.join(b.names)}: make both of one scene"
         )
     for one, other in zip(a.lights, b.lights, strict=True):

@@ -1,7 +1,7 @@
 """A solved problem and the images of lights to try beside it, brought to one size.
 
 Of all there are two halves of the samples, so that what is found on one of them can be held
-against the other (see additional.py).
+against the other (see additions.py).
 """
 
 from dataclasses import dataclass

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats
-from lightpaint.scene.parsed import Position
+from lightpaint.arrays import Floats, Position
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
 

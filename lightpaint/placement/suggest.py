@@ -2,32 +2,29 @@
 
 Candidates stand in free space from which they shine on what the camera sees. The images of all
 of them are rendered in one pass, like a basis, on a small film; what each would take away of the
-miss is then a matter of algebra (solve/additional.py). Near the best a second pass looks closer.
+miss is then a matter of algebra (additions.py). Near the best a second pass looks closer.
 """
 
 import gc
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis, why_not_one_pass
-from lightpaint.colour.photometry import Photometry, photometry, point_flux
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.additions import Addition, find_additions
 from lightpaint.placement.candidates import Candidates
 from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.xml_edit import tag
-from lightpaint.scene.emission import PLUGINS
 from lightpaint.scene.film import reductions
 from lightpaint.scene.lights import free_names
-from lightpaint.scene.parsed import Position
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
 
@@ -53,36 +50,6 @@ SMALLEST_SHARE = 0.01
 
 #: Distance that two suggestions have at least, over the spread of what is seen.
 APART = 0.25
-
-
-@dataclass(frozen=True)
-class Suggestion:
-    """A point light to add to the scene.
-
-    position: in units of the scene. emission: intensity per channel, W/sr.
-    gain_share: of what is missed (energy), what this light takes away beside those before it.
-    missed_share: what is left of it, with this light and those before it.
-    xml: the emitter, to be put into the scene's XML as it is.
-    seen_at: where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
-    without, with_it: (h, w, 3) linear, the solved picture before and with this light, small.
-    """
-
-    name: str
-    position: Position
-    emission: RGB
-    gain_share: float
-    missed_share: float
-    xml: str
-    seen_at: tuple[float, float] | None
-    without: Floats = field(repr=False, compare=False)
-    with_it: Floats = field(repr=False, compare=False)
-
-    def photometry(self, cd_per_unit: float | None = None) -> Photometry:
-        """Its colour, and how much light it is."""
-        flux = point_flux()
-        unit_flux = (flux, flux, flux)
-        unit = PLUGINS["point"][1]
-        return photometry(self.emission, unit=unit, unit_flux=unit_flux, cd_per_unit=cd_per_unit)
 
 
 def check_suggestible(scene: Scene) -> None:

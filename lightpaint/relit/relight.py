@@ -83,7 +83,7 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
         raise LightingError(
             f"the lighting does not fit {scene.path}: it lacks "
             f"{', '.join(sorted(there - given)) or 'no light'} and names "
-            f"{', '.join(sorted(given - there)) or 'none'} that the scene has not"
+            f"{', '.join(sorted(given - there)) or 'none'} that the scene does not have"
         )
     tied = scene.with_lights(lighting.members, lighting.fixed)
     for setting in lighting.lights:

@@ -1,69 +1,12 @@
-"""Prediction against an independent render, judged by the noise of both.
+"""The independent render of the relit scene, held against the prediction."""
 
-The predicted image Σ w_i Φ_i and the render of the relit scene estimate the same picture
-from different samples. They differ by noise; if they differ by more, something is wrong,
-and the difference in units of the noise (z) tells.
-"""
-
-from dataclasses import dataclass, replace
-
-import numpy as np
-
-from lightpaint.arrays import Floats
-from lightpaint.colour.color import delta_e
-from lightpaint.colour.display import choose_exposure
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
 from lightpaint.progress import Progress, silent
+from lightpaint.relit.verification import Verification, compare
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
-
-#: Side of the blocks of pixels over which differences are averaged before they are judged.
-BLOCK = 8
-#: Standard errors at which a difference counts as real: far enough out that sound renders
-#: pass thousands of times in a row.
-LIMIT = 5.0
-
-#: Relative round-off of float32 sums, below which a difference is no news.
-PRECISION = 1e-5
-
-
-@dataclass(frozen=True)
-class Verification:
-    """How far prediction and verification are apart.
-
-    verified: the independent render. Where the prediction is smaller by a whole factor, all
-    else is about its block means, at the size (h, w) of the prediction.
-    z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
-    z_rms: root mean square of the differences of 8x8 blocks in their own standard errors.
-    About 1 if there is only noise; a little more where the noise is rare bright samples.
-    z_mean: (3,), difference of the whole image's sum, in standard errors.
-    z_pattern: how alike the differences of the two halves are, block by block, in standard
-    errors (see `_pattern`): noise is not alike, an error in some place is.
-    rmse: of the pixels, in radiance; noise_rmse: what noise alone would give.
-    delta_e_mean, delta_e_95: CIEDE2000 at the exposure of the report: mean, 95th percentile.
-    """
-
-    verified: Estimate
-    z: Floats
-    z_rms: float
-    z_mean: tuple[float, float, float]
-    z_pattern: float
-    rmse: float
-    noise_rmse: float
-    delta_e_mean: float
-    delta_e_95: float
-
-    @property
-    def difference(self) -> float:
-        """The most telling difference in standard errors, to be held against LIMIT."""
-        return max(*map(abs, self.z_mean), self.z_pattern)
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the difference can be noise alone."""
-        return self.difference <= LIMIT
 
 
 def verify(
@@ -95,70 +38,3 @@ def verify(
         progress=progress,
     )
     return compare(predicted, verified)
-
-
-def compare(predicted: Estimate, verified: Estimate) -> Verification:
-    """Judge the difference of two independent estimates of one picture.
-
-    verified: of the size of `predicted`, or larger by a whole factor. Raises SizeError else.
-    """
-    factor = whole_factor(verified.size, predicted.size)
-    if factor is None:
-        raise SizeError(f"sizes of {predicted.size} and {verified.size} cannot be compared")
-    judged = _judge(predicted, verified.reduced(factor))
-    return replace(judged, verified=verified)
-
-
-def _judge(predicted: Estimate, verified: Estimate) -> Verification:
-    difference = predicted.image.astype(np.float64) - verified.image
-    squares = np.square(predicted.half_difference, dtype=np.float64)
-    squares += np.square(verified.half_difference, dtype=np.float64)
-    # Round-off is noise too; it keeps 0/0 out where nothing was ever lit.
-    magnitude = np.abs(predicted.image).astype(np.float64) + np.abs(verified.image)
-    squares += np.square(PRECISION * magnitude) + np.finfo(np.float32).tiny
-
-    pooled = predicted.variance() + verified.variance() + np.square(PRECISION * magnitude)
-    z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
-
-    # A block's mean difference, over the standard error that its own pixels show.
-    block_z = _block_sums(difference) / np.sqrt(_block_sums(squares))
-    z_mean = difference.sum(axis=(0, 1)) / np.sqrt(squares.sum(axis=(0, 1)))
-
-    scale = 2.0 ** choose_exposure(verified.image)
-    differences = delta_e(predicted.image * scale, verified.image * scale)
-    return Verification(
-        verified=verified,
-        z=z.astype(np.float32),
-        z_rms=float(np.sqrt(np.square(block_z).mean())),
-        z_mean=(float(z_mean[0]), float(z_mean[1]), float(z_mean[2])),
-        z_pattern=_pattern(predicted, verified, squares, magnitude),
-        rmse=float(np.sqrt(np.square(difference).mean())),
-        noise_rmse=float(np.sqrt(squares.mean())),
-        delta_e_mean=float(differences.mean()),
-        delta_e_95=float(np.percentile(differences, 95)),
-    )
-
-
-def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude: Floats) -> float:
-    """Σ_blocks d_A d_B over its standard error, d_A and d_B the differences of the halves.
-
-    The halves A and B of both images are independent, so noise of any distribution makes
-    the sum 0 on average, and whatever is truly different adds its square. Blocks count
-    relative to their brightness. squares: variance per pixel; magnitude: brightness.
-    """
-    difference = predicted.image.astype(np.float64) - verified.image
-    half = predicted.half_difference.astype(np.float64) - verified.half_difference
-    brightness = _block_sums(magnitude.sum(axis=-1, dtype=np.float64))
-    typical = brightness.mean()
-    weight = np.square(typical / (brightness + typical)) if typical > 0 else 1.0
-    products = (_block_sums(difference + half) * _block_sums(difference - half)).sum(axis=-1)
-    # A half has twice the variance of the mean; the channels may all go together.
-    spread = 2 * _block_sums(squares).sum(axis=-1)
-    return float((weight * products).sum() / np.sqrt(np.square(weight * spread).sum()))
-
-
-def _block_sums(image: Floats) -> Floats:
-    """Sums over whole blocks of BLOCK x BLOCK pixels; the ragged border joins the last ones."""
-    rows = np.arange(0, max(image.shape[0] - BLOCK + 1, 1), BLOCK)
-    columns = np.arange(0, max(image.shape[1] - BLOCK + 1, 1), BLOCK)
-    return np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1)

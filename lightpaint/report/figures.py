@@ -13,7 +13,7 @@ from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.verify import LIMIT, Verification
+from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.pictures import (
     DIVERGING,
     diverging,

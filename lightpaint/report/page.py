@@ -17,8 +17,8 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.suggest import Suggestion
-from lightpaint.relit.verify import Verification
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import Verification
 from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.figures import Picture, maps, wipe

@@ -6,7 +6,7 @@ from html import escape
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.placement.suggest import Suggestion
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.figures import data_uri
 from lightpaint.report.sentences import spoken_percent
 

@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.verify import LIMIT, Verification
+from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.verdict import (
     codes_missed,
     linear_residual,

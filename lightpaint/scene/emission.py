@@ -59,6 +59,9 @@ PLUGINS = {
     "sunsky": ("radiance", "W/(m² sr)"),
 }
 
+#: Of these, those that surround the scene.
+ENVIRONMENTS = ("constant", "envmap", "sunsky")
+
 
 def emission_kind(emitter: Any, plugin: str) -> EmissionKind | None:
     """How a loaded emitter is scaled; None where lightpaint cannot scale it."""

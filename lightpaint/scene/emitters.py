@@ -11,6 +11,7 @@ from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
 from lightpaint.scene.emission import (
     AS_AUTHORED,
+    ENVIRONMENTS,
     PLUGINS,
     EmissionKind,
     Scaling,
@@ -179,7 +180,7 @@ def describe_form(emitter: Any, plugin: str) -> str:
         box = shape.bbox()
         area = float(np.array(shape.surface_area()).ravel()[0])
         return f"area {area:.3g} at {at(box.center())}"
-    if plugin in ("constant", "envmap", "sunsky"):
+    if plugin in ENVIRONMENTS:
         return "all around"
     parameters = mi.traverse(emitter)
     if "position" in parameters:

@@ -74,7 +74,7 @@ def check_resolution(resolution: str) -> re.Match[str]:
     """Its numbers. Raises SceneError for what is neither a part, `1/4`, nor a size, `320x180`."""
     given = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
     if given is None:
-        raise SceneError(f"{resolution!r} is no resolution: give 1/4, say, or 320x180")
+        raise SceneError(f"{resolution!r} is not a resolution: give one like 1/4 or 320x180")
     return given
 
 

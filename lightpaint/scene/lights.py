@@ -102,7 +102,7 @@ def tie(name: str, members: Sequence[Emitter]) -> Light:
         listed = ", ".join(f"{m.name} ({m.plugin})" for m in members)
         raise SceneError(
             f"group {name!r} has only black lights of different kinds, {listed}, so nothing "
-            "says how bright they are to each other: give one of them a colour"
+            "says how bright they are relative to each other: give one of them a colour"
         )
     parameters = {member.kind.parameter for member in members if member.kind is not None}
     return Light(

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 from lightpaint.scene.checks.assets import check_assets
@@ -23,9 +24,6 @@ from lightpaint.scene.film import Film
 
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000
-
-#: A place in units of the scene.
-Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

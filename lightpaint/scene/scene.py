@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
 from lightpaint.scene.checks.xml import MAX_XML
@@ -23,7 +23,7 @@ from lightpaint.scene.emitters import Emitter, find_emitters, point_emitter
 from lightpaint.scene.film import Film, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights_file import lights_file_for
-from lightpaint.scene.parsed import Integrator, ParsedScene, Position, mitsuba_errors
+from lightpaint.scene.parsed import Integrator, ParsedScene, mitsuba_errors
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import Listed, some_of
 

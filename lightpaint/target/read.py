@@ -169,7 +169,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     """The look of surfaces under the light that was painted: image and importance."""
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
-            f"to take {reading.path} for light its template is needed, which knows what surfaces "
+            f"to read {reading.path} as light its template is needed, which knows what surfaces "
             "reflect: give the folder that lightpaint template wrote as template=..."
         )
     albedo = reading.template.albedo

@@ -26,7 +26,7 @@ class Target:
     at_least: (h, w, 3) bool, where the painting was at the top of what its file can say, so that
         this or anything brighter was meant; None if it can say everything.
     notes: what a person should know of how it was read, a sentence each.
-    content, sensor: of the scene and view that it was painted on, where a template says.
+    content, sensor: of the scene and sensor that it was painted on, where a template says.
     transform: what a display showed it through when it was painted; None if nobody knows.
     """
 

@@ -108,7 +108,7 @@ def test_options_that_need_a_renderer_are_refused(given: str, named: str):
     painting = [] if "--target" in given else ["painting.exr"]
     with pytest.raises(BasisError) as refused:
         _jobs("groups.exr", *painting, *given.split())
-    assert spoken(str(refused.value)).startswith(f"{named} cannot be had from groups.exr")
+    assert spoken(str(refused.value)).startswith(f"{named} cannot be used with groups.exr")
 
 
 @pytest.mark.usefixtures("here")

@@ -409,7 +409,7 @@ def test_archives_without_a_merged_picture(tmp_path: Path):
         _read(tmp_path, layered(None))
     with pytest.raises(ImageError, match="merged picture that is no PNG"):
         _read(tmp_path, layered(psd(_pixels())))
-    with pytest.raises(ImageError, match="neither of OpenRaster nor of Krita"):
+    with pytest.raises(ImageError, match="neither OpenRaster's nor Krita's"):
         _read(tmp_path, layered(png(_pixels()), b"application/zip"))
 
 

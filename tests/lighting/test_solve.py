@@ -302,7 +302,7 @@ def test_what_is_kept_stays_through_any_painting(make_basis: Any) -> None:
     everything = solve(alone, _random_target())
     assert everything.certificate.converged
     assert (everything.lighting.weights_for(alone) == 1).all()
-    with pytest.raises(LightingError, match="kept as it is, so its emission is 1 1 1"):
+    with pytest.raises(LightingError, match="kept as it is, so its emission must be 1 1 1"):
         black.with_emission(basis.names[0], (2, 2, 2))
 
 

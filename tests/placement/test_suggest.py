@@ -20,11 +20,11 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
 from lightpaint.placement.suggest import (
-    Suggestion,
     check_suggestible,
     emitter_xml,
     suggest_lights,
 )
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.suggestion import spoken_suggestions, suggestion_section
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target

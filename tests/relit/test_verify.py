@@ -10,7 +10,7 @@ import pytest
 from lightpaint.colour.color import delta_e
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.verify import LIMIT, compare
+from lightpaint.relit.verification import LIMIT, compare
 
 SIZE = (48, 40)
 SEEDS = range(100)

@@ -16,7 +16,7 @@ from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
-from lightpaint.relit.verify import compare
+from lightpaint.relit.verification import compare
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.lights_table import hex_color
 from lightpaint.report.page import report_page

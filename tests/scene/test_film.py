@@ -38,7 +38,7 @@ def test_anything_else_is_refused_with_what_works(given: str) -> None:
 
 @pytest.mark.parametrize("given", ["", "half", "4", "2/4", "-1/4", "1/4x", "320X180", "1e2x3"])
 def test_what_is_no_resolution_is_said_to_be_none(given: str) -> None:
-    with pytest.raises(SceneError, match="is no resolution"):
+    with pytest.raises(SceneError, match="is not a resolution"):
         reduction(FULL_HD, given)
 
 

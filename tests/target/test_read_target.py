@@ -215,7 +215,7 @@ def test_rec709_may_be_declared(tmp_path: Path, image: Any, primaries: Any):
 
 
 def test_no_rgb(write: Any, alpha: Any):
-    with pytest.raises(ImageError, match=r"look\.exr is no RGB image: .*; it has G, R, Z"):
+    with pytest.raises(ImageError, match=r"look\.exr is not an RGB image: .*; it has G, R, Z"):
         read_target(write(R=alpha, G=alpha, Z=alpha))
 
 

@@ -76,8 +76,8 @@ def read_layers(path: Path) -> list[RenderLayer]:
             )
         if not are_same(layer.primaries, first.primaries):
             raise BasisError(
-                f"{layer.place} and {first.place} declare other primaries: light groups need one "
-                "colour space"
+                f"{layer.place} and {first.place} declare different primaries: light groups need "
+                "one colour space"
             )
     names = [layer.name for layer in layers]
     if twice := sorted({name for name in names if names.count(name) > 1}):

@@ -1,7 +1,7 @@
 """Which layers of a file are its light groups, and which is the whole picture.
 
-Works on names alone. A layer is known by its own name, `ViewLayer.Combined_key`, and a
-A pattern also finds it by the name of its part or file.
+Works on names alone. A layer is known by its own name, `ViewLayer.Combined_key`. A pattern also
+finds it by the name of its part or file.
 """
 
 import re

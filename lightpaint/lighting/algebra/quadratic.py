@@ -161,7 +161,7 @@ def scaled(
     if M.shape != (n, n):
         raise ValueError(f"M is {M.shape} and b {b.shape}: expected ({n}, {n})")
     if not (np.isfinite(M).all() and np.isfinite(b).all()):
-        raise ValueError("M and b are to be finite: some picture has a pixel that is not")
+        raise ValueError("M and b must be finite: some picture has a pixel that is not")
     low = np.broadcast_to(np.asarray(lower, np.float64), n)
     high = np.broadcast_to(np.asarray(upper, np.float64), n)
     if not (low <= high).all():

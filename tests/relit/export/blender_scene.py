@@ -1,6 +1,6 @@
 """Runs in Blender: makes small scenes with light groups, and checks what set_lights.py does.
 
-Arguments: what to do, and a folder. Not a test by itself: test_export.py runs it.
+Arguments: what to do, and a folder. Not a test by itself: test_exports.py runs it.
 """
 
 import runpy
@@ -131,7 +131,7 @@ def emitted(data):
 
 
 def kinds():
-    """The groups a: 2 0.5 0, b: 0.1 1 3, linked: off, world: 1.25 1.25 0.3 of test_export.py."""
+    """The groups a: 2 0.5 0, b: 0.1 1 3, linked: off, world: 1.25 1.25 0.3 of test_exports.py."""
     empty()
     sun = light("sun", "SUN", 3, (1, 0.5, 0.25), (0, 0, 5), "a")
     shared, twin = light("x", "POINT", 10, (1, 1, 1), (0, 0, 1), "a"), None

@@ -1,0 +1,58 @@
+"""What the documents say of the code is so: names of files, public names, the corridor."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import lightpaint as lp
+from lightpaint.cli.parser import command_parser
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FILES = {"/" + path.relative_to(ROOT).as_posix() for path in ROOT.glob("[a-z]*/**/*.py")}
+
+#: A file that is written, and an option of another program.
+ELSEWHERE = {"set_lights.py", "--colorconvert"}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_files_that_are_named_are_there(document: Path):
+    named = set(re.findall(r"`([\w/]+\.py)`", document.read_text())) - ELSEWHERE
+    assert [x for x in sorted(named) if not any(file.endswith("/" + x) for file in FILES)] == []
+
+
+def test_rooms_that_are_named_are_there():
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    rooms = set(re.findall(r"`([a-z_]+(?:/[a-z_]+)*)/`", text))
+    assert len(rooms) > 15
+    assert [room for room in rooms if not (ROOT / "lightpaint" / room).is_dir()] == []
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_public_names_and_options_that_are_named_are_there(document: Path):
+    text = document.read_text()
+    public = set(re.findall(r"\blp\.(\w+)", text))
+    assert sorted(public - set(lp.__all__)) == []
+    options = set(re.findall(r"`(--[a-z-]+)(?:[ `=])", text)) - ELSEWHERE
+    assert sorted(options - _options()) == []
+
+
+def _options() -> set[str]:
+    [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
+    return {
+        option
+        for parser in commands.choices.values()
+        for action in parser._actions
+        for option in action.option_strings
+    }
+
+
+def test_the_corridor_is_quoted_as_it_stands():
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    [quoted] = re.findall(r"```python\n(def run.*?)```", text, re.DOTALL)
+    module = ast.parse((ROOT / "lightpaint" / "pipeline.py").read_text())
+    [run] = (x for x in module.body if isinstance(x, ast.FunctionDef) and x.name == "run")
+    del run.body[0]  # the docstring
+    assert ast.dump(ast.parse(quoted).body[0]) == ast.dump(run)
