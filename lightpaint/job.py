@@ -19,7 +19,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
@@ -98,7 +98,10 @@ class Job:
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
             folders = [self.folder / name for name in check_each_once(scenes)]
-        asked = all_constraints(scenes[0] if scenes else None, self.constraints)
+        told = scenes[0] if scenes else basis
+        asked = self.constraints
+        if isinstance(told, Scene | Basis):
+            asked = constraints_of(told.asked).and_then(asked)
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
         # Names what cannot be had before it renders.
@@ -288,11 +291,3 @@ def check_each_once(scenes: Sequence[Scene]) -> list[str]:
         if Path(name).name != name or name in ("..", ""):
             raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
     return names
-
-
-def all_constraints(scene: Scene | None, given: Constraints | None) -> Constraints:
-    """What the lights file of `scene` asks, if it has one, and then `given`."""
-    asked = given or Constraints()
-    if scene is None or scene.lights_file is None:
-        return asked
-    return read_constraints(scene.lights_file).and_then(asked)

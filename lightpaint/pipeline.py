@@ -224,10 +224,15 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
 def _obtained(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
     """The basis of each view: handed in, given with the job, kept, or rendered."""
     if bases is None:
-        return [_basis_of(job, view, listen) for view in job.views]
-    made = list(bases)
-    bases.clear()
-    return made
+        made = [_basis_of(job, view, listen) for view in job.views]
+    else:
+        made = list(bases)
+        bases.clear()
+    # What the scene's lights file asks by now, whenever they were made.
+    return [
+        basis if view.scene is None else basis.asking(view.scene.asked)
+        for basis, view in zip(made, job.views, strict=True)
+    ]
 
 
 def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
+from lightpaint.scene.lights_file import Asked
 from lightpaint.screen import Listed, some_of
 from lightpaint.version import __version__
 
@@ -111,6 +112,8 @@ class Basis:
     emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
     learned: (2, cells, emitters) float32, what the renderer found out on the way about which
     emitter matters where, or None. Going on needs it, nobody else.
+    asked: what the lights file of the scene asks of the lights, for whoever solves; of memory
+    only, since that file may change.
     """
 
     lights: tuple[BasisLight, ...]
@@ -119,6 +122,7 @@ class Basis:
     emitters_seen: Bools
     origin: Origin
     learned: Floats | None = None
+    asked: Asked = field(default_factory=Asked)
 
     def __post_init__(self) -> None:
         n = len(self.lights)
@@ -151,6 +155,10 @@ class Basis:
         if name not in self.names:
             raise BasisError(f"no light {name!r} in the basis: it has {', '.join(self.names)}")
         return np.asarray(self.images[self.names.index(name)])
+
+    def asking(self, asked: Asked) -> "Basis":
+        """This basis, of whose lights that is asked."""
+        return self if self.asked == asked else replace(self, asked=asked)
 
     @property
     def size(self) -> tuple[int, int]:

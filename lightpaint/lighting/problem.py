@@ -11,9 +11,10 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.errors import ConstraintError, TargetError
+from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -95,15 +96,18 @@ class Problem:
         method: Method = "polished",
         transform: ViewTransform | None = None,
     ) -> "Problem":
-        """Of one view, or of several: their bases and targets in the same order. As of `solve`."""
-        bases = [basis] if isinstance(basis, Basis) else list(basis)
-        targets = [target] if isinstance(target, Target) else _listed(target)
+        """Of one view, or of several: their bases and targets in the same order. As of `solve`.
+
+        What the bases' scene asks of its lights is heeded; `constraints` go before it.
+        """
+        bases = [basis] if isinstance(basis, Basis) else _bases(basis)
+        targets = [target] if isinstance(target, Target) else _targets(target)
         if not (constraints is None or isinstance(constraints, Constraints)):
             raise ConstraintError(
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
-        asked = constraints or Constraints()
         whole, parts = joint_basis(bases)
+        asked = constraints_of(whole.asked).and_then(constraints or Constraints())
         fitted = [
             what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
             for its, one in zip(targets, parts, strict=True)
@@ -250,7 +254,16 @@ class Problem:
         )
 
 
-def _listed(targets: Any) -> list[Target]:
+def _bases(given: Any) -> list[Basis]:
+    if isinstance(given, Sequence) and given and all(isinstance(x, Basis) for x in given):
+        return list(given)
+    raise BasisError(
+        f"the basis is a {type(given).__name__}: give what render_basis or read_basis returns, or "
+        "the .basis of light groups"
+    )
+
+
+def _targets(targets: Any) -> list[Target]:
     if isinstance(targets, Sequence) and targets and all(isinstance(t, Target) for t in targets):
         return list(targets)
     raise TargetError(f"the target is a {type(targets).__name__}: give what read_target returns")

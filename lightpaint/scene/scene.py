@@ -22,7 +22,7 @@ from lightpaint.scene.emission import EmitterSetting
 from lightpaint.scene.emitters import Emitter, find_emitters, point_emitter
 from lightpaint.scene.film import Film, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
-from lightpaint.scene.lights_file import lights_file_for
+from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import Integrator, ParsedScene, Position, mitsuba_errors
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import Listed, some_of
@@ -41,7 +41,7 @@ class Scene:
     emitters: all of them; lights: what is adjusted, and last what is kept, if anything is.
     content: hash of all XML files and assets, the parameters and the sensor; the same on a
     reduced film.
-    lights_file: the lights file that went into `lights`, if one did.
+    lights_file: the lights file that went into `lights`, if one did; asked: what it asks of them.
     """
 
     path: Path
@@ -57,6 +57,7 @@ class Scene:
     files: tuple[Path, ...]
     content: str
     lights_file: Path | None
+    asked: Asked
     _parsed: ParsedScene
 
     def __post_init__(self) -> None:
@@ -159,6 +160,7 @@ class Scene:
             emitters=emitters,
             lights=lights_of(emitters, members, fixed=[*members][-1:]),
             content=lit_by,
+            asked=Asked(),
             _parsed=parsed,
         )
 
@@ -227,7 +229,7 @@ def load_scene(
     with mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant)
     index = sensor_index(sensor, parsed.sensor_names, path)
-    asked = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
+    said = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
     with mitsuba_errors(path):
         seen = _look_at(parsed, index)
     check_film(path, seen["film"], seen["spp"])
@@ -235,8 +237,9 @@ def load_scene(
     return Scene(
         path=path,
         parameters=values,
-        lights=choose_lights(emitters, scene=str(path), lights=asked.lights, groups=asked.groups),
-        lights_file=asked.path,
+        lights=choose_lights(emitters, scene=str(path), lights=said.lights, groups=said.groups),
+        lights_file=said.path,
+        asked=said.asked,
         _parsed=parsed,
         **seen,
     )

@@ -76,7 +76,7 @@ def render_basis(
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
-        return start
+        return start.asking(scene.asked)
     method = ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
     if start is not None and start.origin.method != method:
         # Nothing to go on from, but nothing to be replaced by less either.
@@ -182,6 +182,7 @@ def _render_together(
             sums.emitters_seen(),
             _origin(scene, seed, ONE_PASS, halves, passes),
             tracer.guide.learned(),
+            scene.asked,
         )
 
     try:
@@ -226,7 +227,8 @@ def _render_one_by_one(
     def basis() -> Basis:
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
-        return Basis(basis_lights(scene), images, half_differences, seen, origin)
+        lights = basis_lights(scene)
+        return Basis(lights, images, half_differences, seen, origin, asked=scene.asked)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

@@ -162,10 +162,14 @@ class Constraints:
         )
 
     def and_then(self, others: "Constraints") -> "Constraints":
-        """These and `others`, which replace what they contradict."""
+        """These and `others`, which replace what they contradict, ties of the same lights too.
+
+        What both say is said once: `a.and_then(a.and_then(b)) == a.and_then(b)`.
+        """
+        tied = [set(tie.lights) for tie in others.ties]
         return Constraints(
-            self.lights + others.lights,
-            self.ties + others.ties,
+            tuple(x for x in self.lights if x not in others.lights) + others.lights,
+            tuple(x for x in self.ties if set(x.lights) not in tied) + others.ties,
             others.prefer_current or self.prefer_current,
             self.sparse if others.sparse is None else others.sparse,
         )
