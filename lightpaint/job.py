@@ -28,6 +28,7 @@ from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_t
 from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import shortly
 from lightpaint.settings import Settings
 from lightpaint.sources import (
     BasisFile,
@@ -86,6 +87,8 @@ class Job:
     display: ViewTransform | None = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
     _relit: tuple[Path, ...] = field(init=False, repr=False)
+
+    __repr__ = shortly
 
     def __post_init__(self) -> None:
         self._check_counts()

@@ -19,7 +19,9 @@ from lightpaint.records import read_record, strict_json
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verify import Verification, verify
 from lightpaint.report.comparison import write_comparison
+from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
+from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
@@ -65,6 +67,13 @@ class Look:
     verification: Verification | None
     analysis: Analysis
     suggestions: tuple[Suggestion, ...] | None = None
+
+    def __repr__(self) -> str:
+        said = verdict(self.solution, self.predicted, self.verification)
+        return f"Look(of {self.target.name}: {said})"
+
+    def _repr_html_(self) -> str:
+        return look_html(self.target, self.solution, self.predicted, self.verification)
 
     @property
     def uncertainty(self) -> Uncertainty | None:

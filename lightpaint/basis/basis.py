@@ -12,7 +12,7 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
 from lightpaint.scene.lights_file import Asked
-from lightpaint.screen import Listed, some_of
+from lightpaint.screen import Listed, Shown, some_of
 from lightpaint.version import __version__
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -101,7 +101,7 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Basis:
+class Basis(Shown):
     """The images of a scene lit by one light at a time.
 
     lights: n of them; their order is the order of everything else.

@@ -10,6 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
+from lightpaint.screen import shortly
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"
@@ -26,6 +27,8 @@ class Estimate:
 
     image: Floats
     half_difference: Floats
+
+    __repr__ = shortly
 
     def __post_init__(self) -> None:
         if self.image.shape != self.half_difference.shape:

@@ -17,6 +17,7 @@ from lightpaint.files import one_line, read_text, write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.bound import Bound
 from lightpaint.records import read_record, strict_json
+from lightpaint.screen import Shown, shortly, some_of
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
@@ -103,6 +104,20 @@ class Certificate:
     display: str = ""
     rounds: int = 1
 
+    __repr__ = shortly
+
+    def __str__(self) -> str:
+        told = "closest there is"
+        if self.curve or self.rounds > 1:
+            told = "closest with the lights chosen" if self.curve else "no small change is closer"
+        told = told if self.converged else "stopped before it converged"
+        missed = math.sqrt(max(self.relative_objective))
+        where = f", as {self.display} shows it" if self.display else ""
+        return (
+            f"{told} (KKT residual {max(self.kkt_residual):.1g}); misses {missed:.2g} of the "
+            f"painting{where} (RMS, worst channel)"
+        )
+
     def of(self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None) -> "Certificate":
         """With what is missed, (3,), beside what a black picture would miss, (3,)."""
         norm = np.where(norm2 > 0, norm2, 1)
@@ -115,7 +130,7 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class Lighting:
+class Lighting(Shown):
     """Emissions for named lights.
 
     certificate: of the solve they come from, if they do.
@@ -127,6 +142,12 @@ class Lighting:
     scene_identity: str = ""
     certificate: Certificate | None = None
     cd_per_unit: float | None = None
+
+    def __repr__(self) -> str:
+        rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]
+        told = [f"{light.name} {its}" for light, its in zip(self.lights, rgb, strict=True)]
+        target = f" for {self.target}" if self.target else ""
+        return f"Lighting({len(told)} lights{target}: {some_of(told, room=600)})"
 
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]

@@ -28,6 +28,7 @@ from lightpaint.lighting.painting import (
 )
 from lightpaint.lighting.reweighted import predicted
 from lightpaint.lighting.views import Views, joint_basis
+from lightpaint.screen import shortly
 from lightpaint.target.target import Target
 
 #: What is compared with the painting: light, or what a display shows of it.
@@ -83,6 +84,8 @@ class Problem:
     refinement: Refinement | None = None
     painting: Painting | None = None
     strokes: int = 0
+
+    __repr__ = shortly
 
     @classmethod
     def of(

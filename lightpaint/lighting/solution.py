@@ -11,10 +11,11 @@ from lightpaint.lighting.lighting import Certificate, Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, Space
 from lightpaint.lighting.reweighted import Reweighting
+from lightpaint.screen import Shown
 
 
 @dataclass(frozen=True)
-class Solution:
+class Solution(Shown):
     """The lighting that comes closest to a target, and the problem it solves.
 
     problem: with the squares that stand for its loss where the lighting is, and the lights that
@@ -30,6 +31,9 @@ class Solution:
     tried: tuple[tuple[int, Doubles], ...] = ()
     reweighting: Reweighting | None = None
     whole: "Solution | None" = None
+
+    def __repr__(self) -> str:
+        return f"Solution({self.certificate}: {self.lighting})"
 
     @cached_property
     def weights(self) -> Doubles:

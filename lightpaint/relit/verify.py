@@ -18,6 +18,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import Shown
 
 #: Side of the blocks of pixels over which differences are averaged before they are judged.
 BLOCK = 8
@@ -30,7 +31,7 @@ PRECISION = 1e-5
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Shown):
     """How far prediction and verification are apart.
 
     verified: the independent render. Where the prediction is smaller by a whole factor, all
@@ -54,6 +55,13 @@ class Verification:
     noise_rmse: float
     delta_e_mean: float
     delta_e_95: float
+
+    def __repr__(self) -> str:
+        (height, width), word = self.verified.size, "agrees" if self.agrees else "DISAGREES"
+        return (
+            f"Verification({word}, {self.difference:.1f} standard errors apart, limit {LIMIT:g}; "
+            f"ΔE {self.delta_e_mean:.2f}; {width}x{height})"
+        )
 
     @property
     def difference(self) -> float:

@@ -25,14 +25,14 @@ from lightpaint.scene.lights import Light, free_names, light_named, lights_of, s
 from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import Integrator, ParsedScene, Position, mitsuba_errors
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import Listed, some_of
+from lightpaint.screen import Listed, Shown, some_of
 
 #: Characters of a name beyond which it is a mistake.
 MAX_NAME = 1000
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Shown):
     """A parsed scene, seen through one of its sensors.
 
     film: of the sensor it is seen through.

@@ -10,13 +10,14 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_mean, whole_factor
+from lightpaint.screen import Shown
 
 #: By how much more than half one of two shares prevails, beyond the rounding of float32.
 TIE = 1e-5
 
 
 @dataclass(frozen=True)
-class Target:
+class Target(Shown):
     """The painted image Ψ and its importance D.
 
     image: (h, w, 3) float32, linear Rec.709, finite.

@@ -27,6 +27,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import read_headers
+from lightpaint.screen import shortly
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
@@ -61,6 +62,8 @@ class LightGroups:
     exceeding: float | None
     holes: npt.NDArray[np.bool_]
     remarks: tuple[str, ...]
+
+    __repr__ = shortly
 
     @property
     def has_rest(self) -> bool:

@@ -7,6 +7,7 @@ from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose, with_diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
+from lightpaint.screen import shortly
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Analysis:
     diagnosis: Diagnosis
     ambiguities: tuple[Ambiguity, ...]
     unconstrained: Solution | None
+
+    __repr__ = shortly
 
 
 def analyse(solution: Solution) -> tuple[Analysis, ...]:

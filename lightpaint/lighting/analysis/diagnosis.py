@@ -25,6 +25,7 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
+from lightpaint.screen import shortly
 
 #: Blocks along each side of the image over which it is asked where light is missing, and
 #: regions that are spoken of: left, middle, right.
@@ -79,6 +80,8 @@ class Diagnosis:
     bounds_left_out: int = 0
     compromise: float = 0.0
     lighting_total: float = 0.0
+
+    __repr__ = shortly
 
     @property
     def avoidable(self) -> float:

@@ -30,6 +30,7 @@ from lightpaint.lighting.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
+from lightpaint.screen import shortly
 
 #: Standard errors on either side of a 95 % interval.
 SIDES = 1.96
@@ -60,6 +61,8 @@ class Uncertainty:
     objective_noise: Doubles
     excess: Doubles
     target_norm2: Doubles
+
+    __repr__ = shortly
 
     @property
     def relative_excess(self) -> float:

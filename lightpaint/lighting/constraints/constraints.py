@@ -15,6 +15,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.errors import ColorError, ConstraintError
+from lightpaint.screen import shortly
 
 #: What may be asked of one light.
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")
@@ -123,6 +124,8 @@ class Constraints:
     ties: tuple[Tie, ...] = ()
     prefer_current: float = 0.0
     sparse: int | None = None
+
+    __repr__ = shortly
 
     def __bool__(self) -> bool:
         return bool(self.lights or self.ties or self.prefer_current or self.sparse is not None)
