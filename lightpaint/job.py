@@ -62,17 +62,32 @@ class PaintedView:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One lighting to be found, for one view or several. Raises LightpaintError for what cannot be.
+    """One lighting to be found, for one view or several; checked whole when it is born.
 
-    scenes: the scene through the sensor of each view; none to solve from `basis` alone, without
-    a renderer. targets: what each view is to show. folder: receives the results.
-    basis: made before of the one view; taken from the cache or rendered if not given. Of light
-    groups that another renderer made, `folder` receives the answer for other programs, too.
-    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
-    by_sensor: whether pictures go to a folder for each sensor, as they do of several.
+    Attributes:
+        scenes: The scene through the sensor of each view; none to solve from `basis` alone, without
+            a renderer.
+        targets: What each view is to show.
+        folder: Receives the results.
+        basis: Made before of the one view; taken from the cache or rendered if not given. Of light
+            groups that another renderer made, `folder` receives the answer for other programs, too.
+        constraints: What is asked of the lights; it goes before what the scene's lights file asks.
+        settings: How it is to be answered.
+        by_sensor: Whether pictures go to a folder for each sensor, as they do of several.
+        views: Found at birth: each view, with what it needs.
+        asked: Found at birth: all constraints, those of the lights file first.
+        display: Found at birth: the view transform to come closest in; None for linear light.
+        remarks: Found at birth: what is worth saying to a person, in plain text.
 
-    Found at birth: views, each with what it needs; asked, all constraints; display, the view
-    transform to come closest in; remarks, what is worth saying to a person, in plain text.
+    Raises:
+        LightpaintError: For what cannot be.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> scenes, targets = (lp.SceneFile("room.xml"),), (lp.Painting("painting.exr"),)
+        >>> job = lp.Job(scenes, targets, Path("evening"), settings=lp.Settings(spp=4))
+        >>> lp.Job.from_json(job.to_json()) == job
+        True
     """
 
     scenes: tuple[Scene | SceneFile, ...]

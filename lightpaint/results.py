@@ -54,9 +54,20 @@ RESULTS = (
 class Look:
     """One painting and its answer.
 
-    relit and verification are None where there was only a saved basis and no scene.
-    analysis: how sure the lights are, and why the painting is not met. suggestions: lights that
-    would help most, None if they were not asked for.
+    Attributes:
+        target: What was wanted, at the size of the basis.
+        basis: What it was solved with.
+        solution: The answer, with its errors and what holds its lights.
+        predicted: Σ w_i Φ_i, what it will look like.
+        relit: The scene as it was relit; None where there was only a saved basis.
+        verification: Prediction against a render; None without a scene.
+        analysis: How sure the lights are, and why the painting is not met.
+        suggestions: Lights that would help most, None if they were not asked for.
+
+    Examples:
+        >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
+        >>> look.lighting.emission["panel"] == look.solution.lighting.emission["panel"]
+        True
     """
 
     target: Target

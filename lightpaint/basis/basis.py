@@ -104,16 +104,24 @@ class Origin:
 class Basis(Shown):
     """The images of a scene lit by one light at a time.
 
-    lights: n of them; their order is the order of everything else.
-    images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
-    half_differences: (n, h, w, 3) float32, half the difference of two independent halves
-    of the samples: the noise of `images`. Where an interrupt left the halves unequal, it
-    overstates the noise a little. Zeros where nothing is known of it (see `knows_noise`).
-    emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
-    learned: (2, cells, emitters) float32, what the renderer found out on the way about which
-    emitter matters where, or None. Going on needs it, nobody else.
-    asked: what the lights file of the scene asks of the lights, for whoever solves; of memory
-    only, since that file may change.
+    Attributes:
+        lights: n of them; their order is the order of everything else.
+        images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
+        half_differences: (n, h, w, 3) float32, half the difference of two independent halves of the
+            samples: the noise of `images`. Where an interrupt left the halves unequal, it
+            overstates the noise a little. Zeros where nothing is known of it (see `knows_noise`).
+        emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
+        origin: Where it comes from: scene, sensor, seed, samples.
+        learned: (2, cells, emitters) float32, what the renderer found out on the way about which
+            emitter matters where, or None. Going on needs it, nobody else.
+        asked: What the lights file of the scene asks of the lights, for whoever solves; of memory
+            only, since that file may change.
+
+    Examples:
+        >>> basis.names
+        ('panel', 'bulb')
+        >>> basis.image("bulb").shape
+        (16, 16, 3)
     """
 
     lights: tuple[BasisLight, ...]

@@ -20,9 +20,15 @@ HALF_DIFFERENCE = "half_difference"
 class Estimate:
     """The mean of two independent renders A and B, and half their difference.
 
-    image: (h, w, 3) float32, (A + B) / 2, linear Rec.709 radiance.
-    half_difference: (h, w, 3) float32, (A − B) / 2. Its square is an unbiased estimate of
-    the variance of `image`, one per pixel and channel.
+    Attributes:
+        image: (h, w, 3) float32, (A + B) / 2, linear Rec.709 radiance.
+        half_difference: (h, w, 3) float32, (A − B) / 2. Its square is an unbiased estimate of the
+            variance of `image`, one per pixel and channel.
+
+    Examples:
+        >>> predicted = lp.combine(basis, lp.solve(basis, target).lighting)
+        >>> predicted.image.shape == predicted.variance().shape
+        True
     """
 
     image: Floats

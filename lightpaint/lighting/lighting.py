@@ -79,17 +79,30 @@ class LightSetting:
 class Certificate:
     """How good a solve is, per colour channel (R, G, B).
 
-    kkt_residual: optimality measure of the solver (see solver.kkt_residual).
-    objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
-    unreached: lights that no weighted pixel sees, which keep what the solve started from, or
-    what is nearest to it under their constraints: their present emission, if no start was given.
-    curve: where only some lights may be on, numbers of lights and the relative residual,
-    √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
-    bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
-    objective_error: standard error of `objective`, from the noise it was solved with, where that
-    is known.
-    display: the view transform through which the objective is seen; "" where it is of linear light.
-    rounds: linear problems solved one after the other, the last of which is the certified one.
+    Attributes:
+        kkt_residual: Optimality measure of the solver (see solver.kkt_residual).
+        objective: ‖Ψ − Σ w_i Φ_i‖² under the importance.
+        relative_objective: Over ‖Ψ‖².
+        sweeps: Gauss–Seidel sweeps per channel; 0 where Newton steps did it.
+        converged: Whether the KKT residual came below the tolerance.
+        unreached: Lights that no weighted pixel sees, which keep what the solve started from, or
+            what is nearest to it under their constraints: their present emission, if no start was
+            given.
+        curve: Where only some lights may be on, numbers of lights and the relative residual, √(Σ_c
+            E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
+        bounds: What holds single lights, where a diagnosis has looked, the largest gain first.
+        objective_error: Standard error of `objective`, from the noise it was solved with, where
+            that is known.
+        display: The view transform through which the objective is seen; "" where it is of linear
+            light.
+        rounds: Linear problems solved one after the other, the last of which is the certified one.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> solution.certificate.converged
+        True
+        >>> print(solution.certificate)
+        closest there is (KKT residual ...); misses ... of the painting (RMS, worst channel)
     """
 
     kkt_residual: RGB
@@ -133,8 +146,19 @@ class Certificate:
 class Lighting(Shown):
     """Emissions for named lights.
 
-    certificate: of the solve they come from, if they do.
-    cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+    Attributes:
+        lights: Each with its emission, in the order of the basis.
+        target: Name of what was painted.
+        scene_identity: Of the scene it is for.
+        certificate: Of the solve they come from, if they do.
+        cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+
+    Examples:
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> lighting.emission["panel"]
+        (2.0, 1.5, 1.0)
+        >>> lighting.with_emission("panel", (1, 1, 1)).emission["panel"]
+        (1, 1, 1)
     """
 
     lights: tuple[LightSetting, ...]
@@ -264,13 +288,36 @@ class Lighting(Shown):
 
 
 def combine(basis: Basis, lighting: Lighting) -> Estimate:
-    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it."""
+    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it.
+
+    Args:
+        basis: Of n lights.
+        lighting: Of the same lights.
+
+    Raises:
+        LightingError: If the two do not name the same lights.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 1e-4
+        True
+    """
     weights = lighting.weights_for(basis)
     return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
 
 
-def write_lighting(path: Path, lighting: Lighting) -> None:
-    """Write lighting.json (docs/formats.md), whole or not at all."""
+def write_lighting(path: str | Path, lighting: Lighting) -> None:
+    """Write lighting.json (docs/formats.md), whole or not at all.
+
+    Args:
+        path: Of the file.
+        lighting: To keep.
+
+    Examples:
+        >>> lp.write_lighting("evening.json", lp.solve(basis, target).lighting)
+        >>> len(lp.read_lighting("evening.json").lights)
+        2
+    """
     data: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,
@@ -304,11 +351,22 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             **({"display": q.display} if q.display else {}),
             **({"rounds": q.rounds} if q.rounds > 1 else {}),
         }
-    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def read_lighting(path: str | Path) -> Lighting:
-    """Read what `write_lighting` wrote. Raises LightingError for anything else."""
+    """Read what `write_lighting` wrote.
+
+    Args:
+        path: A lighting.json.
+
+    Raises:
+        LightingError: For anything else.
+
+    Examples:
+        >>> lp.read_lighting("lighting.json").emission["panel"]
+        (2.0, 1.5, 1.0)
+    """
     path = Path(path)
     text = read_text(path, "lighting file", LightingError)
     try:

@@ -55,17 +55,33 @@ class Refinement:
 class Problem:
     """A loss over the pictures that a basis can make, and what the lights may do.
 
-    basis: of all views together; views: basis and target of each (views.py).
-    loss: what a picture costs. squares: the linear problem that stands for it, the loss itself
-    where that is one; before a solve has found better, the painting taken at its word.
-    equations: M and b of these squares, of the basis as it is.
-    reduction: what constraints leave to solve for; full: the same with all lights that `sparse`
-    has not chosen.
-    start: (n, 3), the weights to begin with: lights that reach nothing keep them.
-    unpainted: weight of what is not painted, against the current look.
-    noise_removed: the part of the noise in `equations` that is not in `corrected`, where some was
-    taken out; refinement: the last step by which an answer was improved, if one was.
-    painting: where strokes go, once there are some; strokes: how many there had been.
+    Attributes:
+        basis: Of all views together.
+        views: Basis and target of each view (views.py).
+        loss: What a picture costs.
+        squares: The linear problem that stands for the loss, the loss itself where that is one;
+            before a solve has found better, the painting taken at its word.
+        equations: M and b of these squares, of the basis as it is.
+        constraints: What is asked of the lights.
+        reduction: What constraints leave to solve for.
+        full: The same with all lights that `sparse` has not chosen.
+        start: (n, 3), the weights to begin with: lights that reach nothing keep them.
+        unpainted: Weight of what is not painted, against the current look.
+        method: As of `solve`.
+        corrected: The equations without that part of the noise; None where none was taken out.
+        noise_removed: The part of the noise in `equations` that is not in `corrected`, where some
+            was taken out.
+        refinement: The last step by which an answer was improved, if one was.
+        painting: Where strokes go, once there are some.
+        strokes: How many there had been.
+
+    Examples:
+        >>> problem = lp.Problem.of(basis, target)
+        >>> problem.equations.M.shape
+        (3, 2, 2)
+        >>> brighter = problem.painted((slice(0, 4), slice(0, 8)), (1.0, 0.5, 0.2), 1.0)
+        >>> brighter.strokes
+        1
     """
 
     basis: Basis

@@ -18,12 +18,21 @@ from lightpaint.screen import Shown
 class Solution(Shown):
     """The lighting that comes closest to a target, and the problem it solves.
 
-    problem: with the squares that stand for its loss where the lighting is, and the lights that
-    `sparse` has chosen.
-    tried: with `sparse`, numbers of lights and the weights (n, 3) of the best such.
-    reweighting: how these squares came about, where the loss has others elsewhere.
-    whole: of one of several views, the solution of all of them: the lighting need not be the best
-    for this view.
+    Attributes:
+        problem: With the squares that stand for its loss where the lighting is, and the lights that
+            `sparse` has chosen.
+        lighting: The emission of each light, with its certificate.
+        tried: With `sparse`, numbers of lights and the weights (n, 3) of the best such.
+        reweighting: How these squares came about, where the loss has others elsewhere.
+        whole: Of one of several views, the solution of all of them: the lighting need not be the
+            best for this view.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> np.round(solution.lighting.emission["panel"], 3).tolist()
+        [2.0, 1.5, 1.0]
+        >>> solution.certificate.converged
+        True
     """
 
     problem: Problem

@@ -59,12 +59,21 @@ APART = 0.25
 class Suggestion:
     """A point light to add to the scene.
 
-    position: in units of the scene. emission: intensity per channel, W/sr.
-    gain_share: of what is missed (energy), what this light takes away beside those before it.
-    missed_share: what is left of it, with this light and those before it.
-    xml: the emitter, to be put into the scene's XML as it is.
-    seen_at: where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
-    without, with_it: (h, w, 3) linear, the solved picture before and with this light, small.
+    Attributes:
+        name: That no light of the scene has.
+        position: In units of the scene.
+        emission: Intensity per channel, W/sr.
+        gain_share: Of what is missed (energy), what this light takes away beside those before it.
+        missed_share: What is left of it, with this light and those before it.
+        xml: The emitter, to be put into the scene's XML as it is.
+        seen_at: Where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
+        without: (h, w, 3) linear, the solved picture before this light, small.
+        with_it: (h, w, 3), the same with it.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> for light in lp.suggest_lights(scene, basis, lp.solve(basis, target)):
+        ...     print(light.xml)
     """
 
     name: str
@@ -105,11 +114,22 @@ def suggest_lights(
 ) -> tuple[Suggestion, ...]:
     """Point lights that would bring `solution` closest to its painting, the best first.
 
-    scene: what `basis` was made of, on the same film or a larger one. count: at most so many;
-    none where nothing is missed, or no light would surely take a hundredth of it away.
-    seed: of the positions and of their images.
+    Args:
+        scene: What `basis` was made of, on the same film or a larger one.
+        basis: What the solution was solved with.
+        solution: Of that one view.
+        count: At most so many; none where nothing is missed, or no light would surely take a
+            hundredth of it away.
+        seed: Of the positions and of their images.
+        progress: Hears how far the work has come.
 
-    Raises SceneError for scenes that one pass cannot serve (see `check_suggestible`).
+    Raises:
+        SceneError: For scenes that one pass cannot serve (see `check_suggestible`).
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> lp.suggest_lights(scene, basis, lp.solve(basis, target))  # nothing is missed
+        ()
     """
     if count < 1:
         raise SceneError(f"{count} lights cannot be suggested: ask for one or more")

@@ -34,16 +34,26 @@ PRECISION = 1e-5
 class Verification(Shown):
     """How far prediction and verification are apart.
 
-    verified: the independent render. Where the prediction is smaller by a whole factor, all
-    else is about its block means, at the size (h, w) of the prediction.
-    z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
-    z_rms: root mean square of the differences of 8x8 blocks in their own standard errors.
-    About 1 if there is only noise; a little more where the noise is rare bright samples.
-    z_mean: (3,), difference of the whole image's sum, in standard errors.
-    z_pattern: how alike the differences of the two halves are, block by block, in standard
-    errors (see `_pattern`): noise is not alike, an error in some place is.
-    rmse: of the pixels, in radiance; noise_rmse: what noise alone would give.
-    delta_e_mean, delta_e_95: CIEDE2000 at the exposure of the report: mean, 95th percentile.
+    Attributes:
+        verified: The independent render. Where the prediction is smaller by a whole factor, all
+            else is about its block means, at the size (h, w) of the prediction.
+        z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
+        z_rms: Root mean square of the differences of 8x8 blocks in their own standard errors. About
+            1 if there is only noise; a little more where the noise is rare bright samples.
+        z_mean: (3,), difference of the whole image's sum, in standard errors.
+        z_pattern: How alike the differences of the two halves are, block by block, in standard
+            errors (see `_pattern`): noise is not alike, an error in some place is.
+        rmse: Of the pixels, in radiance.
+        noise_rmse: What noise alone would give.
+        delta_e_mean: CIEDE2000 at the exposure of the report, mean.
+        delta_e_95: The same, 95th percentile.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> relit = lp.relight(scene, lighting, "relit.xml")
+        >>> lp.verify(lp.combine(basis, lighting), relit, spp=4)
+        Verification(agrees, ...)
     """
 
     verified: Estimate
@@ -85,9 +95,20 @@ def verify(
 ) -> Verification:
     """Render the relit scene with samples no basis ever uses, and compare.
 
-    predicted: of the size of `relit`, or smaller by a whole factor.
-    spp: samples per pixel of `relit` (the scene's own number by default).
-    stream: random numbers to draw; a repeated verification takes others than the first.
+    Args:
+        predicted: Of the size of `relit`, or smaller by a whole factor.
+        relit: What `relight` returns.
+        spp: Samples per pixel of `relit` (the scene's own number by default).
+        seed: Any number >= 0.
+        stream: Random numbers to draw; a repeated verification takes others than the first.
+        progress: Hears how far the work has come.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> relit = lp.relight(scene, lighting, "relit.xml")
+        >>> lp.verify(lp.combine(basis, lighting), relit, spp=4).agrees
+        True
     """
     if whole_factor(relit.size, predicted.size) is None:
         raise SizeError(

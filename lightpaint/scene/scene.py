@@ -35,13 +35,29 @@ MAX_NAME = 1000
 class Scene(Shown):
     """A parsed scene, seen through one of its sensors.
 
-    film: of the sensor it is seen through.
-    spp: samples per pixel the scene itself asks for.
-    has_null: whether rays may pass a surface as if it were not there.
-    emitters: all of them; lights: what is adjusted, and last what is kept, if anything is.
-    content: hash of all XML files and assets, the parameters and the sensor; the same on a
-    reduced film.
-    lights_file: the lights file that went into `lights`, if one did; asked: what it asks of them.
+    Attributes:
+        path: Of its XML.
+        parameters: Values of the `$name` parameters.
+        film: Of the sensor it is seen through.
+        sensor_names: Ids of all sensors.
+        spp: Samples per pixel the scene itself asks for.
+        integrator: Its plugin and options.
+        has_media: Whether there is fog or the like.
+        has_null: Whether rays may pass a surface as if it were not there.
+        emitters: All of them.
+        lights: What is adjusted, and last what is kept, if anything is.
+        files: All XML files.
+        content: Hash of all XML files and assets, the parameters and the sensor; the same on a
+            reduced film.
+        lights_file: The lights file that went into `lights`, if one did.
+        asked: What it asks of them.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> [light.name for light in scene.lights]
+        ['panel', 'bulb']
+        >>> scene.light("bulb").emission
+        (0.5, 0.6..., 0.69...)
     """
 
     path: Path
@@ -206,19 +222,30 @@ def load_scene(
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
-    sensor: index or id of the sensor to look through (the first by default).
-    parameters: values for the `$name` parameters of the XML (Mitsuba's `-D`).
-    variant: Mitsuba variant to run, where the process has none yet.
-    lights: names or patterns (`window_*`) of the lights to adjust; the others are kept as
-    they are. All by default.
-    groups: name → names or patterns of emitters that are adjusted as one light.
-    lights_file: TOML with such lights and groups, instead of the one beside the scene.
-    `lights` replaces what it lists, `groups` are added to its own or replace namesakes;
-    without `lights` they are adjusted beside what it lists.
-    use_lights_file: False leaves the one beside the scene alone.
+    Args:
+        path: Mitsuba XML.
+        sensor: Index or id of the sensor to look through (the first by default).
+        parameters: Values for the `$name` parameters of the XML (Mitsuba's `-D`).
+        variant: Mitsuba variant to run, where the process has none yet.
+        lights: Names or patterns (`window_*`) of the lights to adjust; the others are kept as they
+            are. All by default.
+        groups: Name → names or patterns of emitters that are adjusted as one light.
+        lights_file: TOML with such lights and groups, instead of the one beside the scene. `lights`
+            replaces what it lists, `groups` are added to its own or replace namesakes; without
+            `lights` they are adjusted beside what it lists.
+        use_lights_file: False leaves the one beside the scene alone.
 
-    Raises SceneError, with Mitsuba's own message where it refuses the scene, and
-    BackendError if Mitsuba cannot run.
+    Raises:
+        SceneError: With Mitsuba's own message where it refuses the scene.
+        BackendError: If Mitsuba cannot run.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> [light.name for light in scene.lights]
+        ['panel', 'bulb']
+        >>> lp.load_scene("room.xml", lights=["bulb"]).lights
+        (Light('bulb', ...),
+         Light('rest', ..., kept))
     """
     backend = use_variant(variant)
     path = Path(path)

@@ -113,11 +113,19 @@ class Tie:
 class Constraints:
     """What is asked of the lights, besides to come close to the painting.
 
-    lights: name or pattern, what is asked of it, and what errors call it. What stands later
-    replaces what it contradicts; `of` puts patterns before names.
-    prefer_current: strength of the pull towards the present lighting. At 1 a light that
-    changes costs as much as if the whole picture it makes, painted or not, were missed.
-    sparse: how many lights may be on at most.
+    Attributes:
+        lights: Name or pattern, what is asked of it, and what errors call it. What stands later
+            replaces what it contradicts; `of` puts patterns before names.
+        ties: Lights on one dimmer.
+        prefer_current: Strength of the pull towards the present lighting. At 1 a light that changes
+            costs as much as if the whole picture it makes, painted or not, were missed.
+        sparse: How many lights may be on at most.
+
+    Examples:
+        >>> asked = lp.Constraints.of({"panel": {"lock": True}})
+        >>> lighting = lp.solve(basis, target, constraints=asked).lighting
+        >>> np.round(lighting.emission["panel"], 3).tolist()
+        [4.0, 3.0, 2.0]
     """
 
     lights: tuple[tuple[str, Mapping[str, Any], str], ...] = ()

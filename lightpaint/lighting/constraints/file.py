@@ -14,8 +14,17 @@ MAX_SAID = 1000
 def read_constraints(path: str | Path) -> Constraints:
     """What the lights file at `path` asks of the lights; nothing if it only chooses them.
 
-    Raises SceneError for a file that is missing or no TOML, ConstraintError for a value that
-    means nothing, naming file, light and key.
+    Args:
+        path: TOML (docs/formats.md).
+
+    Raises:
+        SceneError: For a file that is missing or no TOML.
+        ConstraintError: For a value that means nothing, naming file, light and key.
+
+    Examples:
+        >>> asked = lp.read_constraints("hall.lights.toml")
+        >>> lp.solve(basis, target, constraints=asked).lighting.emission["bulb"]
+        (0.0, 0.0, 0.0)
     """
     return constraints_of(Asked.of(Path(path), read_keys(Path(path))))
 
