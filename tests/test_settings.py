@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint import LightpaintError, Settings, View
+from lightpaint import LightpaintError, Settings, ViewTransform
 
 WRONG = {
     "unpainted": (-0.1, math.nan, math.inf, "1", None, True),
     "method": ("Gauss-Seidel", "newton", None, ["polished"]),
     "resize": ("yes", 1, None, 0),
     "space": ("Display", None, 1),
-    "view": ("srgb", ("agx", 1.0)),
+    "transform": ("srgb", ("agx", 1.0)),
     "spp": (1, 0, -4, 2.5, "64", True, math.inf),
     "time_s": (0, -1, math.nan, math.inf, "3", True),
     "seed": (-1, 0.5, "0", None, False),
@@ -33,7 +33,7 @@ RIGHT = {
     "method": ("polished", "gauss-seidel"),
     "resize": (True, False),
     "space": ("linear", "display"),
-    "view": (None, View("agx", 1.0)),
+    "transform": (None, ViewTransform("agx", 1.0)),
     "spp": (None, 2, np.int64(64)),
     "time_s": (None, 0.1, 3),
     "seed": (0, 2**70, np.uint8(3)),

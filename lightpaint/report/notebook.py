@@ -37,7 +37,7 @@ MOST, SHEET, ACROSS = 10, 12, 4
 #: Pixels of a picture in a page, and width of one that stands alone.
 PIXELS, WIDTH = 2**16, 480
 
-CELL = 'style="text-align: left; padding: 0 1em 0 0"'
+CELL = "text-align: left; padding: 0 1em 0 0"
 
 
 @singledispatch
@@ -168,7 +168,8 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], sizes: Any) -> s
 
     def cells(kind: str, texts: Iterable[str]) -> str:
         made = (x if isinstance(x, _Html) else escape(_cut(x)) for x in texts)
-        return f"<tr>{''.join(f'<{kind} {CELL}>{x}</{kind}>' for x in made)}</tr>"
+        row = "".join(f'<{kind} style="{CELL}">{x}</{kind}>' for x in made)
+        return f"<tr>{row}</tr>"
 
     chosen = _most(np.asarray(sizes, np.float64), MOST)
     body = "".join(cells("td", rows[k]) for k in chosen)
