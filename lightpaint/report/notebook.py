@@ -4,7 +4,7 @@
 colours. Names come from other people's files and are escaped here.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import singledispatch
 from html import escape
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.colour.display import choose_exposure, to_8_bit
@@ -56,51 +56,52 @@ def png_of(shown: object) -> bytes | None:
 def scene_html(scene: Scene) -> str:
     """Its lights: what they are, how bright, and where."""
     (height, width), lights = scene.size, scene.lights
-    seen = [photometry(x.emission, unit=x.unit, unit_flux=x.unit_flux) for x in lights]
-    rows = [
-        (
-            *(light.name, light.plugin, _swatch(light.emission, its)),
-            *(_rgb(light.emission), light.unit, light.form),
-        )
-        for light, its in zip(lights, seen, strict=True)
-    ]
+
+    def row(k: int) -> Sequence[str]:
+        x = lights[k]
+        colour = _swatch(x.emission, photometry(x.emission, unit=x.unit, unit_flux=x.unit_flux))
+        return x.name, x.plugin, colour, _rgb(x.emission), x.unit, x.form
+
     return (
         f"<p>{escape(scene.path.name)}: {len(lights)} lights, {width} × {height} through "
         f"{escape(scene.sensor_names[scene.sensor])}</p>"
-        + _table(("light", "kind", "colour", "emission", "unit", "form"), rows, _sizes(seen))
+        + _table(("light", "kind", "colour", "emission", "unit", "form"), row, _sizes(lights))
     )
 
 
 @html_of.register
 def lighting_html(lighting: Lighting) -> str:
     """Its lights and, of a solve, how good that was."""
-    seen = [lighting.photometry(light) for light in lighting.lights]
-    rows = [
-        (
-            *(light.name, _swatch(light.emission, its), _rgb(light.emission), light.unit),
-            *(" ".join(its.amounts), "kept" if light.is_fixed else light.constraint),
-        )
-        for light, its in zip(lighting.lights, seen, strict=True)
-    ]
+
+    def row(k: int) -> Sequence[str]:
+        light = lighting.lights[k]
+        seen = lighting.photometry(light)
+        asked = "kept" if light.is_fixed else light.constraint
+        colour, output = _swatch(light.emission, seen), " ".join(seen.amounts)
+        return light.name, colour, _rgb(light.emission), light.unit, output, asked
+
     told = "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
     heads = ("light", "colour", "emission", "unit", "output", "asked")
-    return told + _table(heads, rows, _sizes(seen))
+    return told + _table(heads, row, _sizes(lighting.lights))
 
 
 @html_of.register
 def solution_html(solution: Solution) -> str:
     """What happens to each light, of those that change the picture most, and how good that is."""
-    basis, lighting, rows = solution.basis, solution.lighting, []
-    for light, setting in zip(basis.lights, lighting.lights, strict=True):
+    basis, lighting = solution.basis, solution.lighting
+
+    def row(k: int) -> Sequence[str]:
+        light, setting = basis.lights[k], lighting.lights[k]
         # What a page of the report stacks stands in a line here.
-        stops = change(light, setting, solution.certificate.unreached).replace("<small>", " ")
-        swatch = _swatch(setting.emission, lighting.photometry(setting))
+        told = change(light, setting, solution.certificate.unreached)
+        told = told.replace("<small>", " ").replace("</small>", "")
+        colour = _swatch(setting.emission, lighting.photometry(setting))
         now, new = _rgb(light.emission), _rgb(setting.emission)
-        stops = stops.replace("</small>", "")
-        rows.append((light.name, swatch, now, new, stops, setting.constraint))
+        return light.name, colour, now, new, told, setting.constraint
+
     moved = np.abs(solution.weights - basis.present_weights) * basis.totals @ LUMINANCE
     heads = ("light", "colour", "now", "new", "change", "asked")
-    return f"<p>{escape(str(solution.certificate))}</p>" + _table(heads, rows, moved)
+    return f"<p>{escape(str(solution.certificate))}</p>" + _table(heads, row, moved)
 
 
 @html_of.register
@@ -163,8 +164,8 @@ def target_png(target: Target) -> bytes:
     return png_bytes(to_8_bit(_wide(share * paint + (1 - share) * rest)))
 
 
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], sizes: Any) -> str:
-    """Rows of the lights of largest size, and how many are left; cells that are no HTML escaped."""
+def _table(heads: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> str:
+    """The rows of the largest, and how many are left; cells that are no HTML are escaped."""
 
     def cells(kind: str, texts: Iterable[str]) -> str:
         made = (x if isinstance(x, _Html) else escape(_cut(x)) for x in texts)
@@ -172,8 +173,8 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], sizes: Any) -> s
         return f"<tr>{row}</tr>"
 
     chosen = _most(np.asarray(sizes, np.float64), MOST)
-    body = "".join(cells("td", rows[k]) for k in chosen)
-    left = len(rows) - len(chosen)
+    body = "".join(cells("td", row(k)) for k in chosen)
+    left = len(sizes) - len(chosen)
     more = f"<p>… and {left} more, which matter less</p>" if left else ""
     return f"<table>{cells('th', heads)}{body}</table>{more}"
 
@@ -187,10 +188,12 @@ def _most(sizes: Any, count: int) -> list[int]:
     return sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
 
 
-def _sizes(seen: Sequence[Photometry]) -> list[float]:
+def _sizes(lights: Sequence[Any]) -> Doubles:
     """How bright lights are: their flux or, where that is not known of all, their emission."""
-    known = all(x.flux_y is not None for x in seen)
-    return [float((x.flux_y if known else x.y) or 0.0) for x in seen]
+    emission = np.array([light.emission for light in lights])
+    if all(light.unit_flux is not None for light in lights):
+        emission = emission * [light.unit_flux for light in lights]
+    return np.asarray(emission @ LUMINANCE)
 
 
 def _cut(text: str, room: int = 120) -> str:
