@@ -10,9 +10,13 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     render_template             Scene → a folder to paint on
     read_target                 painting → Target                    what is wanted, and where?
     solve                       Basis, Target → Solution             which lighting is closest?
+    analyse                     Solution → Analysis of each view     how sure, and why not closer?
     combine                     Basis, Lighting → Estimate           what will it look like?
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
+
+The examples below are tested: `lp` is this package, `np` NumPy, `basis` one of the scene room.xml,
+whose lights are a panel and a bulb, and `target` a painting of it.
 
 `paint_with_light` is all of it in one call, for one view or several: a `Job`, and a `run` of it.
 Each name is imported when it is first used (PEP 562): importing this loads no
@@ -31,17 +35,28 @@ if TYPE_CHECKING:
     from lightpaint.basis.lightgroups.read import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.read import read_light_groups as read_light_groups
     from lightpaint.basis.render.render import render_basis as render_basis
+    from lightpaint.colour.transform import TransformChoice as TransformChoice
     from lightpaint.colour.transform import ViewTransform as ViewTransform
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
     from lightpaint.images.png import display_picture as display_picture
     from lightpaint.job import Job as Job
+    from lightpaint.lighting.analysis.analyse import Analysis as Analysis
+    from lightpaint.lighting.analysis.analyse import analyse as analyse
+    from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
+    from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
+    from lightpaint.lighting.analysis.refine import refine as refine
+    from lightpaint.lighting.analysis.uncertainty import Uncertainty as Uncertainty
+    from lightpaint.lighting.analysis.uncertainty import correct_noise as correct_noise
+    from lightpaint.lighting.analysis.uncertainty import error_bars as error_bars
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
     from lightpaint.lighting.constraints.file import read_constraints as read_constraints
+    from lightpaint.lighting.lighting import Certificate as Certificate
     from lightpaint.lighting.lighting import Lighting as Lighting
     from lightpaint.lighting.lighting import combine as combine
     from lightpaint.lighting.lighting import read_lighting as read_lighting
     from lightpaint.lighting.lighting import write_lighting as write_lighting
+    from lightpaint.lighting.problem import Problem as Problem
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.pipeline import paint_with_light as paint_with_light
@@ -66,25 +81,35 @@ if TYPE_CHECKING:
 
 #: Public name → its module, below this package: what type checkers read above, for Python.
 _HOMES = {
+    "Analysis": "lighting.analysis.analyse",
     "Basis": "basis.basis",
+    "Certificate": "lighting.lighting",
     "Constraints": "lighting.constraints.constraints",
+    "Diagnosis": "lighting.analysis.diagnosis",
     "Estimate": "images.estimate",
+    "Job": "job",
     "LightGroups": "basis.lightgroups.read",
     "Lighting": "lighting.lighting",
     "LightpaintError": "errors",
-    "Job": "job",
     "Look": "results",
     "Painting": "sources",
+    "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "sources",
     "Settings": "settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
     "Target": "target.target",
+    "TransformChoice": "colour.transform",
+    "Uncertainty": "lighting.analysis.uncertainty",
     "Verification": "relit.verification",
     "ViewTransform": "colour.transform",
+    "analyse": "lighting.analysis.analyse",
     "combine": "lighting.lighting",
+    "correct_noise": "lighting.analysis.uncertainty",
+    "diagnose": "lighting.analysis.diagnosis",
     "display_picture": "images.png",
+    "error_bars": "lighting.analysis.uncertainty",
     "load_scene": "scene.scene",
     "paint_with_light": "pipeline",
     "read_basis": "basis.file",
@@ -92,6 +117,7 @@ _HOMES = {
     "read_light_groups": "basis.lightgroups.read",
     "read_lighting": "lighting.lighting",
     "read_target": "target.read",
+    "refine": "lighting.analysis.refine",
     "relight": "relit.relight",
     "render_basis": "basis.render.render",
     "render_template": "renders",

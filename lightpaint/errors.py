@@ -34,7 +34,15 @@ __all__ = [
 
 
 class LightpaintError(Exception):
-    """Base of all errors that a user of lightpaint can cause and mend."""
+    """Base of all errors that a user of lightpaint can cause and mend.
+
+    Examples:
+        >>> try:
+        ...     lp.read_basis("evening.exr")
+        ... except lp.LightpaintError as error:
+        ...     print(error)
+        no such image file: evening.exr
+    """
 
 
 class BackendError(LightpaintError):

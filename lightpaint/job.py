@@ -19,7 +19,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
@@ -28,6 +28,7 @@ from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_t
 from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import shortly
 from lightpaint.settings import Settings
 from lightpaint.sources import (
     BasisFile,
@@ -61,17 +62,32 @@ class PaintedView:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One lighting to be found, for one view or several. Raises LightpaintError for what cannot be.
+    """One lighting to be found, for one view or several; checked whole when it is born.
 
-    scenes: the scene through the sensor of each view; none to solve from `basis` alone, without
-    a renderer. targets: what each view is to show. folder: receives the results.
-    basis: made before of the one view; taken from the cache or rendered if not given. Of light
-    groups that another renderer made, `folder` receives the answer for other programs, too.
-    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
-    by_sensor: whether pictures go to a folder for each sensor, as they do of several.
+    Attributes:
+        scenes: The scene through the sensor of each view; none to solve from `basis` alone, without
+            a renderer.
+        targets: What each view is to show.
+        folder: Receives the results.
+        basis: Made before of the one view; taken from the cache or rendered if not given. Of light
+            groups that another renderer made, `folder` receives the answer for other programs, too.
+        constraints: What is asked of the lights; it goes before what the scene's lights file asks.
+        settings: How it is to be answered.
+        by_sensor: Whether pictures go to a folder for each sensor, as they do of several.
+        views: Found at birth: each view, with what it needs.
+        asked: Found at birth: all constraints, those of the lights file first.
+        display: Found at birth: the view transform to come closest in; None for linear light.
+        remarks: Found at birth: what is worth saying to a person, in plain text.
 
-    Found at birth: views, each with what it needs; asked, all constraints; display, the view
-    transform to come closest in; remarks, what is worth saying to a person, in plain text.
+    Raises:
+        LightpaintError: For what cannot be.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> scenes, targets = (lp.SceneFile("room.xml"),), (lp.Painting("painting.exr"),)
+        >>> job = lp.Job(scenes, targets, Path("evening"), settings=lp.Settings(spp=4))
+        >>> lp.Job.from_json(job.to_json()) == job
+        True
     """
 
     scenes: tuple[Scene | SceneFile, ...]
@@ -87,6 +103,8 @@ class Job:
     remarks: tuple[str, ...] = field(init=False, repr=False)
     _relit: tuple[Path, ...] = field(init=False, repr=False)
 
+    __repr__ = shortly
+
     def __post_init__(self) -> None:
         self._check_counts()
         self._check_nothing_idle()
@@ -98,7 +116,10 @@ class Job:
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
             folders = [self.folder / name for name in check_each_once(scenes)]
-        asked = all_constraints(scenes[0] if scenes else None, self.constraints)
+        told = scenes[0] if scenes else basis
+        asked = self.constraints
+        if isinstance(told, Scene | Basis):
+            asked = constraints_of(told.asked).and_then(asked)
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
         # Names what cannot be had before it renders.
@@ -288,11 +309,3 @@ def check_each_once(scenes: Sequence[Scene]) -> list[str]:
         if Path(name).name != name or name in ("..", ""):
             raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
     return names
-
-
-def all_constraints(scene: Scene | None, given: Constraints | None) -> Constraints:
-    """What the lights file of `scene` asks, if it has one, and then `given`."""
-    asked = given or Constraints()
-    if scene is None or scene.lights_file is None:
-        return asked
-    return read_constraints(scene.lights_file).and_then(asked)

@@ -42,11 +42,23 @@ AnyTarget = str | Path | Target
 
 
 def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = None) -> list[Look]:
-    """Do `job`: find its lighting, prove it, and write results to its folder; a look for each view.
+    """Do `job`: find its lighting, prove it, and write results to its folder.
 
-    progress: hears how far the work has come and, if it is a `Listener`, remarks.
-    bases: of the views on their films, where an earlier run has obtained them; the list is
-    emptied, so that no pixel is held twice.
+    Args:
+        job: What is asked.
+        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
+        bases: Of the views on their films, where an earlier run has obtained them; the list is
+            emptied, so that no pixel is held twice.
+
+    Returns:
+        A look for each view.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
+        >>> [look] = lp.run(job)
+        >>> np.round(look.lighting.emission["panel"], 3).tolist()
+        [2.0, 1.5, 1.0]
     """
     listen, settings = listener(progress), job.settings
     for remark in job.remarks:
@@ -104,21 +116,40 @@ def paint_with_light(
 ) -> Look | list[Look]:
     """Find the lighting of `scene` that comes closest to a painting, and prove it.
 
-    scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer. For several
-    views a list: the same scene, loaded through another sensor each; `target` is then a list of
-    what each is to show, and a list comes back.
-    folder: receives lighting.json, predicted.exr, comparison.png and report.html and, with
-    a scene, relit.xml and verified.exr; of a list, the pictures lie in a folder for each sensor.
-    basis: one made before of the same scene; taken from the cache or rendered if not given. Of
-    light groups that another renderer made, `folder` receives the answer for other programs, too.
-    For several views a list, which is emptied, so that no pixel is held twice.
-    constraints: what is asked of the lights; it goes before what the scene's lights file asks.
-    mask: as `read_target` takes it, where `target` is a path.
-    sensor, parameters, lights, groups: as `load_scene` takes them, where `scene` is a path.
-    progress: hears how far the work has come and, if it is a `Listener`, remarks.
-    settings: any of `Settings`, by name, like spp=64.
+    Args:
+        scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer. For several
+            views a list: the same scene, loaded through another sensor each; `target` is then a
+            list of what each is to show, and a list comes back.
+        target: Painting, as a file or read; for several views a list.
+        folder: Receives lighting.json, predicted.exr, comparison.png and report.html and, with a
+            scene, relit.xml and verified.exr; of a list, the pictures lie in a folder for each
+            sensor.
+        basis: One made before of the same scene; taken from the cache or rendered if not given. Of
+            light groups that another renderer made, `folder` receives the answer for other
+            programs, too. For several views a list, which is emptied, so that no pixel is held
+            twice.
+        constraints: What is asked of the lights; it goes before what the scene's lights file asks.
+        mask: As `read_target` takes it, where `target` is a path.
+        sensor: Index or id, where `scene` is a path.
+        parameters: Values of `$name` parameters, where `scene` is a path.
+        lights: Names or patterns of those to adjust, where `scene` is a path.
+        groups: Emitters that are one light, by its name, where `scene` is a path.
+        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
+        **settings: Any of `Settings`, by name, like spp=64.
 
-    Raises LightpaintError; all that a user gives is checked before anything is rendered.
+    Returns:
+        The look; of a list of views, a list.
+
+    Raises:
+        LightpaintError: For what cannot be; all that a user gives is checked before anything is
+            rendered.
+
+    Examples:
+        >>> look = lp.paint_with_light("room.xml", "painting.exr", "evening", spp=4)
+        >>> look
+        Look(of painting: The lighting meets ... % of the painting ...)
+        >>> look.verification.agrees
+        True
     """
     how = {
         "sensor": sensor,
@@ -224,10 +255,15 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
 def _obtained(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
     """The basis of each view: handed in, given with the job, kept, or rendered."""
     if bases is None:
-        return [_basis_of(job, view, listen) for view in job.views]
-    made = list(bases)
-    bases.clear()
-    return made
+        made = [_basis_of(job, view, listen) for view in job.views]
+    else:
+        made = list(bases)
+        bases.clear()
+    # What the scene's lights file asks by now, whenever they were made.
+    return [
+        basis if view.scene is None else basis.asking(view.scene.asked)
+        for basis, view in zip(made, job.views, strict=True)
+    ]
 
 
 def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:

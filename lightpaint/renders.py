@@ -23,7 +23,7 @@ THUMBNAIL = Preset(32, 2**14)
 
 def render_template(
     scene: Scene,
-    folder: Path,
+    folder: str | Path,
     *,
     transform: ViewTransform | None = None,
     spp: int | None = None,
@@ -32,7 +32,20 @@ def render_template(
 ) -> list[Path]:
     """Render something to paint on into `folder`, and return its files (docs/targets.md).
 
-    transform: how the look becomes a picture; sRGB by default, at an exposure that shows something.
+    Args:
+        scene: What is to be painted.
+        folder: Receives the files.
+        transform: How the look becomes a picture; sRGB by default, at an exposure that shows
+            something.
+        spp: Samples per pixel (the scene's own number by default).
+        seed: Any number >= 0.
+        progress: Hears how far the work has come.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> files = lp.render_template(scene, "template", spp=4)
+        >>> "template.png" in [file.name for file in files]
+        True
     """
     look = render(
         scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
@@ -49,7 +62,7 @@ def render_template(
         albedo=surfaces.albedo,
     )
     return write_template(
-        folder,
+        Path(folder),
         template,
         normals=surfaces.normal,
         depth=surfaces.depth,

@@ -20,7 +20,9 @@ from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import write_comparison
+from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
+from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
@@ -53,9 +55,20 @@ RESULTS = (
 class Look:
     """One painting and its answer.
 
-    relit and verification are None where there was only a saved basis and no scene.
-    analysis: how sure the lights are, and why the painting is not met. suggestions: lights that
-    would help most, None if they were not asked for.
+    Attributes:
+        target: What was wanted, at the size of the basis.
+        basis: What it was solved with.
+        solution: The answer, with its errors and what holds its lights.
+        predicted: Σ w_i Φ_i, what it will look like.
+        relit: The scene as it was relit; None where there was only a saved basis.
+        verification: Prediction against a render; None without a scene.
+        analysis: How sure the lights are, and why the painting is not met.
+        suggestions: Lights that would help most, None if they were not asked for.
+
+    Examples:
+        >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
+        >>> look.lighting.emission["panel"] == look.solution.lighting.emission["panel"]
+        True
     """
 
     target: Target
@@ -66,6 +79,13 @@ class Look:
     verification: Verification | None
     analysis: Analysis
     suggestions: tuple[Suggestion, ...] | None = None
+
+    def __repr__(self) -> str:
+        said = verdict(self.solution, self.predicted, self.verification)
+        return f"Look(of {self.target.name}: {said})"
+
+    def _repr_html_(self) -> str:
+        return look_html(self.target, self.solution, self.predicted, self.verification)
 
     @property
     def uncertainty(self) -> Uncertainty | None:

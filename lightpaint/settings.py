@@ -19,35 +19,41 @@ MAX_REFINE = 100
 
 @dataclass(frozen=True)
 class Settings:
-    """How a painting is to be answered. Raises LightpaintError for a value that means nothing.
+    """How a painting is to be answered.
 
-    What is solved:
-    unpainted: weight of unpainted pixels against the current look.
-    method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
-    resize: whether a target of another size is resampled.
-    space: `linear`, or `display` to come closest in what a display shows, which is `transform`;
-    None for that of the painting or, where it holds light, sRGB at an exposure that shows
-    something.
+    Attributes:
+        unpainted: Weight of unpainted pixels against the current look.
+        method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
+        resize: Whether a target of another size is resampled.
+        space: `linear`, or `display` to come closest in what a display shows.
+        transform: The display meant by `space`; None for that of the painting or, where it holds
+            light, sRGB at an exposure that shows something.
+        spp: Samples per pixel of the basis and of the verification.
+        time_s: Instead of spp, seconds in which the basis is rendered, of all views together.
+        seed: Of the basis and, with other random numbers, of the verification.
+        resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
+            verification has the whole film.
+        quality: Preset of spp and resolution, where these are not given. With a time or a preset
+            the verification has about as many samples as the basis, whatever the resolution.
+        use_cache: Whether a basis from an earlier run is taken, and this one kept.
+        noise_correction: Whether the noise's power, or part of it, is taken out of the equations.
+        refine: How often to render the scene as solved, with as many samples as the basis, and
+            improve the answer by what that shows; needs a scene.
+        suggest: How many point lights that would help most are looked for at most; needs a scene,
+            and one view only.
+        cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
+        command: The shell command that asks for this, for the report.
 
-    What is rendered:
-    spp, seed: of the basis and, with other random numbers, of the verification.
-    time_s: instead of spp, seconds in which the basis is rendered, of all views together.
-    resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
-    verification has the whole film.
-    quality: preset of spp and resolution, where these are not given. With a time or a preset
-    the verification has about as many samples as the basis, whatever the resolution.
-    use_cache: whether a basis from an earlier run is taken, and this one kept.
+    Raises:
+        LightpaintError: For a value that means nothing.
 
-    What is done against noise:
-    noise_correction: whether the noise's power, or part of it, is taken out of the equations.
-    refine: how often to render the scene as solved, with as many samples as the basis, and
-    improve the answer by what that shows; needs a scene.
-
-    What is said:
-    suggest: how many point lights that would help most are looked for at most; needs a scene, and
-    one view only.
-    cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
-    command: the shell command that asks for this, for the report.
+    Examples:
+        >>> lp.Settings(spp=64, refine=2).space
+        'linear'
+        >>> lp.Settings(refine=-1)
+        Traceback (most recent call last):
+            ...
+        lightpaint.errors.LightpaintError: refine is -1: expected a whole number >= 0, at most 100
     """
 
     unpainted: float = 0.0

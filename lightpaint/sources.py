@@ -28,7 +28,22 @@ FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene by its file, as `load_scene` takes it; loaded once, when it is first asked for."""
+    """A scene by its file, as `load_scene` takes it; loaded once, when it is first asked for.
+
+    Attributes:
+        path: Mitsuba XML.
+        sensor: Index or id of the sensor.
+        parameters: Values of the `$name` parameters.
+        variant: Mitsuba variant.
+        lights: Names or patterns of the lights to adjust.
+        groups: Emitters that are one light, by its name.
+        lights_file: TOML to read instead of the one beside the scene.
+        use_lights_file: False leaves that one alone.
+
+    Examples:
+        >>> lp.SceneFile("room.xml").content.size
+        (16, 16)
+    """
 
     path: str
     sensor: int | str | None = None
@@ -47,7 +62,21 @@ class SceneFile:
 
 @dataclass(frozen=True)
 class Painting:
-    """A painting by its file, as `read_target` takes it; read once."""
+    """A painting by its file, as `read_target` takes it; read once.
+
+    Attributes:
+        path: EXR, PNG, TIFF, JPEG or a layered file.
+        mask: Picture of what counts.
+        layer: Of an EXR.
+        transform: What it was encoded by.
+        template: Folder of the template it was painted on.
+        find: Whether one is looked for beside it.
+        paint: `look` or `light`.
+
+    Examples:
+        >>> lp.Painting("painting.exr").content.size
+        (16, 16)
+    """
 
     path: str
     mask: str | None = None

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
-from lightpaint.screen import Listed, some_of
+from lightpaint.scene.lights_file import Asked
+from lightpaint.screen import Listed, Shown, some_of
 from lightpaint.version import __version__
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -100,17 +101,27 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Basis:
+class Basis(Shown):
     """The images of a scene lit by one light at a time.
 
-    lights: n of them; their order is the order of everything else.
-    images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
-    half_differences: (n, h, w, 3) float32, half the difference of two independent halves
-    of the samples: the noise of `images`. Where an interrupt left the halves unequal, it
-    overstates the noise a little. Zeros where nothing is known of it (see `knows_noise`).
-    emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
-    learned: (2, cells, emitters) float32, what the renderer found out on the way about which
-    emitter matters where, or None. Going on needs it, nobody else.
+    Attributes:
+        lights: n of them; their order is the order of everything else.
+        images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
+        half_differences: (n, h, w, 3) float32, half the difference of two independent halves of the
+            samples: the noise of `images`. Where an interrupt left the halves unequal, it
+            overstates the noise a little. Zeros where nothing is known of it (see `knows_noise`).
+        emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
+        origin: Where it comes from: scene, sensor, seed, samples.
+        learned: (2, cells, emitters) float32, what the renderer found out on the way about which
+            emitter matters where, or None. Going on needs it, nobody else.
+        asked: What the lights file of the scene asks of the lights, for whoever solves; of memory
+            only, since that file may change.
+
+    Examples:
+        >>> basis.names
+        ('panel', 'bulb')
+        >>> basis.image("bulb").shape
+        (16, 16, 3)
     """
 
     lights: tuple[BasisLight, ...]
@@ -119,6 +130,7 @@ class Basis:
     emitters_seen: Bools
     origin: Origin
     learned: Floats | None = None
+    asked: Asked = field(default_factory=Asked)
 
     def __post_init__(self) -> None:
         n = len(self.lights)
@@ -151,6 +163,10 @@ class Basis:
         if name not in self.names:
             raise BasisError(f"no light {name!r} in the basis: it has {', '.join(self.names)}")
         return np.asarray(self.images[self.names.index(name)])
+
+    def asking(self, asked: Asked) -> "Basis":
+        """This basis, of whose lights that is asked."""
+        return self if self.asked == asked else replace(self, asked=asked)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -34,8 +34,18 @@ MAX_BYTES = 2**36
 _DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
-def write_basis(path: Path, basis: Basis) -> None:
-    """Write `basis` as a multi-part EXR, whole or not at all."""
+def write_basis(path: str | Path, basis: Basis) -> None:
+    """Write `basis` as a multi-part EXR, whole or not at all.
+
+    Args:
+        path: Of the file; `.basis.exr` by custom.
+        basis: To keep.
+
+    Examples:
+        >>> lp.write_basis("again.basis.exr", basis)
+        >>> lp.read_basis("again.basis.exr").names
+        ('panel', 'bulb')
+    """
     parts, sums = [], {}
     for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
         about = json.dumps(_light_fields(light), ensure_ascii=False)
@@ -59,14 +69,22 @@ def write_basis(path: Path, basis: Basis) -> None:
     )
     head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
     parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
-    write_parts(path, parts)
+    write_parts(Path(path), parts)
 
 
-def read_basis(path: Path) -> Basis:
+def read_basis(path: str | Path) -> Basis:
     """Read what `write_basis` wrote, also where another program has put its parts in another order.
 
-    Raises ImageError if the file is damaged, BasisError if it is not a basis or not as it was
-    written.
+    Args:
+        path: What `write_basis` or the command line wrote.
+
+    Raises:
+        ImageError: If the file is damaged.
+        BasisError: If it is not a basis or not as it was written.
+
+    Examples:
+        >>> lp.read_basis("room.basis.exr")
+        Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
     """
     path = Path(path)
     file_length(path, "image file", ImageError, limit=MAX_BYTES)

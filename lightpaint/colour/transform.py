@@ -48,8 +48,18 @@ class Encoding(Protocol):
 class ViewTransform:
     """A view transform at an exposure. Build it with `ViewTransform.parse`, or by its name.
 
-    name: `srgb`, `linear`, `filmic`, `agx` or `ocio:DISPLAY/VIEW`. stops: light is scaled by
-    2^stops before it is encoded. Raises ViewError for a name that there is none of.
+    Attributes:
+        name: `srgb`, `linear`, `filmic`, `agx` or `ocio:DISPLAY/VIEW`.
+        stops: Light is scaled by 2^stops before it is encoded.
+
+    Raises:
+        ViewError: For a name that there is none of.
+
+    Examples:
+        >>> lp.ViewTransform("agx", 1.0).spoken
+        'agx at +1.0 stops'
+        >>> np.round(lp.ViewTransform().encode(np.array([0.0, 0.5, 1.0])), 2).tolist()
+        [0.0, 0.74, 1.0]
     """
 
     name: str = "srgb"
@@ -116,8 +126,16 @@ class ViewTransform:
 class TransformChoice:
     """What somebody asks of a transform, maybe half of one; the rest is what a picture says.
 
-    name: as of `ViewTransform.parse`. stops: of exposure. None for what is left open. Raises
-    ViewError for what no transform has.
+    Attributes:
+        name: As of `ViewTransform.parse`.
+        stops: Of exposure. None for what is left open.
+
+    Raises:
+        ViewError: For what no transform has.
+
+    Examples:
+        >>> lp.TransformChoice(stops=1.0).over(lp.ViewTransform("agx"))
+        ViewTransform(name='agx', stops=1.0)
     """
 
     name: str | None = None

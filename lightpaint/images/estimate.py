@@ -10,6 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
+from lightpaint.screen import shortly
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"
@@ -19,13 +20,21 @@ HALF_DIFFERENCE = "half_difference"
 class Estimate:
     """The mean of two independent renders A and B, and half their difference.
 
-    image: (h, w, 3) float32, (A + B) / 2, linear Rec.709 radiance.
-    half_difference: (h, w, 3) float32, (A − B) / 2. Its square is an unbiased estimate of
-    the variance of `image`, one per pixel and channel.
+    Attributes:
+        image: (h, w, 3) float32, (A + B) / 2, linear Rec.709 radiance.
+        half_difference: (h, w, 3) float32, (A − B) / 2. Its square is an unbiased estimate of the
+            variance of `image`, one per pixel and channel.
+
+    Examples:
+        >>> predicted = lp.combine(basis, lp.solve(basis, target).lighting)
+        >>> predicted.image.shape == predicted.variance().shape
+        True
     """
 
     image: Floats
     half_difference: Floats
+
+    __repr__ = shortly
 
     def __post_init__(self) -> None:
         if self.image.shape != self.half_difference.shape:

@@ -61,7 +61,14 @@ def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = N
 def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:
     """A linear image as a picture that a notebook shows.
 
-    stops: exposure, chosen if not given. zoom: side of a pixel of `image` in the picture.
+    Args:
+        image: (h, w, 3) linear.
+        stops: Exposure, chosen if not given.
+        zoom: Side of a pixel of `image` in the picture.
+
+    Examples:
+        >>> lp.display_picture(target.image, zoom=8).size
+        (128, 128)
     """
     exposure = choose_exposure(image) if stops is None else stops
     pixels = to_8_bit(encode_display(image, stops=exposure))

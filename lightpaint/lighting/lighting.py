@@ -17,6 +17,7 @@ from lightpaint.files import one_line, read_text, write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.bound import Bound
 from lightpaint.records import read_record, strict_json
+from lightpaint.screen import Shown, shortly, some_of
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
@@ -79,17 +80,30 @@ class LightSetting:
 class Certificate:
     """How good a solve is, per colour channel (R, G, B).
 
-    kkt_residual: optimality measure of the solver (see solver.kkt_residual).
-    objective: ‖Ψ − Σ w_i Φ_i‖² under the importance; relative_objective: over ‖Ψ‖².
-    unreached: lights that no weighted pixel sees, which keep what the solve started from, or
-    what is nearest to it under their constraints: their present emission, if no start was given.
-    curve: where only some lights may be on, numbers of lights and the relative residual,
-    √(Σ_c E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
-    bounds: what holds single lights, where a diagnosis has looked, the largest gain first.
-    objective_error: standard error of `objective`, from the noise it was solved with, where that
-    is known.
-    display: the view transform through which the objective is seen; "" where it is of linear light.
-    rounds: linear problems solved one after the other, the last of which is the certified one.
+    Attributes:
+        kkt_residual: Optimality measure of the solver (see solver.kkt_residual).
+        objective: ‖Ψ − Σ w_i Φ_i‖² under the importance.
+        relative_objective: Over ‖Ψ‖².
+        sweeps: Gauss–Seidel sweeps per channel; 0 where Newton steps did it.
+        converged: Whether the KKT residual came below the tolerance.
+        unreached: Lights that no weighted pixel sees, which keep what the solve started from, or
+            what is nearest to it under their constraints: their present emission, if no start was
+            given.
+        curve: Where only some lights may be on, numbers of lights and the relative residual, √(Σ_c
+            E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
+        bounds: What holds single lights, where a diagnosis has looked, the largest gain first.
+        objective_error: Standard error of `objective`, from the noise it was solved with, where
+            that is known.
+        display: The view transform through which the objective is seen; "" where it is of linear
+            light.
+        rounds: Linear problems solved one after the other, the last of which is the certified one.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> solution.certificate.converged
+        True
+        >>> print(solution.certificate)
+        closest there is (KKT residual ...); misses ... of the painting (RMS, worst channel)
     """
 
     kkt_residual: RGB
@@ -104,6 +118,20 @@ class Certificate:
     display: str = ""
     rounds: int = 1
 
+    __repr__ = shortly
+
+    def __str__(self) -> str:
+        told = "closest there is"
+        if self.curve or self.rounds > 1:
+            told = "closest with the lights chosen" if self.curve else "no small change is closer"
+        told = told if self.converged else "stopped before it converged"
+        missed = math.sqrt(max(self.relative_objective))
+        where = f", as {self.display} shows it" if self.display else ""
+        return (
+            f"{told} (KKT residual {max(self.kkt_residual):.1g}); misses {missed:.2g} of the "
+            f"painting{where} (RMS, worst channel)"
+        )
+
     def of(self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None) -> "Certificate":
         """With what is missed, (3,), beside what a black picture would miss, (3,)."""
         norm = np.where(norm2 > 0, norm2, 1)
@@ -116,11 +144,22 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class Lighting:
+class Lighting(Shown):
     """Emissions for named lights.
 
-    certificate: of the solve they come from, if they do.
-    cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+    Attributes:
+        lights: Each with its emission, in the order of the basis.
+        target: Name of what was painted.
+        scene_identity: Of the scene it is for.
+        certificate: Of the solve they come from, if they do.
+        cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+
+    Examples:
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> lighting.emission["panel"]
+        (2.0, 1.5, 1.0)
+        >>> lighting.with_emission("panel", (1, 1, 1)).emission["panel"]
+        (1, 1, 1)
     """
 
     lights: tuple[LightSetting, ...]
@@ -128,6 +167,12 @@ class Lighting:
     scene_identity: str = ""
     certificate: Certificate | None = None
     cd_per_unit: float | None = None
+
+    def __repr__(self) -> str:
+        rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]
+        told = [f"{light.name} {its}" for light, its in zip(self.lights, rgb, strict=True)]
+        target = f" for {self.target}" if self.target else ""
+        return f"Lighting({len(told)} lights{target}: {some_of(told, room=600)})"
 
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]
@@ -244,13 +289,36 @@ class Lighting:
 
 
 def combine(basis: Basis, lighting: Lighting) -> Estimate:
-    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it."""
+    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it.
+
+    Args:
+        basis: Of n lights.
+        lighting: Of the same lights.
+
+    Raises:
+        LightingError: If the two do not name the same lights.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 1e-4
+        True
+    """
     weights = lighting.weights_for(basis)
     return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
 
 
-def write_lighting(path: Path, lighting: Lighting) -> None:
-    """Write lighting.json (docs/formats.md), whole or not at all."""
+def write_lighting(path: str | Path, lighting: Lighting) -> None:
+    """Write lighting.json (docs/formats.md), whole or not at all.
+
+    Args:
+        path: Of the file.
+        lighting: To keep.
+
+    Examples:
+        >>> lp.write_lighting("evening.json", lp.solve(basis, target).lighting)
+        >>> len(lp.read_lighting("evening.json").lights)
+        2
+    """
     data: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,
@@ -284,11 +352,22 @@ def write_lighting(path: Path, lighting: Lighting) -> None:
             **({"display": q.display} if q.display else {}),
             **({"rounds": q.rounds} if q.rounds > 1 else {}),
         }
-    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def read_lighting(path: str | Path) -> Lighting:
-    """Read what `write_lighting` wrote. Raises LightingError for anything else."""
+    """Read what `write_lighting` wrote.
+
+    Args:
+        path: A lighting.json.
+
+    Raises:
+        LightingError: For anything else.
+
+    Examples:
+        >>> lp.read_lighting("lighting.json").emission["panel"]
+        (2.0, 1.5, 1.0)
+    """
     path = Path(path)
     text = read_text(path, "lighting file", LightingError)
     try:

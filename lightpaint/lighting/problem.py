@@ -11,9 +11,10 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.errors import ConstraintError, TargetError
+from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -27,6 +28,7 @@ from lightpaint.lighting.painting import (
 )
 from lightpaint.lighting.reweighted import predicted
 from lightpaint.lighting.views import Views, joint_basis
+from lightpaint.screen import shortly
 from lightpaint.target.target import Target
 
 #: What is compared with the painting: light, or what a display shows of it.
@@ -53,17 +55,33 @@ class Refinement:
 class Problem:
     """A loss over the pictures that a basis can make, and what the lights may do.
 
-    basis: of all views together; views: basis and target of each (views.py).
-    loss: what a picture costs. squares: the linear problem that stands for it, the loss itself
-    where that is one; before a solve has found better, the painting taken at its word.
-    equations: M and b of these squares, of the basis as it is.
-    reduction: what constraints leave to solve for; full: the same with all lights that `sparse`
-    has not chosen.
-    start: (n, 3), the weights to begin with: lights that reach nothing keep them.
-    unpainted: weight of what is not painted, against the current look.
-    noise_removed: the part of the noise in `equations` that is not in `corrected`, where some was
-    taken out; refinement: the last step by which an answer was improved, if one was.
-    painting: where strokes go, once there are some; strokes: how many there had been.
+    Attributes:
+        basis: Of all views together.
+        views: Basis and target of each view (views.py).
+        loss: What a picture costs.
+        squares: The linear problem that stands for the loss, the loss itself where that is one;
+            before a solve has found better, the painting taken at its word.
+        equations: M and b of these squares, of the basis as it is.
+        constraints: What is asked of the lights.
+        reduction: What constraints leave to solve for.
+        full: The same with all lights that `sparse` has not chosen.
+        start: (n, 3), the weights to begin with: lights that reach nothing keep them.
+        unpainted: Weight of what is not painted, against the current look.
+        method: As of `solve`.
+        corrected: The equations without that part of the noise; None where none was taken out.
+        noise_removed: The part of the noise in `equations` that is not in `corrected`, where some
+            was taken out.
+        refinement: The last step by which an answer was improved, if one was.
+        painting: Where strokes go, once there are some.
+        strokes: How many there had been.
+
+    Examples:
+        >>> problem = lp.Problem.of(basis, target)
+        >>> problem.equations.M.shape
+        (3, 2, 2)
+        >>> brighter = problem.painted((slice(0, 4), slice(0, 8)), (1.0, 0.5, 0.2), 1.0)
+        >>> brighter.strokes
+        1
     """
 
     basis: Basis
@@ -83,6 +101,8 @@ class Problem:
     painting: Painting | None = None
     strokes: int = 0
 
+    __repr__ = shortly
+
     @classmethod
     def of(
         cls,
@@ -95,15 +115,18 @@ class Problem:
         method: Method = "polished",
         transform: ViewTransform | None = None,
     ) -> "Problem":
-        """Of one view, or of several: their bases and targets in the same order. As of `solve`."""
-        bases = [basis] if isinstance(basis, Basis) else list(basis)
-        targets = [target] if isinstance(target, Target) else _listed(target)
+        """Of one view, or of several: their bases and targets in the same order. As of `solve`.
+
+        What the bases' scene asks of its lights is heeded; `constraints` go before it.
+        """
+        bases = [basis] if isinstance(basis, Basis) else _bases(basis)
+        targets = [target] if isinstance(target, Target) else _targets(target)
         if not (constraints is None or isinstance(constraints, Constraints)):
             raise ConstraintError(
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
-        asked = constraints or Constraints()
         whole, parts = joint_basis(bases)
+        asked = constraints_of(whole.asked).and_then(constraints or Constraints())
         fitted = [
             what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
             for its, one in zip(targets, parts, strict=True)
@@ -250,7 +273,16 @@ class Problem:
         )
 
 
-def _listed(targets: Any) -> list[Target]:
+def _bases(given: Any) -> list[Basis]:
+    if isinstance(given, Sequence) and given and all(isinstance(x, Basis) for x in given):
+        return list(given)
+    raise BasisError(
+        f"the basis is a {type(given).__name__}: give what render_basis or read_basis returns, or "
+        "the .basis of light groups"
+    )
+
+
+def _targets(targets: Any) -> list[Target]:
     if isinstance(targets, Sequence) and targets and all(isinstance(t, Target) for t in targets):
         return list(targets)
     raise TargetError(f"the target is a {type(targets).__name__}: give what read_target returns")

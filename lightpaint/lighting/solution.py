@@ -11,18 +11,28 @@ from lightpaint.lighting.lighting import Certificate, Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, Space
 from lightpaint.lighting.reweighted import Reweighting
+from lightpaint.screen import Shown
 
 
 @dataclass(frozen=True)
-class Solution:
+class Solution(Shown):
     """The lighting that comes closest to a target, and the problem it solves.
 
-    problem: with the squares that stand for its loss where the lighting is, and the lights that
-    `sparse` has chosen.
-    tried: with `sparse`, numbers of lights and the weights (n, 3) of the best such.
-    reweighting: how these squares came about, where the loss has others elsewhere.
-    whole: of one of several views, the solution of all of them: the lighting need not be the best
-    for this view.
+    Attributes:
+        problem: With the squares that stand for its loss where the lighting is, and the lights that
+            `sparse` has chosen.
+        lighting: The emission of each light, with its certificate.
+        tried: With `sparse`, numbers of lights and the weights (n, 3) of the best such.
+        reweighting: How these squares came about, where the loss has others elsewhere.
+        whole: Of one of several views, the solution of all of them: the lighting need not be the
+            best for this view.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> np.round(solution.lighting.emission["panel"], 3).tolist()
+        [2.0, 1.5, 1.0]
+        >>> solution.certificate.converged
+        True
     """
 
     problem: Problem
@@ -30,6 +40,9 @@ class Solution:
     tried: tuple[tuple[int, Doubles], ...] = ()
     reweighting: Reweighting | None = None
     whole: "Solution | None" = None
+
+    def __repr__(self) -> str:
+        return f"Solution({self.certificate}: {self.lighting})"
 
     @cached_property
     def weights(self) -> Doubles:

@@ -40,22 +40,39 @@ def solve(
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
-    basis, target: of one view; or of several, in the same order, for the one lighting that comes
-    closest to all: a pixel counts the same in whichever view it is, and `views` of the solution
-    has the answer to each.
-    constraints: what else is asked of the lights.
-    unpainted: weight of what is not painted, against the current look.
-    start: lighting to begin with (the present one by default): a good guess saves sweeps, the
-    answer is the same, but for what no painted pixel tells: lights that reach none keep the start.
-    method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
-    certificate of the answer then says that it has not converged.
-    transform: for an answer that comes closest in what this view transform shows, instead of in
-    linear light.
-
     Lights that are kept have weight 1; the others make up what they leave of the target.
 
-    Raises SizeError if basis and target differ in size, TargetError if nothing counts,
-    ConstraintError if a constraint does not fit the lights, BasisError if views differ in lights.
+    Args:
+        basis: Of one view; or of several, for the one lighting that comes closest to all: a pixel
+            counts the same in whichever view it is, and `views` of the solution has the answer to
+            each.
+        target: Of one view; or of several, in the same order.
+        constraints: What else is asked of the lights; it goes before what the lights file of the
+            scene asks, which a basis that was rendered here knows.
+        unpainted: Weight of what is not painted, against the current look.
+        start: Lighting to begin with (the present one by default): a good guess saves sweeps, the
+            answer is the same, but for what no painted pixel tells: lights that reach none keep the
+            start.
+        method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
+            certificate of the answer then says that it has not converged.
+        transform: For an answer that comes closest in what this view transform shows, instead of in
+            linear light.
+
+    Returns:
+        The lighting, the problem it solves, and the certificate.
+
+    Raises:
+        SizeError: If basis and target differ in size.
+        TargetError: If nothing counts.
+        ConstraintError: If a constraint does not fit the lights.
+        BasisError: If views differ in lights.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> np.round(solution.lighting.emission["panel"], 3).tolist()
+        [2.0, 1.5, 1.0]
+        >>> solution
+        Solution(closest there is (KKT residual ...)...)
     """
     problem = Problem.of(
         basis,

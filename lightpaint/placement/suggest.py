@@ -72,11 +72,22 @@ def suggest_lights(
 ) -> tuple[Suggestion, ...]:
     """Point lights that would bring `solution` closest to its painting, the best first.
 
-    scene: what `basis` was made of, on the same film or a larger one. count: at most so many;
-    none where nothing is missed, or no light would surely take a hundredth of it away.
-    seed: of the positions and of their images.
+    Args:
+        scene: What `basis` was made of, on the same film or a larger one.
+        basis: What the solution was solved with.
+        solution: Of that one view.
+        count: At most so many; none where nothing is missed, or no light would surely take a
+            hundredth of it away.
+        seed: Of the positions and of their images.
+        progress: Hears how far the work has come.
 
-    Raises SceneError for scenes that one pass cannot serve (see `check_suggestible`).
+    Raises:
+        SceneError: For scenes that one pass cannot serve (see `check_suggestible`).
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> lp.suggest_lights(scene, basis, lp.solve(basis, target))  # nothing is missed
+        ()
     """
     if count < 1:
         raise SceneError(f"{count} lights cannot be suggested: ask for one or more")

@@ -13,12 +13,21 @@ UNIT = "W/sr"
 class Suggestion:
     """A point light to add to the scene.
 
-    position: in units of the scene. emission: intensity per channel, W/sr.
-    gain_share: of what is missed (energy), what this light takes away beside those before it.
-    missed_share: what is left of it, with this light and those before it.
-    xml: the emitter, to be put into the scene's XML as it is.
-    seen_at: where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
-    without, with_it: (h, w, 3) linear, the solved picture before and with this light, small.
+    Attributes:
+        name: That no light of the scene has.
+        position: In units of the scene.
+        emission: Intensity per channel, W/sr.
+        gain_share: Of what is missed (energy), what this light takes away beside those before it.
+        missed_share: What is left of it, with this light and those before it.
+        xml: The emitter, to be put into the scene's XML as it is.
+        seen_at: Where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
+        without: (h, w, 3) linear, the solved picture before this light, small.
+        with_it: (h, w, 3), the same with it.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> for light in lp.suggest_lights(scene, basis, lp.solve(basis, target)):
+        ...     print(light.xml)
     """
 
     name: str

@@ -26,16 +26,28 @@ from lightpaint.scene.scene import Scene, load_scene
 def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     """Write `scene` with the emissions of `lighting` to `path`, and load it back.
 
-    The file refers to the original folder by relative path, so it loads in plain Mitsuba
-    from where it lies. Included files that hold lights are copied beside it, and so are
-    scaled images of lights that emit one. A light that is off keeps its emitter, is black
-    and is never sampled.
+    The file refers to the original folder by relative path, so it loads in plain Mitsuba from where
+    it lies. Included files that hold lights are copied beside it, and so are scaled images of
+    lights that emit one. A light that is off keeps its emitter, is black and is never sampled.
 
-    Which emitters make up each light is what `lighting` says, however `scene` ties them;
-    those it keeps are not touched. In the scene returned every emitter is a light.
+    Which emitters make up each light is what `lighting` says, however `scene` ties them; those it
+    keeps are not touched. In the scene returned every emitter is a light.
 
-    Raises LightingError if the two name different emitters, SceneError where the XML cannot
-    express the answer, OutputError if `path` cannot be written.
+    Args:
+        scene: What the lighting is for.
+        lighting: Of all its emitters.
+        path: XML to write.
+
+    Raises:
+        LightingError: If the two name different emitters.
+        SceneError: Where the XML cannot express the answer.
+        OutputError: If `path` cannot be written.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> relit = lp.relight(scene, lp.read_lighting("lighting.json"), "relit.xml")
+        >>> relit.light("panel").emission
+        (2.0, 1.5, 1.0)
     """
     path = Path(path)
     scene = scene_of(scene, lighting)

@@ -15,6 +15,7 @@ from lightpaint.colour.display import choose_exposure
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
+from lightpaint.screen import Shown
 
 #: Side of the blocks of pixels over which differences are averaged before they are judged.
 BLOCK = 8
@@ -27,19 +28,29 @@ PRECISION = 1e-5
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Shown):
     """How far prediction and verification are apart.
 
-    verified: the independent render. Where the prediction is smaller by a whole factor, all
-    else is about its block means, at the size (h, w) of the prediction.
-    z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
-    z_rms: root mean square of the differences of 8x8 blocks in their own standard errors.
-    About 1 if there is only noise; a little more where the noise is rare bright samples.
-    z_mean: (3,), difference of the whole image's sum, in standard errors.
-    z_pattern: how alike the differences of the two halves are, block by block, in standard
-    errors (see `_pattern`): noise is not alike, an error in some place is.
-    rmse: of the pixels, in radiance; noise_rmse: what noise alone would give.
-    delta_e_mean, delta_e_95: CIEDE2000 at the exposure of the report: mean, 95th percentile.
+    Attributes:
+        verified: The independent render. Where the prediction is smaller by a whole factor, all
+            else is about its block means, at the size (h, w) of the prediction.
+        z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
+        z_rms: Root mean square of the differences of 8x8 blocks in their own standard errors. About
+            1 if there is only noise; a little more where the noise is rare bright samples.
+        z_mean: (3,), difference of the whole image's sum, in standard errors.
+        z_pattern: How alike the differences of the two halves are, block by block, in standard
+            errors (see `_pattern`): noise is not alike, an error in some place is.
+        rmse: Of the pixels, in radiance.
+        noise_rmse: What noise alone would give.
+        delta_e_mean: CIEDE2000 at the exposure of the report, mean.
+        delta_e_95: The same, 95th percentile.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> relit = lp.relight(scene, lighting, "relit.xml")
+        >>> lp.verify(lp.combine(basis, lighting), relit, spp=4)
+        Verification(agrees, ...)
     """
 
     verified: Estimate
@@ -51,6 +62,13 @@ class Verification:
     noise_rmse: float
     delta_e_mean: float
     delta_e_95: float
+
+    def __repr__(self) -> str:
+        (height, width), word = self.verified.size, "agrees" if self.agrees else "DISAGREES"
+        return (
+            f"Verification({word}, {self.difference:.1f} standard errors apart, limit {LIMIT:g}; "
+            f"ΔE {self.delta_e_mean:.2f}; {width}x{height})"
+        )
 
     @property
     def difference(self) -> float:

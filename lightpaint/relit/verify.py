@@ -20,9 +20,20 @@ def verify(
 ) -> Verification:
     """Render the relit scene with samples no basis ever uses, and compare.
 
-    predicted: of the size of `relit`, or smaller by a whole factor.
-    spp: samples per pixel of `relit` (the scene's own number by default).
-    stream: random numbers to draw; a repeated verification takes others than the first.
+    Args:
+        predicted: Of the size of `relit`, or smaller by a whole factor.
+        relit: What `relight` returns.
+        spp: Samples per pixel of `relit` (the scene's own number by default).
+        seed: Any number >= 0.
+        stream: Random numbers to draw; a repeated verification takes others than the first.
+        progress: Hears how far the work has come.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> relit = lp.relight(scene, lighting, "relit.xml")
+        >>> lp.verify(lp.combine(basis, lighting), relit, spp=4).agrees
+        True
     """
     if whole_factor(relit.size, predicted.size) is None:
         raise SizeError(

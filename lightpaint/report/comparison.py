@@ -141,8 +141,8 @@ def _caption(
     title, small = ImageFont.load_default(text), ImageFont.load_default(round(0.8 * text))
     # The residual's upper line leaves its right half to the scale bar.
     room = width if tile.limit is None else width // 3
-    draw.text((x, y), _fitted(tile.title, title, room), TEXT, title)
-    draw.text((x, y + round(1.5 * text)), _fitted(tile.detail, small, width), FAINT, small)
+    draw.text((x, y), fitted(tile.title, title, room), TEXT, title)
+    draw.text((x, y + round(1.5 * text)), fitted(tile.detail, small, width), FAINT, small)
 
 
 def _scale_bar(
@@ -162,7 +162,7 @@ def _scale_bar(
     draw.text((x, corner[1] + text // 5), low, FAINT, font)
 
 
-def _fitted(words: str, font: Any, width: int) -> str:
+def fitted(words: str, font: Any, width: int) -> str:
     """`words`, cut short with … where they are wider than `width` pixels."""
     if font.getlength(words) <= width:
         return words

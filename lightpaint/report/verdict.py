@@ -71,7 +71,18 @@ def codes_missed(solution: Solution) -> float:
 
 
 def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
-    """One plain sentence: how well the painting is met, and whether a render confirms it."""
+    """One plain sentence: how well the painting is met, and whether a render confirms it.
+
+    Args:
+        solution: The answer.
+        predicted: What `combine` makes of it.
+        verification: What `verify` says of that; None where nothing was rendered.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> lp.verdict(solution, lp.combine(basis, solution.lighting), None)
+        'The lighting meets 100 % of the painting (RMS; noise adds ... %); the prediction is not...'
+    """
     # No render of light is without noise: where there is none, nobody has measured it.
     noise = "whatever noise the layers have included"
     if predicted.half_difference.any() or not predicted.image.any():

@@ -1,7 +1,7 @@
 """The lights file: which lights to adjust and which go together, in a TOML beside the scene.
 
 For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What it asks of the
-lights in the solve is not looked at here (see lighting/constraints/file.py).
+lights in the solve is kept as it stands (lighting/constraints/file.py makes something of it).
 """
 
 import tomllib
@@ -26,12 +26,32 @@ MAX_DOTS = 10**8
 
 
 @dataclass(frozen=True)
+class Asked:
+    """What a lights file asks of the lights in the solve: CONSTRAINTS, as they stand there.
+
+    source: the file, for errors; "" where there is none, and nothing is asked.
+    """
+
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+    @classmethod
+    def of(cls, path: Path, data: Mapping[str, Any]) -> "Asked":
+        """Of all keys of the lights file at `path`."""
+        return cls({key: data[key] for key in CONSTRAINTS if key in data}, str(path))
+
+
+@dataclass(frozen=True)
 class LightsFile:
-    """What a lights file asks for, as `choose_lights` takes it. path: None if there is none."""
+    """What a lights file says. path: None if there is none.
+
+    lights, groups: as `choose_lights` takes them. asked: what is for the solve.
+    """
 
     path: Path | None = None
     lights: Iterable[str] | None = None
     groups: Mapping[str, Iterable[str]] = field(default_factory=dict)
+    asked: Asked = field(default_factory=Asked)
 
     def with_more(
         self, lights: Iterable[str] | None, groups: Mapping[str, Iterable[str]] | None
@@ -41,7 +61,7 @@ class LightsFile:
         if lights is None and self.lights is not None:
             # Who makes a group here and now means to adjust it.
             lights = (*self.lights, *groups)
-        return LightsFile(self.path, lights, {**self.groups, **groups})
+        return LightsFile(self.path, lights, {**self.groups, **groups}, self.asked)
 
 
 def lights_file_beside(scene: Path) -> Path:
@@ -70,6 +90,7 @@ def read_lights_file(path: Path) -> LightsFile:
         path,
         _names(path, "lights", data["lights"]) if "lights" in data else None,
         {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
+        Asked.of(path, data),
     )
 
 

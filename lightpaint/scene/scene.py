@@ -22,26 +22,42 @@ from lightpaint.scene.emission import EmitterSetting
 from lightpaint.scene.emitters import Emitter, find_emitters, point_emitter
 from lightpaint.scene.film import Film, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
-from lightpaint.scene.lights_file import lights_file_for
+from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import Integrator, ParsedScene, mitsuba_errors
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import Listed, some_of
+from lightpaint.screen import Listed, Shown, some_of
 
 #: Characters of a name beyond which it is a mistake.
 MAX_NAME = 1000
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Shown):
     """A parsed scene, seen through one of its sensors.
 
-    film: of the sensor it is seen through.
-    spp: samples per pixel the scene itself asks for.
-    has_null: whether rays may pass a surface as if it were not there.
-    emitters: all of them; lights: what is adjusted, and last what is kept, if anything is.
-    content: hash of all XML files and assets, the parameters and the sensor; the same on a
-    reduced film.
-    lights_file: the lights file that went into `lights`, if one did.
+    Attributes:
+        path: Of its XML.
+        parameters: Values of the `$name` parameters.
+        film: Of the sensor it is seen through.
+        sensor_names: Ids of all sensors.
+        spp: Samples per pixel the scene itself asks for.
+        integrator: Its plugin and options.
+        has_media: Whether there is fog or the like.
+        has_null: Whether rays may pass a surface as if it were not there.
+        emitters: All of them.
+        lights: What is adjusted, and last what is kept, if anything is.
+        files: All XML files.
+        content: Hash of all XML files and assets, the parameters and the sensor; the same on a
+            reduced film.
+        lights_file: The lights file that went into `lights`, if one did.
+        asked: What it asks of them.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> [light.name for light in scene.lights]
+        ['panel', 'bulb']
+        >>> scene.light("bulb").emission
+        (0.5, 0.6..., 0.69...)
     """
 
     path: Path
@@ -57,6 +73,7 @@ class Scene:
     files: tuple[Path, ...]
     content: str
     lights_file: Path | None
+    asked: Asked
     _parsed: ParsedScene
 
     def __post_init__(self) -> None:
@@ -159,6 +176,7 @@ class Scene:
             emitters=emitters,
             lights=lights_of(emitters, members, fixed=[*members][-1:]),
             content=lit_by,
+            asked=Asked(),
             _parsed=parsed,
         )
 
@@ -204,19 +222,30 @@ def load_scene(
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
-    sensor: index or id of the sensor to look through (the first by default).
-    parameters: values for the `$name` parameters of the XML (Mitsuba's `-D`).
-    variant: Mitsuba variant to run, where the process has none yet.
-    lights: names or patterns (`window_*`) of the lights to adjust; the others are kept as
-    they are. All by default.
-    groups: name → names or patterns of emitters that are adjusted as one light.
-    lights_file: TOML with such lights and groups, instead of the one beside the scene.
-    `lights` replaces what it lists, `groups` are added to its own or replace namesakes;
-    without `lights` they are adjusted beside what it lists.
-    use_lights_file: False leaves the one beside the scene alone.
+    Args:
+        path: Mitsuba XML.
+        sensor: Index or id of the sensor to look through (the first by default).
+        parameters: Values for the `$name` parameters of the XML (Mitsuba's `-D`).
+        variant: Mitsuba variant to run, where the process has none yet.
+        lights: Names or patterns (`window_*`) of the lights to adjust; the others are kept as they
+            are. All by default.
+        groups: Name → names or patterns of emitters that are adjusted as one light.
+        lights_file: TOML with such lights and groups, instead of the one beside the scene. `lights`
+            replaces what it lists, `groups` are added to its own or replace namesakes; without
+            `lights` they are adjusted beside what it lists.
+        use_lights_file: False leaves the one beside the scene alone.
 
-    Raises SceneError, with Mitsuba's own message where it refuses the scene, and
-    BackendError if Mitsuba cannot run.
+    Raises:
+        SceneError: With Mitsuba's own message where it refuses the scene.
+        BackendError: If Mitsuba cannot run.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> [light.name for light in scene.lights]
+        ['panel', 'bulb']
+        >>> lp.load_scene("room.xml", lights=["bulb"]).lights
+        (Light('bulb', ...),
+         Light('rest', ..., kept))
     """
     backend = use_variant(variant)
     path = Path(path)
@@ -227,7 +256,7 @@ def load_scene(
     with mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant)
     index = sensor_index(sensor, parsed.sensor_names, path)
-    asked = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
+    said = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
     with mitsuba_errors(path):
         seen = _look_at(parsed, index)
     check_film(path, seen["film"], seen["spp"])
@@ -235,8 +264,9 @@ def load_scene(
     return Scene(
         path=path,
         parameters=values,
-        lights=choose_lights(emitters, scene=str(path), lights=asked.lights, groups=asked.groups),
-        lights_file=asked.path,
+        lights=choose_lights(emitters, scene=str(path), lights=said.lights, groups=said.groups),
+        lights_file=said.path,
+        asked=said.asked,
         _parsed=parsed,
         **seen,
     )

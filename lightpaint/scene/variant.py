@@ -38,8 +38,18 @@ _current: Backend | None = None
 def use_variant(wanted: str | None = None) -> Backend:
     """Set up Mitsuba once, as `wanted` or as the fastest RGB variant that works here.
 
-    Later calls return the same backend. Raises BackendError if Mitsuba is missing, if
-    `wanted` is no RGB variant of this installation, or if another one is already in use.
+    Later calls return the same backend.
+
+    Args:
+        wanted: Like `llvm_ad_rgb`; None for the fastest.
+
+    Raises:
+        BackendError: If Mitsuba is missing, if `wanted` is no RGB variant of this installation, or
+            if another one is already in use.
+
+    Examples:
+        >>> lp.use_variant().variant
+        '..._rgb'
     """
     global _current
     if _current is not None:

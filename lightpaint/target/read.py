@@ -53,19 +53,31 @@ def read_target(
 ) -> Target:
     """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
 
-    What counts is, in this order: `mask`; an EXR's W channel; alpha; where the picture differs
-    from the template it was painted on; without any of them, every pixel alike. Where alpha is 0
-    no colour was painted, and a mask does not make one.
+    What counts is, in this order: `mask`; an EXR's W channel; alpha; where the picture differs from
+    the template it was painted on; without any of them, every pixel alike. Where alpha is 0 no
+    colour was painted, and a mask does not make one.
 
-    layer: which layer, part or view of an EXR. transform: what 8 and 16 bits were encoded by. What
-    it leaves open is what `template` says, else the file, else a template that was found for it,
-    else sRGB. template: folder that `lightpaint template` wrote; find: whether one is looked for
-    beside the painting if none is given.
-    paint: `light` takes colours for the light that falls on a surface, 1 being what makes white
-    look like 1, and multiplies them by its albedo (Schoeneman et al. 1993, section 3).
+    Args:
+        path: The painting.
+        mask: Picture of what counts, black for nothing.
+        layer: Which layer, part or view of an EXR.
+        transform: What 8 and 16 bits were encoded by. What it leaves open is what `template` says,
+            else the file, else a template that was found for it, else sRGB.
+        template: Folder that `lightpaint template` wrote.
+        find: Whether one is looked for beside the painting if none is given.
+        paint: `light` takes colours for the light that falls on a surface, 1 being what makes white
+            look like 1, and multiplies them by its albedo (Schoeneman et al. 1993, section 3).
 
-    Raises ImageError for files that cannot be read, TargetError for what cannot be solved for,
-    SizeError if target and mask or template differ in size.
+    Raises:
+        ImageError: For files that cannot be read.
+        TargetError: For what cannot be solved for.
+        SizeError: If target and mask or template differ in size.
+
+    Examples:
+        >>> lp.read_target("painting.exr")
+        Target 'painting', 16x16
+          counts   100 % of the pixels
+        ...
     """
     reading = _opened(Path(path), layer, transform, template, find=find)
     picture, made = reading.picture, reading.template

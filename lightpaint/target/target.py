@@ -10,24 +10,36 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_mean, whole_factor
+from lightpaint.screen import Shown
 
 #: By how much more than half one of two shares prevails, beyond the rounding of float32.
 TIE = 1e-5
 
 
 @dataclass(frozen=True)
-class Target:
+class Target(Shown):
     """The painted image Ψ and its importance D.
 
-    image: (h, w, 3) float32, linear Rec.709, finite.
-    importance: (h, w) float32 >= 0, the weight of each pixel's squared residual.
-    everything: whether nobody said what was painted, so that every pixel counts 1.
-    not_finite: number of pixels with NaN or Inf, which have no importance.
-    at_least: (h, w, 3) bool, where the painting was at the top of what its file can say, so that
-        this or anything brighter was meant; None if it can say everything.
-    notes: what a person should know of how it was read, a sentence each.
-    content, sensor: of the scene and sensor that it was painted on, where a template says.
-    transform: what a display showed it through when it was painted; None if nobody knows.
+    Attributes:
+        name: What messages and results call it.
+        image: (h, w, 3) float32, linear Rec.709, finite.
+        importance: (h, w) float32 >= 0, the weight of each pixel's squared residual.
+        everything: Whether nobody said what was painted, so that every pixel counts 1.
+        not_finite: Number of pixels with NaN or Inf, which have no importance.
+        at_least: (h, w, 3) bool, where the painting was at the top of what its file can say, so
+            that this or anything brighter was meant; None if it can say everything.
+        notes: What a person should know of how it was read, a sentence each.
+        content: Of the scene that it was painted on, where a template says.
+        sensor: Id of the sensor it was painted through, where a template says.
+        transform: What a display showed it through when it was painted; None if nobody knows.
+
+    Examples:
+        >>> image = np.full((16, 16, 3), 0.5)
+        >>> left = np.arange(16) < 8
+        >>> lp.Target.of(image, np.tile(left, (16, 1)), name="left half")
+        Target 'left half', 16x16
+          counts   50 % of the pixels
+          light    0.5 to 0.5
     """
 
     name: str

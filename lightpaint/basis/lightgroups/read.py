@@ -27,6 +27,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import read_headers
+from lightpaint.screen import shortly
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
@@ -42,14 +43,24 @@ REST = "rest"
 class LightGroups:
     """What `read_light_groups` found.
 
-    basis: a light for each group, and `rest` last if something is missing. layers: those of the
-    groups, in the order of the lights, without `rest` and without their pixels, which the basis
-    has. beauty: None if the file has none.
-    missing, exceeding: luminance that the groups lack of the beauty and have too much, as shares
-    of it, pixel by pixel; None without a beauty.
-    holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the basis,
-    so that they count nothing in any sum.
-    remarks: what is worth knowing, one sentence each.
+    Attributes:
+        basis: A light for each group, and `rest` last if something is missing.
+        path: The file or folder.
+        renderer: Whose names its layers have.
+        layers: Those of the groups, in the order of the lights, without `rest` and without their
+            pixels, which the basis has.
+        beauty: None if the file has none.
+        missing: Luminance that the groups lack of the beauty, as a share of it, pixel by pixel;
+            None without a beauty.
+        exceeding: Luminance that they have too much, likewise.
+        holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the
+            basis, so that they count nothing in any sum.
+        remarks: What is worth knowing, one sentence each.
+
+    Examples:
+        >>> groups = lp.read_light_groups("groups.exr")
+        >>> lp.solve(groups.basis, lp.Target.of(groups.basis.image("key")))
+        Solution(closest there is ...)
     """
 
     basis: Basis
@@ -61,6 +72,8 @@ class LightGroups:
     exceeding: float | None
     holes: npt.NDArray[np.bool_]
     remarks: tuple[str, ...]
+
+    __repr__ = shortly
 
     @property
     def has_rest(self) -> bool:
@@ -90,11 +103,19 @@ def is_light_groups(path: Path) -> bool:
 def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightGroups:
     """Read the light groups of an EXR file, or of a folder with a file for each.
 
-    pattern: `Light_{name}`, which layers, parts or files are lights; by default the names that
-    known renderers give them (naming.py).
+    Args:
+        path: EXR file, or folder.
+        pattern: `Light_{name}`, which layers, parts or files are lights; by default the names that
+            known renderers give them (naming.py).
 
-    Raises ImageError for a file that cannot be read or is not linear Rec.709, BasisError where
-    the lights cannot be told from other layers, or differ in size.
+    Raises:
+        ImageError: For a file that cannot be read or is not linear Rec.709.
+        BasisError: Where the lights cannot be told from other layers, or differ in size.
+
+    Examples:
+        >>> groups = lp.read_light_groups("groups.exr")
+        >>> groups.renderer, groups.basis.names
+        ('Arnold', ('fill', 'key', 'rim'))
     """
     path = Path(path)
     if path.is_dir() and len(files := _files(path)) > MAX_FILES:

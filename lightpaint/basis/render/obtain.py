@@ -32,7 +32,7 @@ def obtain_basis(
         start = None
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
-        start = replace(start, lights=basis_lights(scene))
+        start = replace(start, lights=basis_lights(scene), asked=scene.asked)
     basis = render_basis(
         scene,
         spp=spp,

@@ -51,15 +51,24 @@ def render_basis(
 ) -> Basis:
     """Render the image of each light of `scene` alone, at unit emission.
 
-    spp: samples per pixel (the scene's own number by default).
-    time_s: instead, seconds to render for, besides what `start` took; whole pairs of passes.
-    seed: any number >= 0; other seeds give independent bases.
-    start: an earlier basis of the same scene, sensor and seed: its samples count, and only
-    what is missing to `spp` is rendered, or as many more as `time_s` allows.
-    keep: called with what there is, now and then and when Ctrl-C ends the work early;
-    returns whether it could be kept.
+    Args:
+        scene: As `load_scene` returns it.
+        spp: Samples per pixel (the scene's own number by default).
+        time_s: Instead, seconds to render for, besides what `start` took; whole pairs of passes.
+        seed: Any number >= 0; other seeds give independent bases.
+        start: An earlier basis of the same scene, sensor and seed: its samples count, and only what
+            is missing to `spp` is rendered, or as many more as `time_s` allows.
+        keep: Called with what there is, now and then and when Ctrl-C ends the work early; returns
+            whether it could be kept.
+        progress: Hears how far the work has come.
 
-    Raises SceneError for more lights and pixels than fit, Interrupted for Ctrl-C.
+    Raises:
+        SceneError: For more lights and pixels than fit.
+        Interrupted: For Ctrl-C.
+
+    Examples:
+        >>> lp.render_basis(lp.load_scene("room.xml"), spp=4)
+        Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
     """
     height, width = scene.size
     if spp is not None and time_s is not None:
@@ -74,7 +83,7 @@ def render_basis(
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
-        return start
+        return start.asking(scene.asked)
     method = ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
     if start is not None and start.origin.method != method:
         # Nothing to go on from, but nothing to be replaced by less either.
@@ -180,6 +189,7 @@ def _render_together(
             sums.emitters_seen(),
             _origin(scene, seed, ONE_PASS, halves, passes),
             tracer.guide.learned(),
+            scene.asked,
         )
 
     try:
@@ -224,7 +234,8 @@ def _render_one_by_one(
     def basis() -> Basis:
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
-        return Basis(basis_lights(scene), images, half_differences, seen, origin)
+        lights = basis_lights(scene)
+        return Basis(lights, images, half_differences, seen, origin, asked=scene.asked)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

@@ -7,17 +7,25 @@ from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose, with_diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
+from lightpaint.screen import shortly
 
 
 @dataclass(frozen=True)
 class Analysis:
     """What is known of an answer, or of the answer to one of several views.
 
-    solution: with its errors and with what holds its lights in its certificate.
-    uncertainty: how sure the lights are, None where nothing is known of the noise. diagnosis: why
-    the painting is not met. ambiguities: lights that it cannot tell apart, where nothing is asked
-    of them. unconstrained: the best without what is asked, None where nothing is, or of one view
-    of several.
+    Attributes:
+        solution: With its errors and with what holds its lights in its certificate.
+        uncertainty: How sure the lights are, None where nothing is known of the noise.
+        diagnosis: Why the painting is not met.
+        ambiguities: Lights that it cannot tell apart, where nothing is asked of them.
+        unconstrained: The best without what is asked, None where nothing is, or of one view of
+            several.
+
+    Examples:
+        >>> [analysis] = lp.analyse(lp.solve(basis, target))
+        >>> analysis.diagnosis.missed < 0.01
+        True
     """
 
     solution: Solution
@@ -26,9 +34,21 @@ class Analysis:
     ambiguities: tuple[Ambiguity, ...]
     unconstrained: Solution | None
 
+    __repr__ = shortly
+
 
 def analyse(solution: Solution) -> tuple[Analysis, ...]:
-    """An analysis for each view."""
+    """An analysis for each view.
+
+    Args:
+        solution: Of one view or of several.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> [analysis] = lp.analyse(solution)
+        >>> analysis.uncertainty.standard_error.shape
+        (2, 3)
+    """
     uncertainty = error_bars(solution)
     solution = with_error_bars(solution, uncertainty)
     alike = () if solution.problem.constraints else ambiguities(solution)

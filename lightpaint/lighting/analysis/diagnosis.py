@@ -25,6 +25,7 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
+from lightpaint.screen import shortly
 
 #: Blocks along each side of the image over which it is asked where light is missing, and
 #: regions that are spoken of: left, middle, right.
@@ -51,17 +52,28 @@ class Place:
 class Diagnosis:
     """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and where it comes from.
 
-    unreachable: what no weights of any sign can reach. forbidden: what they can and w >= 0
-    cannot. compromise: what the best lighting for this view alone would not miss; 0 where
-    there is one view. noise: what the basis' own noise adds. The four sum to `total`.
-    ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
-    missed: what is missed relative to the painting, root mean square, in the space of the fit.
-    unreachable_map, forbidden_map: (h, w, 3), signed: what is painted and missed for that
-    reason. Their sum is Ψ − ΣwΦ. ignored_map: (h, w), of luminance, weighted.
-    bounds: what holds single lights, the largest gain first. bounds_left_out: how many more
-    there are, which seem to matter less. is_constrained: whether anything was asked of the
-    lights, which then forbids too. place: None where nothing is out of reach. lighting_total:
-    `total` of all views that the lighting answers, to hold gains against.
+    Attributes:
+        total: The whole of it, the sum of the four parts.
+        unreachable: What no weights of any sign can reach.
+        forbidden: What they can and w >= 0 cannot.
+        noise: What the basis' own noise adds.
+        ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
+        missed: What is missed relative to the painting, root mean square, in the space of the fit.
+        unreachable_map: (h, w, 3), signed: what is painted and missed for that reason.
+        forbidden_map: (h, w, 3), the same of what is forbidden. The sum of both is Ψ − ΣwΦ.
+        ignored_map: (h, w), of luminance, weighted.
+        bounds: What holds single lights, the largest gain first.
+        place: None where nothing is out of reach.
+        is_constrained: Whether anything was asked of the lights, which then forbids too.
+        bounds_left_out: How many more there are, which seem to matter less.
+        compromise: What the best lighting for this view alone would not miss; 0 where there is one
+            view.
+        lighting_total: `total` of all views that the lighting answers, to hold gains against.
+
+    Examples:
+        >>> diagnosis = lp.diagnose(lp.solve(basis, target))
+        >>> diagnosis.unreachable_map.shape
+        (16, 16, 3)
     """
 
     total: float
@@ -79,6 +91,8 @@ class Diagnosis:
     bounds_left_out: int = 0
     compromise: float = 0.0
     lighting_total: float = 0.0
+
+    __repr__ = shortly
 
     @property
     def avoidable(self) -> float:
@@ -98,6 +112,14 @@ def diagnose(solution: Solution) -> Diagnosis:
     """Split what `solution`, of one view, misses of its target.
 
     Of one of several views, what holds the lights does so in all views together.
+
+    Args:
+        solution: Of one view: one of `Solution.views`.
+
+    Examples:
+        >>> diagnosis = lp.diagnose(lp.solve(basis, target))
+        >>> diagnosis.missed < 0.01
+        True
     """
     basis, loss, weights = solution.basis, solution.problem.loss, solution.weights
     [target] = solution.problem.views.targets

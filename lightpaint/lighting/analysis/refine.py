@@ -31,11 +31,24 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     """One step from the weights w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over w' >= 0.
 
     g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of what was solved.
-    mixed: V, a render of the scene under solution.lighting, of the size of the basis, with
-    random numbers that the basis does not use.
 
-    Raises SizeError if it has another size, BasisError where nothing is known of the basis' noise:
-    then nothing says how much of the render to believe.
+    Args:
+        solution: Of one view or of several.
+        mixed: V, a render of the scene under solution.lighting, of the size of the basis, with
+            random numbers that the basis does not use.
+
+    Raises:
+        SizeError: If it has another size.
+        BasisError: Where nothing is known of the basis' noise: then nothing says how much of the
+            render to believe.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> solution = lp.solve(basis, target)
+        >>> relit = lp.relight(scene, solution.lighting, "relit.xml")
+        >>> mixed = lp.verify(lp.combine(basis, solution.lighting), relit, spp=4).verified
+        >>> 0 <= lp.refine(solution, mixed).problem.refinement.share <= 1
+        True
     """
     basis, problem, w = solution.basis, solution.problem, solution.weights
     if not basis.knows_noise:

@@ -30,6 +30,7 @@ from lightpaint.lighting.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
+from lightpaint.screen import shortly
 
 #: Standard errors on either side of a 95 % interval.
 SIDES = 1.96
@@ -42,15 +43,22 @@ SHARES = 8
 class Uncertainty:
     """What noise does to a solve. All are estimates themselves, good to a third or so.
 
-    weights: (n, 3), as solved.
-    scatter: (n, 3), standard deviation of the weights from one seed to another. Of a light
-    that is off, what is left of it above zero (see `_one_sided`).
-    bias: (n, 3), how much higher the weights would be without the noise power in M.
-    objective_error: (3,), standard deviation of the objective; objective_noise: (3,), what
-    the prediction's own noise adds to it.
-    excess: (3,), by how much the objective of these weights, were they rendered without
-    noise, may be expected to exceed the least possible. target_norm2: (3,), ‖Ψ‖², to hold
-    it against.
+    Attributes:
+        weights: (n, 3), as solved.
+        scatter: (n, 3), standard deviation of the weights from one seed to another. Of a light that
+            is off, what is left of it above zero (see `_one_sided`).
+        bias: (n, 3), how much higher the weights would be without the noise power in M.
+        objective_error: (3,), standard deviation of the objective.
+        objective_noise: (3,), what the prediction's own noise adds to it.
+        excess: (3,), by how much the objective of these weights, were they rendered without noise,
+            may be expected to exceed the least possible.
+        target_norm2: (3,), ‖Ψ‖², to hold it against.
+
+    Examples:
+        >>> bars = lp.error_bars(lp.solve(basis, target))
+        >>> low, high = bars.interval
+        >>> bool((low <= bars.weights).all() and (bars.weights <= high).all())
+        True
     """
 
     weights: Doubles
@@ -60,6 +68,8 @@ class Uncertainty:
     objective_noise: Doubles
     excess: Doubles
     target_norm2: Doubles
+
+    __repr__ = shortly
 
     @property
     def relative_excess(self) -> float:
@@ -82,12 +92,20 @@ class Uncertainty:
 def error_bars(solution: Solution) -> Uncertainty | None:
     """Standard error and bias of every weight that a solve or `refine` found.
 
-    None where nothing is known of the noise of the basis: that is not the same as none.
-    After reweighting they are of the last linear problem.
+    None where nothing is known of the noise of the basis: that is not the same as none. After
+    reweighting they are of the last linear problem.
 
     Lights that are kept or reach nothing have none. What a limit holds that was asked for has none
     either: the error is of what is free to move there. What is off may be on by as much as noise
     could hide, and no more (see `_one_sided`).
+
+    Args:
+        solution: As `solve`, `refine` or `correct_noise` made it.
+
+    Examples:
+        >>> bars = lp.error_bars(lp.solve(basis, target))
+        >>> bars.standard_error.shape
+        (2, 3)
     """
     problem, weights = solution.problem, solution.weights
     if not problem.basis.knows_noise:
@@ -134,9 +152,18 @@ def error_bars(solution: Solution) -> Uncertainty | None:
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """The solution of the equations without that share of the noise power in M and b.
 
-    share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
-    What was solved before, `solution`, is where it starts. docs/method.md has what it is worth.
-    Raises BasisError where nothing is known of the noise.
+    Args:
+        solution: What was solved before; it starts there.
+        share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
+            docs/method.md has what it is worth.
+
+    Raises:
+        BasisError: Where nothing is known of the noise.
+
+    Examples:
+        >>> corrected = lp.correct_noise(lp.solve(basis, target))
+        >>> 0 <= corrected.problem.noise_removed <= 1
+        True
     """
     basis = solution.basis
     if not basis.knows_noise:

@@ -15,6 +15,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.errors import ColorError, ConstraintError
+from lightpaint.screen import shortly
 
 #: What may be asked of one light.
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")
@@ -112,17 +113,27 @@ class Tie:
 class Constraints:
     """What is asked of the lights, besides to come close to the painting.
 
-    lights: name or pattern, what is asked of it, and what errors call it. What stands later
-    replaces what it contradicts; `of` puts patterns before names.
-    prefer_current: strength of the pull towards the present lighting. At 1 a light that
-    changes costs as much as if the whole picture it makes, painted or not, were missed.
-    sparse: how many lights may be on at most.
+    Attributes:
+        lights: Name or pattern, what is asked of it, and what errors call it. What stands later
+            replaces what it contradicts; `of` puts patterns before names.
+        ties: Lights on one dimmer.
+        prefer_current: Strength of the pull towards the present lighting. At 1 a light that changes
+            costs as much as if the whole picture it makes, painted or not, were missed.
+        sparse: How many lights may be on at most.
+
+    Examples:
+        >>> asked = lp.Constraints.of({"panel": {"lock": True}})
+        >>> lighting = lp.solve(basis, target, constraints=asked).lighting
+        >>> np.round(lighting.emission["panel"], 3).tolist()
+        [4.0, 3.0, 2.0]
     """
 
     lights: tuple[tuple[str, Mapping[str, Any], str], ...] = ()
     ties: tuple[Tie, ...] = ()
     prefer_current: float = 0.0
     sparse: int | None = None
+
+    __repr__ = shortly
 
     def __bool__(self) -> bool:
         return bool(self.lights or self.ties or self.prefer_current or self.sparse is not None)
@@ -162,10 +173,14 @@ class Constraints:
         )
 
     def and_then(self, others: "Constraints") -> "Constraints":
-        """These and `others`, which replace what they contradict."""
+        """These and `others`, which replace what they contradict, ties of the same lights too.
+
+        What both say is said once: `a.and_then(a.and_then(b)) == a.and_then(b)`.
+        """
+        tied = [set(tie.lights) for tie in others.ties]
         return Constraints(
-            self.lights + others.lights,
-            self.ties + others.ties,
+            tuple(x for x in self.lights if x not in others.lights) + others.lights,
+            tuple(x for x in self.ties if set(x.lights) not in tied) + others.ties,
             others.prefer_current or self.prefer_current,
             self.sparse if others.sparse is None else others.sparse,
         )

@@ -26,12 +26,29 @@ BLENDER = ("Blender", "pattern")
 LARGEST_HALF = 65504.0
 
 
-def write_exports(folder: Path, groups: LightGroups, lighting: Lighting) -> list[Path]:
+def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -> list[Path]:
     """Write `lighting`, solved from `groups`, into `folder` for other programs.
 
     lights.csv, a table of multipliers; set_lights.py for Blender's light groups, unless another
     renderer made the file; relit.nk for Nuke; relit.exr, the sum with these multipliers.
-    Returns the files. Raises LightingError if `lighting` is of other lights, OutputError.
+
+    Args:
+        folder: Receives the files.
+        groups: What was solved from.
+        lighting: The answer.
+
+    Returns:
+        The files.
+
+    Raises:
+        LightingError: If `lighting` is of other lights.
+        OutputError: If `folder` cannot be written.
+
+    Examples:
+        >>> groups = lp.read_light_groups("groups.exr")
+        >>> lighting = lp.solve(groups.basis, lp.Target.of(groups.basis.image("key"))).lighting
+        >>> [file.name for file in lp.write_exports(".", groups, lighting)]
+        ['lights.csv', 'relit.nk', 'relit.exr']
     """
     folder = Path(folder)
     texts = {"lights.csv": lights_table(groups, lighting)}

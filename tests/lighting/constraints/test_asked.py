@@ -1,0 +1,117 @@
+"""What a lights file beside a scene asks of the lights holds for every solve."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+
+import lightpaint as lp
+from lightpaint.errors import ConstraintError, SceneError
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.problem import Problem
+from lightpaint.scene.lights_file import Asked
+
+FILE = '[light.bulb]\nlock = "40%"\n[light.panel]\nkelvin = 3200\n'
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    (tmp_path / "room.lights.toml").write_text(FILE, encoding="utf-8")
+    return write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"])
+
+
+def _target(basis: lp.Basis) -> lp.Target:
+    return lp.Target.of(0.7 * basis.mix(basis.present_weights))
+
+
+def _emission(solution: lp.Solution, name: str) -> Any:
+    return pytest.approx(solution.lighting.emission[name], rel=1e-12)
+
+
+def test_a_solve_from_python_is_that_of_paint_with_light(room: Path, tmp_path: Path):
+    scene = lp.load_scene(room)
+    basis = lp.render_basis(scene, spp=8)
+    write_rgb(tmp_path / "t.exr", _target(basis).image)
+    look = lp.paint_with_light(scene, tmp_path / "t.exr", tmp_path / "out", spp=8)
+    solution = lp.solve(basis, lp.read_target(tmp_path / "t.exr"))
+    assert look.basis.asked == basis.asked == scene.asked
+    assert {x.constraint for x in solution.lighting.lights} == {"lock 40%", "3200 K"}
+    for light in look.lighting.lights:
+        assert light.emission == _emission(solution, light.name)
+    # To be asked twice is to be asked once.
+    assert look.solution.problem.constraints == solution.problem.constraints
+    # What is given goes before the file; what it does not contradict stays.
+    given = lp.Constraints.of({"bulb": {"off": True}})
+    off = lp.solve(basis, _target(basis), constraints=given).lighting
+    assert off.emission["bulb"] == (0, 0, 0)
+    assert [x.constraint for x in off.lights] == ["3200 K", "off"]
+    # A basis read from a file knows only what it was rendered of.
+    lp.write_basis(tmp_path / "b.exr", basis)
+    assert not lp.read_basis(tmp_path / "b.exr").asked.keys
+
+
+def test_the_file_of_now_counts_and_not_that_of_the_cached_basis(room: Path, tmp_path: Path):
+    first = lp.load_scene(room)
+    earlier = lp.render_basis(first, spp=8)
+    target = _target(earlier)
+    lp.paint_with_light(first, target, tmp_path / "one", spp=8)
+    (tmp_path / "room.lights.toml").write_text("[light.panel]\noff = true\n", encoding="utf-8")
+    scene = lp.load_scene(room)
+    heard = []
+    cached = lp.paint_with_light(
+        scene, target, tmp_path / "two", spp=8, progress=lambda *told: heard.append(told[0])
+    )
+    assert "basis" not in " ".join(heard)
+    given = lp.paint_with_light(scene, target, tmp_path / "three", basis=earlier)
+    gone_on = lp.solve(lp.render_basis(scene, spp=8, start=earlier), target)
+    for lighting in (cached.lighting, given.lighting, gone_on.lighting):
+        assert [x.constraint for x in lighting.lights] == ["off", ""]
+    # Without a scene the basis in memory is what knows; without the file nobody does.
+    alone = lp.paint_with_light(None, target, tmp_path / "four", basis=earlier)
+    assert [x.constraint for x in alone.lighting.lights] == ["3200 K", "lock 40%"]
+    free = lp.load_scene(room, use_lights_file=False)
+    assert not lp.render_basis(free, spp=8).asked.keys
+
+
+def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
+    beside = room.with_name("room.lights.toml")
+    beside.write_text("[lamp.bulb]\noff = true\n", encoding="utf-8")
+    with pytest.raises(SceneError, match="unknown key 'lamp'"):
+        lp.load_scene(room)
+    basis = make_basis(2, names=("panel", "bulb"))
+    for keys, wrong in [
+        ({"light": {"bulb": {"lock": "much"}}}, r"hall\.toml: light\.bulb\.lock is 'much'"),
+        ({"light": {"blub": {"off": True}}}, r"hall\.toml: light\.blub: no light 'blub'; did you"),
+        ({"tie": 3}, r"hall\.toml: tie is 3"),
+    ]:
+        with pytest.raises(ConstraintError, match=wrong) as caught:
+            lp.solve(basis.asking(Asked(keys, "hall.toml")), _target(basis))
+        assert "\n" not in str(caught.value)
+
+
+def test_the_same_tie_twice_is_one_tie(make_basis: Any, tmp_path: Path):
+    path = tmp_path / "a.lights.toml"
+    path.write_text('tie = [["a", "b"]]\nprefer = 0.1\n[light."*"]\noff = false\n', "utf-8")
+    file = read_constraints(path)
+    given = lp.Constraints.of({"c": {"lock": True}}, tie=[{"lights": ["b", "a"], "color": "3200K"}])
+    both = file.and_then(given)
+    assert file.and_then(both) == both
+    assert both.ties == given.ties
+    basis = make_basis(3, names=("a", "b", "c"))
+    a, b, c = lp.solve(basis, _target(basis), constraints=both).lighting.lights
+    assert np.array(a.emission) / sum(a.emission) == pytest.approx(
+        np.array(b.emission) / sum(b.emission)
+    )
+    assert c.emission == pytest.approx(basis.lights[2].emission)
+
+
+def test_all_views_heed_it(make_basis: Any):
+    asked = Asked({"light": {"light 0": {"off": True}}}, "hall.toml")
+    bases = [make_basis(2, seed=1).asking(asked), make_basis(2, seed=1).asking(asked)]
+    problem = Problem.of(bases, [_target(basis) for basis in bases])
+    assert list(problem.reduction.labels) == ["off", ""]
+    with pytest.raises(lp.LightpaintError, match="the basis is a str: give what"):
+        lp.solve("a.basis.exr", _target(bases[0]))
