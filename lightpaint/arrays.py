@@ -1,5 +1,6 @@
 """Types of the arrays that walk between the rooms. No library stands behind them but NumPy."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,3 +17,9 @@ Indices = npt.NDArray[np.intp]
 
 #: One colour, linear Rec.709.
 RGB = tuple[float, float, float]
+
+
+def as_rgb(values: Iterable[Any]) -> RGB:
+    """Three numbers of an array, or any others, as one colour."""
+    r, g, b = (float(v) for v in values)
+    return r, g, b

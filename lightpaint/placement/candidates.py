@@ -1,7 +1,7 @@
 """A solved problem and the images of lights to try beside it, brought to one size.
 
 Of all there are two halves of the samples, so that what is found on one of them can be held
-against the other (see additional.py).
+against the other (see additions.py).
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,8 @@ from lightpaint.basis.basis import Basis, mix
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import block_mean, whole_factor
 from lightpaint.lighting.algebra.threads import one_thread
-from lightpaint.lighting.constraints.reduction import Knob, Reduction
+from lightpaint.lighting.constraints.knobs import Knob
+from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.solution import Solution
 

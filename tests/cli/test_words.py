@@ -122,7 +122,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
         ("use noise_correction=False, and", "use no --correct-noise, and"),
         ('space="display" fits', "--space display fits"),
         ("like pattern='Light_{name}'; its", "like --pattern 'Light_{name}'; its"),
-        ("profile (view=..., mask=...), or", "profile (--view, --mask), or"),
+        ("profile (transform=..., mask=...), or", "profile (--view, --mask), or"),
         ("set it with parameters={'width': ...}", "set it with -D width=VALUE"),
         ("(use_cache=False renders it anew)", "(--no-cache renders it anew)"),
         ("spp=..., refine=... cannot", "--spp, --refine cannot"),

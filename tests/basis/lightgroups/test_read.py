@@ -324,9 +324,9 @@ def test_nobody_claims_that_there_is_no_noise(tmp_path: Path):
     groups = read_light_groups(interleaved(tmp_path / "a.exr", _layers(pictures())))
     assert not groups.basis.knows_noise
     solution = solve(groups.basis, _target(pictures(seed=3)[0]))
-    assert error_bars(groups.basis, solution) is None
+    assert error_bars(solution) is None
     with pytest.raises(BasisError, match="says nothing of its noise"):
-        correct_noise(groups.basis, solution)
+        correct_noise(solution)
 
 
 def test_the_basis_can_be_saved_and_is_no_light_group_file_then(tmp_path: Path):
