@@ -46,9 +46,7 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
         plain = solve(basis, target)
         found = {"plain": plain, "corrected": correct_noise(plain)}
         if seed < REFINED:
-            found["refined"] = refine_by_rendering(
-                [(scene, basis)], basis, plain, rounds=1, seed=seed
-            )
+            found["refined"] = refine_by_rendering([(scene, basis)], plain, rounds=1, seed=seed)
         for name, solution in found.items():
             low, high = error_bars(solution).interval
             inside = (low <= truth + 1e-12) & (truth <= high + 1e-12)
