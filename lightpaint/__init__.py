@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from lightpaint.basis.lightgroups.read import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.read import read_light_groups as read_light_groups
     from lightpaint.basis.render.render import render_basis as render_basis
+    from lightpaint.call import paint_with_light as paint_with_light
     from lightpaint.colour.transform import TransformChoice as TransformChoice
     from lightpaint.colour.transform import ViewTransform as ViewTransform
     from lightpaint.errors import LightpaintError as LightpaintError
@@ -51,15 +52,14 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.uncertainty import error_bars as error_bars
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
     from lightpaint.lighting.constraints.file import read_constraints as read_constraints
+    from lightpaint.lighting.file import read_lighting as read_lighting
+    from lightpaint.lighting.file import write_lighting as write_lighting
     from lightpaint.lighting.lighting import Certificate as Certificate
     from lightpaint.lighting.lighting import Lighting as Lighting
     from lightpaint.lighting.lighting import combine as combine
-    from lightpaint.lighting.lighting import read_lighting as read_lighting
-    from lightpaint.lighting.lighting import write_lighting as write_lighting
     from lightpaint.lighting.problem import Problem as Problem
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
-    from lightpaint.pipeline import paint_with_light as paint_with_light
     from lightpaint.pipeline import run as run
     from lightpaint.placement.suggest import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
@@ -111,11 +111,11 @@ _HOMES = {
     "display_picture": "images.png",
     "error_bars": "lighting.analysis.uncertainty",
     "load_scene": "scene.scene",
-    "paint_with_light": "pipeline",
+    "paint_with_light": "call",
     "read_basis": "basis.file",
     "read_constraints": "lighting.constraints.file",
     "read_light_groups": "basis.lightgroups.read",
-    "read_lighting": "lighting.lighting",
+    "read_lighting": "lighting.file",
     "read_target": "target.read",
     "refine": "lighting.analysis.refine",
     "relight": "relit.relight",
@@ -129,7 +129,7 @@ _HOMES = {
     "verify": "relit.verify",
     "write_basis": "basis.file",
     "write_exports": "relit.export.exports",
-    "write_lighting": "lighting.lighting",
+    "write_lighting": "lighting.file",
 }
 
 __all__ = ["__version__", *_HOMES]

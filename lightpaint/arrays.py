@@ -1,5 +1,6 @@
 """Types of the arrays that walk between the rooms. No library stands behind them but NumPy."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -19,3 +20,9 @@ RGB = tuple[float, float, float]
 
 #: One place, in units of the scene.
 Position = tuple[float, float, float]
+
+
+def as_rgb(values: Iterable[Any]) -> RGB:
+    """Three numbers of an array, or any others, as one colour."""
+    r, g, b = (float(v) for v in values)
+    return r, g, b

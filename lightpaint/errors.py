@@ -17,21 +17,6 @@ Each message is one line: what came, what was expected, and what to do. The comm
 line prints it and exits with 2.
 """
 
-__all__ = [
-    "BackendError",
-    "BasisError",
-    "ColorError",
-    "ConstraintError",
-    "ImageError",
-    "LightingError",
-    "LightpaintError",
-    "OutputError",
-    "SceneError",
-    "SizeError",
-    "TargetError",
-    "ViewError",
-]
-
 
 class LightpaintError(Exception):
     """Base of all errors that a user of lightpaint can cause and mend.

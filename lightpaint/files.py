@@ -60,6 +60,7 @@ def file_length(
     Reading a device, a pipe or a socket might never end, so that this is asked before any of it
     is read. what: the kind of file that is expected.
     """
+    article = "an" if what[0] in "aeiou" else "a"
     try:
         status = Path(path).stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -68,9 +69,9 @@ def file_length(
         said = getattr(reason, "strerror", None) or reason
         raise error(f"cannot read {one_line(str(path))}: {said}") from None
     if stat.S_ISDIR(status.st_mode):
-        raise error(f"{path} is a folder, not a {what}")
+        raise error(f"{path} is a folder, not {article} {what}")
     if not stat.S_ISREG(status.st_mode):
-        raise error(f"{path} is a device or a pipe, not a {what}")
+        raise error(f"{path} is a device or a pipe, not {article} {what}")
     if status.st_size > limit:
         raise error(
             f"{path} is {status.st_size} bytes long: no {what} has more than {limit}, so it is not "
@@ -112,6 +113,12 @@ def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
     text = " ".join(text[: 4 * limit].split())
     text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     return text if len(text) <= limit else f"{text[:limit]} …"
+
+
+def first_line(said: str | BaseException) -> str:
+    """Of what a library says, or else that it says nothing."""
+    silent = "no reason given" if isinstance(said, str) else type(said).__name__
+    return next(iter(str(said).strip().splitlines()), silent)
 
 
 @contextmanager

@@ -5,10 +5,9 @@ sample is taken. One of files and plain values can be sent to another machine, w
 files anew; one of objects in memory can only be run where it is.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
@@ -16,7 +15,7 @@ from lightpaint.basis.render.obtain import check_same_view
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
+from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
@@ -25,7 +24,7 @@ from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import check_relightable
 from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
-from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results
+from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
@@ -35,6 +34,7 @@ from lightpaint.sources import (
     GroupsFile,
     Painting,
     SceneFile,
+    check_needed,
     content,
     from_json,
     to_json,
@@ -115,7 +115,7 @@ class Job:
         scenes = [content(scene) for scene in self.scenes]
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
-            folders = [self.folder / name for name in check_each_once(scenes)]
+            folders = [self.folder / name for name in view_names(scenes)]
         told = scenes[0] if scenes else basis
         asked = self.constraints
         if isinstance(told, Scene | Basis):
@@ -272,24 +272,6 @@ class Job:
         return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
 
 
-def check_needed(given: Iterable[str], basis: Any) -> None:
-    """Raise BasisError for anything `given`, by name, that a basis without its scene has no use of.
-
-    basis: a saved one, or light groups.
-    """
-    if not (idle := [f"{name}=..." for name in given]):
-        return
-    if isinstance(basis, LightGroups | GroupsFile):
-        raise BasisError(
-            f"{', '.join(idle)} cannot be used with {basis.path}: its light groups are rendered "
-            "already, and say nothing of samples, noise or units; leave it out"
-        )
-    raise BasisError(
-        f"{', '.join(idle)} cannot change a saved basis: leave "
-        f"{'it' if len(idle) == 1 else 'them'} out, or give the scene"
-    )
-
-
 def check_same_picture(target: Target, scene: Scene) -> None:
     """Raise TargetError for a painting of another view than `scene` is seen through."""
     sensor = scene.sensor_names[scene.sensor]
@@ -298,14 +280,3 @@ def check_same_picture(target: Target, scene: Scene) -> None:
             f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
             f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
         )
-
-
-def check_each_once(scenes: Sequence[Scene]) -> list[str]:
-    """The sensor of each. Raises SceneError for one that is there twice or names no folder."""
-    names = [scene.sensor_names[scene.sensor] for scene in scenes]
-    if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
-    for name in names:
-        if Path(name).name != name or name in ("..", ""):
-            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
-    return names

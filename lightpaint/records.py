@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, asdict, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -88,6 +88,18 @@ def read_record(
         elif name in required or (field.default is MISSING and field.default_factory is MISSING):
             raise ValueError(f"it lacks {name}")
     return kind(**given)
+
+
+def fields_of(record: Any, *optional: str) -> dict[str, Any]:
+    """A dataclass for a JSON, its fields by name; those that are `optional` where they say more
+    than by default.
+    """
+    default = {field.name: field.default for field in fields(record)}
+    return {
+        name: value
+        for name, value in asdict(record).items()
+        if name not in optional or getattr(record, name) != default[name]
+    }
 
 
 def _read(kind: Any, value: Any) -> Any:

@@ -1,13 +1,15 @@
 """What a solve leaves in its folder, and what is read back from there."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import ImageError, OutputError
-from lightpaint.files import one_line, write_text
-from lightpaint.images.estimate import Estimate, read_estimate_with_attributes, write_estimate
+from lightpaint.errors import ImageError, OutputError, SceneError
+from lightpaint.files import one_line, write_bytes, write_text
+from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
+from lightpaint.images.png import png_bytes
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -19,7 +21,7 @@ from lightpaint.records import read_record, strict_json
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
-from lightpaint.report.comparison import write_comparison
+from lightpaint.report.comparison import comparison_image
 from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
@@ -117,6 +119,20 @@ def result_folders(folder: Path) -> list[Path]:
     return sorted(file.parent for file in folder.glob("*/predicted.exr")) or [folder]
 
 
+def view_names(scenes: Sequence[Scene]) -> list[str]:
+    """The sensor of each, after which its folder is called.
+
+    Raises SceneError for one that is there twice or names no folder.
+    """
+    names = [scene.sensor_names[scene.sensor] for scene in scenes]
+    if len(set(names)) < len(names):
+        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+    for name in names:
+        if Path(name).name != name or name in ("..", ""):
+            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+    return names
+
+
 def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -> None:
     """predicted.exr, with a note of how to see the relit scene as the basis saw it."""
     write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
@@ -125,14 +141,14 @@ def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -
 def write_report(look: Look, folder: Path, *, command: str) -> None:
     """Write the pictures people look at: comparison.png and report.html."""
     verified = look.verification.verified.image if look.verification else None
-    write_comparison(
-        folder / "comparison.png",
+    sheet = comparison_image(
         basis=look.basis,
         target=look.target,
         solution=look.solution,
         predicted=look.predicted.image,
         verified=verified,
     )
+    write_bytes(folder / "comparison.png", png_bytes(sheet))
     page = report_page(
         basis=look.basis,
         target=look.target,
@@ -171,7 +187,7 @@ def verify_result(
             f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
         )
     path = folder / "predicted.exr"
-    predicted, attributes = read_estimate_with_attributes(path)
+    predicted, attributes = read_estimate(path)
     seen = _read_view(path, attributes.get(VIEW_KEY, "{}"))
     relit = load_scene(relit_xml, sensor=seen.sensor, use_lights_file=False)
     return verify(

@@ -4,7 +4,7 @@ Each is plain values that can be sent, and is read once, when it is first asked 
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
-from lightpaint.errors import LightpaintError
+from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints, Tie
 from lightpaint.records import strict_json
 from lightpaint.scene.scene import Scene, load_scene
@@ -129,6 +129,24 @@ def vars_of(given: Any) -> dict[str, Any]:
 def content(given: Any) -> Any:
     """What is in a file that a job names; what is in memory already, and None, as it is."""
     return given.content if isinstance(given, File) else given
+
+
+def check_needed(given: Iterable[str], basis: Any) -> None:
+    """Raise BasisError for anything `given`, by name, that a basis without its scene has no use of.
+
+    basis: a saved one, or light groups.
+    """
+    if not (idle := [f"{name}=..." for name in given]):
+        return
+    if isinstance(basis, LightGroups | GroupsFile):
+        raise BasisError(
+            f"{', '.join(idle)} cannot be used with {basis.path}: its light groups are rendered "
+            "already, and say nothing of samples, noise or units; leave it out"
+        )
+    raise BasisError(
+        f"{', '.join(idle)} cannot change a saved basis: leave "
+        f"{'it' if len(idle) == 1 else 'them'} out, or give the scene"
+    )
 
 
 def to_json(

@@ -25,7 +25,7 @@ class Reader:
 
             return Seen(read_picture(path))
         if self.kind == "lighting":
-            from lightpaint.lighting.lighting import read_lighting
+            from lightpaint.lighting.file import read_lighting
 
             return read_lighting(path)
         if self.kind == "lights":
@@ -107,7 +107,7 @@ class Seen:
 
 def contents(lighting: Any) -> Any:
     """What a lighting says, by way of the file that is written of it."""
-    from lightpaint.lighting.lighting import write_lighting
+    from lightpaint.lighting.file import write_lighting
 
     path = Path(os.environ.get("TMPDIR", "/tmp")) / f"lighting.{os.getpid()}.json"
     write_lighting(path, lighting)

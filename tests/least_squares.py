@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
-from lightpaint.lighting.constraints.reduction import Knob, Reduction
+from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target.target import Target
 

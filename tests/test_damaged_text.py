@@ -23,13 +23,8 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
 from lightpaint.files import MAX_TEXT
 from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.lighting import (
-    Certificate,
-    Lighting,
-    LightSetting,
-    read_lighting,
-    write_lighting,
-)
+from lightpaint.lighting.file import read_lighting, write_lighting
+from lightpaint.lighting.lighting import Certificate, Lighting, LightSetting
 from lightpaint.scene.lights_file import read_lights_file
 from lightpaint.target.template import Template, read_template, write_template
 

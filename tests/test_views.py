@@ -11,6 +11,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
+from lightpaint.call import paint_with_light
 from lightpaint.cli import main
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
@@ -20,7 +21,6 @@ from lightpaint.lighting.analysis.uncertainty import error_bars
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
-from lightpaint.pipeline import paint_with_light
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 

@@ -54,8 +54,7 @@ def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> 
         return None
     try:
         basis = read_basis(path)
-        origin = basis.origin
-        if path != _path(origin.scene_identity, origin.sensor, origin.seed, basis.size):
+        if path != _path_of(basis):
             raise BasisError(f"{path} is the basis of something else")
     except LightpaintError:
         with suppress(OSError):
@@ -71,8 +70,7 @@ def keep(basis: Basis) -> bool:
 
     Returns whether that worked: a full disk is no reason to lose a render.
     """
-    origin = basis.origin
-    path = _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
+    path = _path_of(basis)
     try:
         write_basis(path, basis)
         _prune(path)
@@ -83,9 +81,8 @@ def keep(basis: Basis) -> bool:
 
 def is_kept(basis: Basis) -> bool:
     """Whether `basis` is kept, with all its samples."""
-    origin = basis.origin
-    path = _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
-    return path.is_file() and _entry(path).origin == origin
+    path = _path_of(basis)
+    return path.is_file() and _entry(path).origin == basis.origin
 
 
 def _prune(path: Path) -> None:
@@ -121,6 +118,11 @@ def clear() -> int:
 def _path(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Path:
     key = repr((FORMAT, scene_identity, sensor, seed, size))
     return folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
+
+
+def _path_of(basis: Basis) -> Path:
+    origin = basis.origin
+    return _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
 
 
 def _entry(path: Path) -> Entry:

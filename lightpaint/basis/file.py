@@ -5,7 +5,6 @@ Part k is named after light k and holds its image as R, G, B; docs/formats.md ha
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
-from lightpaint.records import read_record, strict_json
+from lightpaint.records import fields_of, read_record, strict_json
 
 FORMAT = "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"
@@ -60,10 +59,8 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         learned = dict(zip(("received", "asked"), basis.learned, strict=True))
         # A table and no picture; the format wants one display window for all parts.
         parts.append(Part(free_name(LEARNED, basis.names), learned, display=basis.size))
-    origin = asdict(basis.origin)
-    if not basis.origin.each_light:
-        del origin["each_light"]  # as in files from before there was any
-    of_origin = json.dumps(origin, ensure_ascii=False)
+    # Without `each_light` as in files from before there was any.
+    of_origin = json.dumps(fields_of(basis.origin, "each_light"), ensure_ascii=False)
     checksums = Checksums(
         sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
     )
@@ -189,11 +186,7 @@ def is_basis_file(path: Path) -> bool:
 
 def _light_fields(light: BasisLight) -> dict[str, Any]:
     """What the file says of a light; what goes without saying for one emitter is left out."""
-    data = asdict(light)
+    data = fields_of(light, "is_fixed", "unit_flux")
     if light.members == (light.name,):
         del data["members"]
-    if not light.is_fixed:
-        del data["is_fixed"]
-    if light.unit_flux is None:
-        del data["unit_flux"]
     return data

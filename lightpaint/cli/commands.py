@@ -16,7 +16,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import OutputError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
-from lightpaint.lighting.lighting import read_lighting
+from lightpaint.lighting.file import read_lighting
 from lightpaint.pipeline import obtain, run
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import scene_of
@@ -29,8 +29,6 @@ from lightpaint.scene.variant import use_variant
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile
 from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
-
-__all__ = ["basis", "cache", "doctor", "lights", "relight", "solve", "template", "verify"]
 
 
 def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int:

@@ -16,11 +16,11 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.read import is_light_groups
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
-from lightpaint.job import Job, check_needed
+from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
+from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 
 #: Options that say how a scene is loaded, by the names that Python has for them.
 LOADING = ("sensor", "parameters", "variant", "lights", "groups")

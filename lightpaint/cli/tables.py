@@ -109,6 +109,35 @@ def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
 
 def show_look(look: Look, folder: Path) -> None:
     """Print the lights that were solved for, and what is to be said of the answer."""
+    _show_solved(look)
+    terminal.write(verdict(look.solution, look.predicted, look.verification))
+    for sentence in what_is_missed(look.diagnosis):
+        terminal.write(sentence)
+    if look.uncertainty is not None:
+        terminal.write(how_sure(look.basis, look.solution, look.uncertainty))
+    terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
+    certificate = look.solution.certificate
+    if curve := certificate.curve:
+        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
+        terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
+    if certificate.unreached:
+        terminal.say(
+            f"no painted pixel sees {', '.join(certificate.unreached)}: kept as it is; "
+            "paint where it shines, or pass --unpainted"
+        )
+    for ambiguity in look.analysis.ambiguities:
+        terminal.say(ambiguity.sentence)
+    if not certificate.converged:
+        terminal.say(
+            f"the solve stopped after {max(certificate.sweeps)} sweeps at a KKT residual of "
+            f"{max(certificate.kkt_residual):.1e}"
+        )
+    if look.verification is not None and not look.verification.agrees:
+        terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
+
+
+def _show_solved(look: Look) -> None:
+    """Print a row for each light: before, solved, how sure, and what it does to the picture."""
     shares = energy_shares(look.basis, look.lighting)
     held = any(light.constraint for light in look.lighting.lights)
     headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
@@ -134,32 +163,6 @@ def show_look(look: Look, folder: Path) -> None:
             *([escape(light.constraint) + "*" * light.is_active] if held else []),
         )
     terminal.print_table(table)
-    terminal.write(verdict(look.solution, look.predicted, look.verification))
-    for sentence in what_is_missed(look.diagnosis):
-        terminal.write(sentence)
-    if look.uncertainty is not None:
-        terminal.write(how_sure(look.basis, look.solution, look.uncertainty))
-    terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    certificate = look.solution.certificate
-    if certificate.curve:
-        listed = ", ".join(
-            f"{100 * missed:.1f} % with {count}" for count, missed in certificate.curve
-        )
-        terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
-    if certificate.unreached:
-        terminal.say(
-            f"no painted pixel sees {', '.join(certificate.unreached)}: kept as it is; "
-            "paint where it shines, or pass --unpainted"
-        )
-    for ambiguity in look.analysis.ambiguities:
-        terminal.say(ambiguity.sentence)
-    if not certificate.converged:
-        terminal.say(
-            f"the solve stopped after {max(certificate.sweeps)} sweeps at a KKT residual of "
-            f"{max(certificate.kkt_residual):.1e}"
-        )
-    if look.verification is not None and not look.verification.agrees:
-        terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
 
 
 def spoken_agreement(result: Verification) -> str:

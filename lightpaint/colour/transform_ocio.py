@@ -12,6 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import ViewError
+from lightpaint.files import first_line
 
 #: Linear Rec.709 as OpenColorIO's built-in configurations call it, and as others do.
 LINEAR_REC709 = (
@@ -58,13 +59,13 @@ class OcioEncoding:
         try:
             self._to_display = _processors(ocio, config, display, view)
         except (ocio.Exception, ocio.ExceptionMissingFile) as error:
-            raise ViewError(f"{self._name} cannot be used: {_first_line(error)}") from error
+            raise ViewError(f"{self._name} cannot be used: {first_line(error)}") from error
         try:
             self._to_light = _processors(ocio, config, display, view, inverse=True)
         except (ocio.Exception, ocio.ExceptionMissingFile) as error:
             raise ViewError(
                 f"{self._name} cannot be undone, and reading a painting undoes it: "
-                f"{_first_line(error)}"
+                f"{first_line(error)}"
             ) from error
         self._check_way_back()
         self.white = float(self.decode(np.ones((1, 1, 3), np.float32)).max())
@@ -115,7 +116,7 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
         config.validate()
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
         named = f"OCIO={source}" if source else "the built-in configuration"
-        raise ViewError(f"{named} is no OpenColorIO configuration: {_first_line(error)}") from error
+        raise ViewError(f"{named} is no OpenColorIO configuration: {first_line(error)}") from error
     finally:
         ocio.SetLoggingLevel(loudness)
     return ocio, config
@@ -164,7 +165,3 @@ def _applied(processors: list[Any], image: Floats) -> Floats:
     for processor in processors:
         processor.applyRGB(pixels)
     return pixels.reshape(image.shape)
-
-
-def _first_line(error: BaseException) -> str:
-    return next(iter(str(error).strip().splitlines()), type(error).__name__)

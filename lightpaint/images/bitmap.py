@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.colour.icc import Profile, read_icc
 from lightpaint.errors import ImageError
+from lightpaint.files import first_line
 from lightpaint.images.png import read_png_head
 from lightpaint.images.psd import check_psd
 from lightpaint.images.silence import silenced
@@ -102,7 +103,7 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
     plain["oiio:UnassociatedAlpha"] = 1  # or it multiplies display values by alpha
     file = OpenImageIO.ImageInput.open(str(path), plain)
     if file is None:
-        raise ImageError(f"is damaged: {_first_line(OpenImageIO.geterror())}")
+        raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror())}")
     try:
         if file.format_name() != kind:
             raise ImageError(f"is damaged: it begins like {kind.upper()} and is none")
@@ -111,7 +112,7 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
         pixels = file.read_image(0, 0, 0, spec.nchannels, spec.format)
         error = file.geterror()
         if pixels is None or error:
-            raise ImageError(f"is damaged or cut off: {_first_line(error)}")
+            raise ImageError(f"is damaged or cut off: {first_line(error)}")
         if kind == "tiff":
             _check_pages(file, spec)
     finally:
@@ -180,7 +181,3 @@ def _upright(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
     if orientation in (2, 3, 6, 7):
         pixels = pixels[:, ::-1]
     return pixels
-
-
-def _first_line(text: str) -> str:
-    return next(iter(text.strip().splitlines()), "no reason given")

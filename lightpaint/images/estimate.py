@@ -86,12 +86,7 @@ def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -
     write_parts(path, [Part("rgb", channels, attributes)])
 
 
-def read_estimate(path: Path) -> Estimate:
-    """Read what `write_estimate` wrote."""
-    return read_estimate_with_attributes(path)[0]
-
-
-def read_estimate_with_attributes(path: Path) -> tuple[Estimate, Mapping[str, str]]:
+def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
     """What `write_estimate` wrote, and the text attributes of its header."""
     parts = read_parts(path)
     if len(parts) > 1:

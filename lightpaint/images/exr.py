@@ -16,7 +16,7 @@ import OpenEXR
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError, OutputError
-from lightpaint.files import replacing
+from lightpaint.files import first_line, replacing
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.silence import silenced
 
@@ -86,13 +86,8 @@ class Part:
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
     """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
     with silenced():
-        try:
-            headers = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
-            size, _ = _windows(headers[0])
-        except Exception as error:
-            reason = _first_line(error)
-            raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
-        return [{k: v for k, v in h.items() if isinstance(v, str)} for h in headers], size
+        headers = [header for _, header in _declared(path)]
+        return [_texts(header) for header in headers], _windows(headers[0])[0]
 
 
 def read_parts(path: Path) -> list[Part]:
@@ -109,23 +104,35 @@ def read_parts(path: Path) -> list[Part]:
         is_a = f"is a {name} file" if name else "is no OpenEXR file"
         raise ImageError(f"{path} {is_a}: export it as linear OpenEXR")
     with silenced():
-        try:
-            header = OpenEXR.File(str(path), header_only=True)
-        except Exception as error:
-            reason = _first_line(error)
-            raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
-        declared = [(part.name(), dict(part.header)) for part in header.parts]
+        declared = _declared(path)
         _check_headers(path, declared)
         try:
             parts = OpenEXR.File(str(path), separate_channels=True).parts
         except Exception as error:
-            raise ImageError(f"{path} is damaged: {_first_line(error)}") from error
+            raise ImageError(f"{path} is damaged: {first_line(error)}") from error
     if len(parts) != len(declared):
         raise ImageError(
             f"{path} is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
             "read; export it again"
         )
     return [_part(path, part) for part in parts]
+
+
+def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
+    """Name and header of each part, without its pixels. Raises ImageError."""
+    try:
+        header = OpenEXR.File(str(path), header_only=True)
+        declared = [(part.name(), dict(part.header)) for part in header.parts]
+        _windows(declared[0][1])
+    except Exception as error:
+        reason = first_line(error)
+        raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
+    return declared
+
+
+def _texts(header: Mapping[str, Any]) -> dict[str, str]:
+    """The text attributes of a header."""
+    return {key: value for key, value in header.items() if isinstance(value, str)}
 
 
 def _part(path: Path, part: Any) -> Part:
@@ -147,7 +154,7 @@ def _part(path: Path, part: Any) -> Part:
     return Part(
         part.name() or "",
         channels,
-        {k: v for k, v in part.header.items() if isinstance(v, str)},
+        _texts(part.header),
         display,
         offset,
         _primaries(part.header),
@@ -205,7 +212,7 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
         try:
             OpenEXR.File(exr_parts).write(str(beside))
         except RuntimeError as error:  # the library's word for a full disk and the like
-            raise OutputError(f"cannot write {path}: {_first_line(error)}") from error
+            raise OutputError(f"cannot write {path}: {first_line(error)}") from error
 
 
 def rgb_channels(image: Floats, layer: str = "") -> dict[str, Floats]:
@@ -256,8 +263,3 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
             f"{path} declares {size:.2g} bytes of pixels, in a file of {path.stat().st_size:.2g}: "
             "too many to read"
         )
-
-
-def _first_line(error: BaseException) -> str:
-    text = str(error).strip()
-    return text.splitlines()[0] if text else type(error).__name__

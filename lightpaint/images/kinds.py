@@ -1,8 +1,10 @@
 """Which kind of picture a file is, by how it begins: its name says nothing."""
 
+import sys
 from pathlib import Path
 
 from lightpaint.errors import ImageError
+from lightpaint.files import file_length
 
 #: How files begin, what people call them, and the kind as which they are read; "" if they are not.
 BEGINNINGS = (
@@ -27,10 +29,7 @@ BEGINNINGS = (
 
 def head_of(path: Path, length: int) -> bytes:
     """How an image file begins. Raises ImageError if there is none that can be read."""
-    if path.is_dir():
-        raise ImageError(f"{path} is a folder, not an image file")
-    if not path.is_file():
-        raise ImageError(f"no such image file: {path}")
+    file_length(path, "image file", ImageError, limit=sys.maxsize)
     try:
         with path.open("rb") as file:
             return file.read(length)

@@ -1,7 +1,7 @@
 """One thing that holds lights back, as data: what it is, and what it costs."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 #: What holds: that light is not negative; that a light is not adjusted; what was asked of it.
 Kind = Literal["zero", "kept", "lock", "off", "left out", "tie", "limits", "colour"]
@@ -38,14 +38,3 @@ class Bound:
     def is_switched_off(self) -> bool:
         """Whether it is off because somebody, or a choice of few lights, wants it so."""
         return self.kind in ("off", "left out")
-
-    def fields(self) -> dict[str, Any]:
-        """As it stands in lighting.json."""
-        return {
-            "lights": list(self.lights),
-            "kind": self.kind,
-            "held_by": self.held_by,
-            "gain": self.gain,
-            "multiplier": list(self.multiplier),
-            "per": self.per,
-        }

@@ -8,7 +8,7 @@ display shows; `reweighted.py` finds the squares that stand for it where it is l
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,42 +21,6 @@ STRIP = 2**16
 
 #: From arrays of all views to the part of one of them.
 Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
-
-
-class Loss(Protocol):
-    """F, of pictures x, (h, w, 3) linear.
-
-    importance: (h, w) >= 0, where it counts. transform: through which it sees x; None for linear
-    light.
-    """
-
-    @property
-    def importance(self) -> Floats: ...
-
-    @property
-    def transform(self) -> ViewTransform | None: ...
-
-    @property
-    def norm2(self) -> Doubles:
-        """The objective of a black picture, (3,): ‖Ψ‖² where nothing else is asked."""
-
-    def objective(self, x: Floats) -> Doubles:
-        """F less the least that any picture could have, per channel, (3,)."""
-
-    def squares(self, x: Floats, *, from_clipping: bool = False) -> "Squares":
-        """Squares with F's own gradient at x (see `PaintingLoss.squares`)."""
-
-    def meant(self, x: Floats) -> Floats:
-        """What was to be there, (h, w, 3) linear, of a picture x: x itself where that will do."""
-
-    def missed(self, x: Floats) -> Doubles:
-        """What a picture misses of the painting, (h, w, 3), as the view transform shows it."""
-
-    def same_squares(self, a: Floats, b: Floats) -> bool:
-        """Whether the squares made for two pictures are the same, and so exact between them."""
-
-    def cut(self, part: Cut) -> "Loss":
-        """That of a part of the pixels, all arrays by `part`."""
 
 
 @dataclass(frozen=True)
@@ -268,6 +232,10 @@ class PaintingLoss:
         apart = np.square(self._shown_painting - self._shown_current)
         apart = np.where(self.at_least & (self.current >= self.painted), 0, apart)
         return np.asarray(q * (1 - q) * apart)
+
+
+#: F, of pictures x, (h, w, 3) linear; seen through its transform, or as linear light.
+Loss = Squares | PaintingLoss
 
 
 def _with_chords(own: Floats, missed: Floats, way: Floats) -> Doubles:

@@ -61,19 +61,6 @@ class NormalEquations:
         # A perfect fit leaves round-off of either sign.
         return np.asarray(np.maximum(value, 0))
 
-    def holding(self, is_fixed: npt.NDArray[np.bool_]) -> "NormalEquations":
-        """The problem of the other lights while these have weight 1: Ψ − Σ_fixed Φ_j is left.
-
-        is_fixed: (n,). Known terms of M w = b go to its right-hand side.
-        """
-        free, held = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
-        within = self.M[:, held][:, :, held].sum(axis=(1, 2))
-        return NormalEquations(
-            self.M[:, free][:, :, free],
-            self.b[:, free] - self.M[:, free][:, :, held].sum(axis=2),
-            np.maximum(self.target_norm2 - 2 * self.b[:, held].sum(axis=1) + within, 0),
-        )
-
     @classmethod
     def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":
         """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w) or (h, w, 3)."""

@@ -179,6 +179,7 @@ class Painting:
         """Paint over a rectangle of view k. Raises ValueError, and changes nothing, for misfits."""
         target, basis, look = self.views.targets[k], self.views.bases[k], self.looks[k]
         assert target.at_least is not None
+        self.tiles[k].touched(region)
         if importance is not None:
             given = np.asarray(importance)
             if not (np.isfinite(given).all() and (given >= 0).all()):
@@ -206,8 +207,7 @@ class Painting:
         for name in ("image", "weight", "share"):
             self.views.part(getattr(self.word, name), k)[region] = getattr(part, name)
         # A stroke of colour leaves M as it is.
-        weight = None if importance is None else part.weight
-        self.tiles[k].update(region, part.image, weight)
+        self.tiles[k].update(region, with_M=importance is not None)
         self.strokes += 1
 
 

@@ -1,7 +1,8 @@
 """A problem with the lighting that solves it, and what shows that it does."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -102,6 +103,11 @@ class Solution(Shown):
         """What shows how good the solve is."""
         assert self.lighting.certificate is not None
         return self.lighting.certificate
+
+    def told(self, **about: Any) -> "Solution":
+        """The same, with this in its certificate."""
+        certificate = replace(self.certificate, **about)
+        return replace(self, lighting=self.lighting.with_certificate(certificate))
 
     @cached_property
     def views(self) -> tuple["Solution", ...]:

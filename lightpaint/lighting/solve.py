@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles
+from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.algebra.optimum import Method
@@ -105,7 +105,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
         held = replace(problem, reduction=chosen.problem.reduction)
         solution = replace(_descended(held, chosen.weights), tried=chosen.tried)
         first = chosen
-    return _told(solution, unreached=first.certificate.unreached, curve=first.certificate.curve)
+    return solution.told(unreached=first.certificate.unreached, curve=first.certificate.curve)
 
 
 def again(solution: Solution, problem: Problem) -> Solution:
@@ -120,15 +120,9 @@ def again(solution: Solution, problem: Problem) -> Solution:
     step = _one(problem, solution.weights)
     before, reweighting = solution.certificate, solution.reweighting
     converged = step.certificate.converged and reweighting.converged
-    certificate = replace(
-        step.certificate,
-        unreached=before.unreached,
-        curve=before.curve,
-        rounds=before.rounds,
-        converged=converged,
-    )
-    lighting = step.lighting.with_certificate(certificate)
-    return replace(step, lighting=lighting, tried=solution.tried, reweighting=reweighting)
+    kept = {name: getattr(before, name) for name in ("unreached", "curve", "rounds")}
+    told = step.told(converged=converged, **kept)
+    return replace(told, tried=solution.tried, reweighting=reweighting)
 
 
 def _linear(problem: Problem, start: Doubles) -> Solution:
@@ -149,7 +143,7 @@ def _linear(problem: Problem, start: Doubles) -> Solution:
     solution = replace(solution, problem=left, tried=tuple(curve))
     norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
     told = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
-    return _told(solution, curve=tuple(told))
+    return solution.told(curve=tuple(told))
 
 
 def _one(problem: Problem, start: Doubles) -> Solution:
@@ -176,16 +170,9 @@ def _descended(problem: Problem, start: Doubles) -> Solution:
     solved = replace(problem, squares=found.squares, equations=found.equations)
     optimum = best_of(found.equations, found.reweighting.at)
     solution = _solution(solved, optimum, found.weights, problem.pulled(found.equations))
-    certificate = replace(
-        solution.certificate,
-        converged=optimum.converged and found.reweighting.converged,
-        rounds=1 + found.reweighting.rounds,
-    )
-    return replace(
-        solution,
-        lighting=solution.lighting.with_certificate(certificate),
-        reweighting=found.reweighting,
-    )
+    converged = optimum.converged and found.reweighting.converged
+    told = solution.told(converged=converged, rounds=1 + found.reweighting.rounds)
+    return replace(told, reweighting=found.reweighting)
 
 
 def _solution(
@@ -194,7 +181,7 @@ def _solution(
     """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull."""
     transform, names = problem.loss.transform, problem.basis.names
     certificate = Certificate(
-        kkt_residual=_rgb(optimum.kkt_residual),
+        kkt_residual=as_rgb(optimum.kkt_residual),
         objective=(0, 0, 0),
         relative_objective=(0, 0, 0),
         sweeps=optimum.sweeps,
@@ -234,14 +221,3 @@ def _held_back(equations: NormalEquations, basis: Basis, weights: Doubles) -> Bo
 def _of_all(constraints: Constraints) -> Constraints:
     """Without the choice of a few lights."""
     return replace(constraints, sparse=None) if constraints.sparse is not None else constraints
-
-
-def _told(solution: Solution, **about: object) -> Solution:
-    """`solution` with this in its certificate."""
-    certificate = replace(solution.certificate, **about)  # type: ignore[arg-type]
-    return replace(solution, lighting=solution.lighting.with_certificate(certificate))
-
-
-def _rgb(values: Doubles) -> tuple[float, float, float]:
-    r, g, b = (float(v) for v in values)
-    return r, g, b

@@ -10,7 +10,6 @@ from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.errors import SizeError
@@ -31,10 +30,10 @@ FEW_LIGHTS = 32
 
 
 class TiledEquations:
-    """The problem of one basis, target and importance, updated in place.
+    """The problem of one basis, target and importance, which are looked at where they are.
 
     images: (n, h, w, 3); target: (h, w, 3); importance: (h, w) or (h, w, 1), or (h, w, 3) where
-    channels differ, >= 0. The images are not copied, target and importance are.
+    channels differ, finite and >= 0. Whoever paints on these says where, by `update`.
 
     The sums of the tiles are the base of a pyramid, each of whose nodes is the sum of two by
     two below it: a dirty tile costs its own sum and three additions per level, and the order
@@ -54,15 +53,15 @@ class TiledEquations:
                 f"target {target.shape} and importance {importance.shape} do not fit basis images "
                 f"of {(height, width)}"
             )
-        self._target = np.array(target)
-        self._importance = np.array(importance)
+        self._target = target
+        self._importance = importance
         self.side = side_for(n, height, width) if side is None else side
         # What a stroke of colour leaves as it is, M, is kept apart from what it changes, b and
         # ‖Ψ‖².
         shape = -(-height // self.side), -(-width // self.side)
         self._M = _pyramid(shape, (3, n, n))
         self._b = _pyramid(shape, (3, n + 1))
-        self._update((slice(0, height), slice(0, width)), with_M=True)
+        self.update((slice(0, height), slice(0, width)))
 
     @property
     def equations(self) -> NormalEquations:
@@ -70,36 +69,17 @@ class TiledEquations:
         M, b = self._M[-1][0, 0], self._b[-1][0, 0]
         return NormalEquations(M.copy(), b[:, :-1].copy(), b[:, -1].copy())
 
-    def update(
-        self,
-        region: tuple[slice, slice],
-        target: npt.ArrayLike | None = None,
-        importance: npt.ArrayLike | None = None,
-    ) -> None:
-        """Paint over a rectangle: what is given replaces the target or the importance there.
+    def touched(self, region: tuple[slice, slice]) -> tuple[range, range]:
+        """Rows and columns of the tiles that a rectangle, slices of rows and columns, touches.
 
-        region: slices of rows and columns. target: (rows, columns, 3) or one colour; importance:
-        (rows, columns), (rows, columns, 1 or 3) or one number. Raises ValueError, and leaves all
-        as it is, for a negative or infinite importance and for what does not fit the region.
+        Raises ValueError for one that runs backwards.
         """
-        for along, length in zip(region, self._target.shape[:2], strict=True):
-            _tiles(along, length, self.side)
-        if target is not None:
-            np.broadcast_to(target, self._target[region].shape)
-        if importance is not None:
-            given = np.asarray(importance)
-            if given.shape == self._target[region].shape[:2]:
-                given = given[..., None]
-            if not (np.isfinite(given).all() and (given >= 0).all()):
-                raise ValueError("importance is a finite weight >= 0 of each pixel")
-            self._importance[region] = given
-        if target is not None:
-            self._target[region] = target
-        self._update(region, with_M=importance is not None)
+        height, width = self._target.shape[:2]
+        return _tiles(region[0], height, self.side), _tiles(region[1], width, self.side)
 
-    def _update(self, region: tuple[slice, slice], *, with_M: bool) -> None:
-        rows = _tiles(region[0], self._importance.shape[0], self.side)
-        columns = _tiles(region[1], self._importance.shape[1], self.side)
+    def update(self, region: tuple[slice, slice], *, with_M: bool = True) -> None:
+        """Sum anew after a rectangle was painted over. with_M: whether its importance changed."""
+        rows, columns = self.touched(region)
         if not (rows and columns):
             return
         few = max(CHUNK // (8 * 3 * (len(self._images) + 1) * self.side**2), 1)

@@ -6,6 +6,7 @@ before it, and places are taken along these: inside a room, out through its wind
 camera. Of many such places a few are kept that lie far apart.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -114,7 +115,7 @@ def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, fl
     ]
 
 
-def as_position(place: Floats) -> Position:
+def as_position(place: Iterable[Any]) -> Position:
     """A row of `places`."""
     x, y, z = (float(v) for v in place)
     return x, y, z

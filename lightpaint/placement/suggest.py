@@ -5,13 +5,12 @@ of them are rendered in one pass, like a basis, on a small film; what each would
 miss is then a matter of algebra (additions.py). Near the best a second pass looks closer.
 """
 
-import gc
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import RGB, Floats, Position
+from lightpaint.arrays import RGB, Floats, Position, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis, why_not_one_pass
 from lightpaint.errors import SceneError
@@ -98,7 +97,7 @@ def suggest_lights(
     # The gains are of the last linear problem, which may be on another scale.
     total = solution.energy
     small = _on_small_film(scene, basis)
-    space = _look_around(small, seed)
+    space = small.while_loaded(lambda loaded: free_space(small, loaded, seed=seed))
     if not len(space.places):
         return ()
     best: Floats = np.zeros((0, 3))
@@ -148,15 +147,6 @@ def _most(small: Scene, tried: int) -> int:
     return min(tried, max(VALUES // (height * width * 3), FEWEST))
 
 
-def _look_around(scene: Scene, seed: int) -> FreeSpace:
-    loaded = scene.load()
-    try:
-        return free_space(scene, loaded, seed=seed)
-    finally:
-        del loaded
-        gc.collect()
-
-
 def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats:
     """The best so far, and `count` positions more within `radius` of these, far apart."""
     if not len(best):
@@ -188,32 +178,24 @@ def _render(small: Scene, places: Floats, seed: int) -> Basis:
 
 
 def _suggestions(
-    scene: Scene,
-    additions: Sequence[Addition],
-    places: Floats,
-    total: float,
+    scene: Scene, additions: Sequence[Addition], places: Floats, total: float
 ) -> tuple[Suggestion, ...]:
-    loaded = scene.load()
-    try:
-        seen = pixels_of(scene, loaded, places)
-    finally:
-        del loaded
-        gc.collect()
+    seen = scene.while_loaded(lambda loaded: pixels_of(scene, loaded, places))
     names = free_names("suggested", len(additions), [x.name for x in scene.emitters])
     made = []
     missed = total
     for k, addition in enumerate(additions):
         missed -= addition.gain
-        r, g, b = (float(f"{v:.4g}") for v in addition.weights[-1])
-        x, y, z = (float(f"{v:.6g}") for v in places[k])
+        emission = as_rgb(f"{v:.4g}" for v in addition.weights[-1])
+        position = as_position(f"{v:.6g}" for v in places[k])
         made.append(
             Suggestion(
                 name=names[k],
-                position=(x, y, z),
-                emission=(r, g, b),
+                position=position,
+                emission=emission,
                 gain_share=addition.gain / total,
                 missed_share=max(missed, 0.0) / total,
-                xml=emitter_xml(names[k], (x, y, z), (r, g, b)),
+                xml=emitter_xml(names[k], position, emission),
                 seen_at=seen[k],
                 without=addition.without,
                 with_it=addition.with_it,

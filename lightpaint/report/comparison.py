@@ -1,7 +1,6 @@
 """comparison.png: target | predicted | verified | residual, side by side."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display import to_8_bit
-from lightpaint.files import write_bytes
 from lightpaint.images.blocks import block_mean, enlarged
-from lightpaint.images.png import png_bytes
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.pictures import (
@@ -94,22 +91,6 @@ def comparison_image(
     picture = residual_picture(solution, predicted, current, transform=transform, limit=limit)
     tiles.append(Tile("residual", "luminance, predicted - target", picture, limit))
     return compose(tiles)
-
-
-def write_comparison(
-    path: Path,
-    *,
-    basis: Basis,
-    target: Target,
-    solution: Solution,
-    predicted: Floats,
-    verified: Floats | None,
-) -> None:
-    """Write `comparison_image` as PNG, whole or not at all."""
-    image = comparison_image(
-        basis=basis, target=target, solution=solution, predicted=predicted, verified=verified
-    )
-    write_bytes(path, png_bytes(image))
 
 
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:

@@ -8,6 +8,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure
+from lightpaint.report.html import row, share_cell, table
 from lightpaint.report.sentences import spoken_percent
 from lightpaint.report.verdict import relative_residual
 
@@ -50,23 +51,13 @@ def _curve(solution: Solution, free: Solution) -> str:
     if not curve:
         return ""
     used = _used(solution)
-    rows = [
-        _row(f"{_lights(count)}{', as asked' if count == used else ''}", missed)
+    told = [
+        (f"{_lights(count)}{', as asked' if count == used else ''}", missed)
         for count, missed in curve
     ]
-    rows.append(_row("without constraints", relative_residual(free)))
-    return (
-        '<table><thead><tr><th scope="col">lights on, the best that were found</th>'
-        f'<th scope="col">missed</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
-    )
-
-
-def _row(what: str, missed: float) -> str:
-    return (
-        f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(missed)}</span>'
-        '<div class="bar" aria-hidden="true">'
-        f'<i style="width: {100 * min(missed, 1.0):.2f}%"></i></div></td></tr>'
-    )
+    told.append(("without constraints", relative_residual(free)))
+    rows = [row(what, share_cell(spoken_percent(x), min(x, 1.0))) for what, x in told]
+    return table(("lights on, the best that were found", "missed"), rows)
 
 
 def _numbers(basis: Basis, solution: Solution, transform: ViewTransform) -> str:

@@ -12,7 +12,8 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.figures import SIGNED, Picture, figure, scale
+from lightpaint.report.figures import Picture, figure, signed_scale
+from lightpaint.report.html import row, share_cell, table
 from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
     how_sure,
@@ -41,11 +42,13 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     # Those that are off and may be on come behind, by how bright they may be.
     order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
     rows = [
-        f'<tr><th scope="row">{escape(basis.names[k])}</th>'
-        f"<td>{float(luminance(uncertainty.weights[k])):.3g}</td>"
-        f"<td>{low[k]:.3g} … {high[k]:.3g}</td>"
-        f"<td>{f'± {spoken_percent(float(errors[k]))}' if np.isfinite(errors[k]) else '–'}</td>"
-        f"<td>{f'± {spoken_percent(float(effect[k]))}' if effect[k] else '–'}</td></tr>"
+        row(
+            escape(basis.names[k]),
+            f"{float(luminance(uncertainty.weights[k])):.3g}",
+            f"{low[k]:.3g} … {high[k]:.3g}",
+            f"± {spoken_percent(float(errors[k]))}" if np.isfinite(errors[k]) else "–",
+            f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
+        )
         for k in order[:ROWS]
         if errors[k] > 0
     ]
@@ -59,9 +62,7 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
         "yet make up for each other in the picture: together these errors miss about "
         f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).{others}</p>"
         f"{_steps(solution)}</div>"
-        '<table><thead><tr><th scope="col">light</th><th scope="col">solved</th>'
-        '<th scope="col">95 % between</th><th scope="col">of it</th>'
-        f'<th scope="col">of the picture</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+        f"{table(('light', 'solved', '95 % between', 'of it', 'of the picture'), rows)}"
         "</div></section>"
     )
 
@@ -108,18 +109,12 @@ def _shares(diagnosis: Diagnosis) -> str:
     ]
     if d.compromise > 0:
         parts.insert(2, ("given up for the other views", d.compromise))
-    rows = [
-        f'<tr><th scope="row">{what}</th><td class="share"><span>{spoken_percent(d.share(part))}'
-        '</span><div class="bar" aria-hidden="true">'
-        f'<i style="width: {100 * d.share(part):.2f}%"></i></div></td></tr>'
-        for what, part in parts
-    ]
+    shares = [(what, d.share(part)) for what, part in parts]
+    rows = [row(what, share_cell(spoken_percent(x), x)) for what, x in shares]
     if d.ignored > 0:
         times = d.ignored / d.total if d.total > 0 else np.inf
-        rows.append(
-            '<tr><th scope="row">besides, where it does not count</th>'
-            f"<td>{f'{times:.2g} times as much' if np.isfinite(times) else 'all'}</td></tr>"
-        )
+        told = f"{times:.2g} times as much" if np.isfinite(times) else "all"
+        rows.append(row("besides, where it does not count", told))
     return f"<table><tbody>{''.join(rows)}</tbody></table>"
 
 
@@ -156,7 +151,7 @@ def _maps(
             figure(
                 Picture(name, f"False-colour map: {name}.", share * colours + (1 - share) * grey),
                 caption,
-                scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+                signed_scale(limit),
             )
         )
     if diagnosis.ignored > 0:
@@ -165,7 +160,7 @@ def _maps(
             figure(
                 Picture("Not counted", "False-colour map of what does not count.", colours),
                 "Painted and missed where the importance is small.",
-                scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+                signed_scale(limit),
             )
         )
     return "".join(figures)
@@ -173,10 +168,12 @@ def _maps(
 
 def _bounds(diagnosis: Diagnosis) -> str:
     rows = [
-        f'<tr><th scope="row">{escape(", ".join(bound.lights))}</th>'
-        f"<td>{escape(_held_by(bound))}</td>"
-        f"<td>{spoken_percent(diagnosis.gained(bound))}</td>"
-        f'<td class="rgb">{_multiplier(bound)}</td></tr>'
+        row(
+            escape(", ".join(bound.lights)),
+            escape(_held_by(bound)),
+            spoken_percent(diagnosis.gained(bound)),
+            f'<td class="rgb">{_multiplier(bound)}</td>',
+        )
         for bound in diagnosis.bounds
         if diagnosis.gained(bound) >= SMALLEST_GAIN
     ]
@@ -192,9 +189,7 @@ def _bounds(diagnosis: Diagnosis) -> str:
         "reason would go below zero and so take light away: a hint at which other lights spill "
         f"where they should not.{others}</p><p>At first: how the objective would change, per unit, "
         "if that which holds were raised a little.</p></div>"
-        '<table><thead><tr><th scope="col">light</th><th scope="col">held by</th>'
-        '<th scope="col">less missed<br>without that</th><th scope="col">at first</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
+        f"{table(('light', 'held by', 'less missed<br>without that', 'at first'), rows)}</div>"
     )
 
 

@@ -126,7 +126,7 @@ def maps(
         figure(
             Picture("Residual", "False-colour map of the residual.", picture),
             "Luminance, predicted − target. Hatched pixels do not count.",
-            scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}"),
+            signed_scale(limit),
         ),
         figure(
             Picture(
@@ -162,6 +162,11 @@ def figure(picture: Picture, caption: str, legend: str) -> str:
         f'src="{data_uri(to_8_bit(picture.pixels))}">{legend}'
         f"<figcaption><strong>{picture.name}.</strong> {caption}</figcaption></figure>"
     )
+
+
+def signed_scale(limit: float) -> str:
+    """The legend of what is too dark or too bright, up to `limit`."""
+    return scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}")
 
 
 def scale(colours: list[str], *ends: str) -> str:

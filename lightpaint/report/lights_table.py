@@ -16,6 +16,7 @@ from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
+from lightpaint.report.html import share_cell
 from lightpaint.report.sentences import relative_errors, spoken_error
 from lightpaint.report.verdict import energy_shares
 
@@ -41,8 +42,7 @@ def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
             f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
             f"<td>{change(light, setting, unreached)}{error}{_asked(setting)}</td>"
-            f'<td class="share"><span>{100 * share:.1f} %</span><div class="bar" '
-            f'aria-hidden="true"><i style="width: {100 * share:.2f}%"></i></div></td></tr>'
+            f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
         )
     return "".join(rows)
 

@@ -67,6 +67,14 @@ def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
     return np.repeat(dim[..., None], 3, axis=-1)
 
 
+def over_unpainted(
+    picture: Floats, share: Floats, current: Floats, *, transform: ViewTransform
+) -> Floats:
+    """A picture, laid over `unpainted_look` by its share of each pixel, (h, w)."""
+    share = share[..., None]
+    return np.asarray(share * picture + (1 - share) * unpainted_look(current, transform=transform))
+
+
 def target_picture(
     target: Target, solution: Solution, current: Floats, *, transform: ViewTransform
 ) -> Floats:
@@ -75,17 +83,15 @@ def target_picture(
     current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
     display encoding of the target.
     """
-    share = painted(target, solution)[..., None]
     paint = transform.encode(target.image)
-    return np.asarray(share * paint + (1 - share) * unpainted_look(current, transform=transform))
+    return over_unpainted(paint, painted(target, solution), current, transform=transform)
 
 
 def importance_picture(importance: Floats, current: Floats, *, transform: ViewTransform) -> Floats:
     """The current look in pale yellow where it counts; dimmed and hatched where not."""
-    share = coverage(importance)[..., None]
     grey = luminance(transform.encode(current))[..., None]
     counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
-    return np.asarray(share * counted + (1 - share) * unpainted_look(current, transform=transform))
+    return over_unpainted(counted, coverage(importance), current, transform=transform)
 
 
 def residual(solution: Solution, predicted: Floats) -> Floats:
@@ -108,9 +114,8 @@ def residual_picture(
     limit: float,
 ) -> Floats:
     """False colours of the residual from −limit to +limit, dimmed where it does not count."""
-    share = coverage(solution.importance)[..., None]
     colours = diverging(residual(solution, predicted) / limit)
-    return np.asarray(share * colours + (1 - share) * unpainted_look(current, transform=transform))
+    return over_unpainted(colours, coverage(solution.importance), current, transform=transform)
 
 
 def diverging(values: Floats) -> Floats:

@@ -8,6 +8,7 @@ from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.figures import data_uri
+from lightpaint.report.html import facts
 from lightpaint.report.sentences import spoken_percent
 
 #: Ring around the place of a light in the picture, dark on bright and bright on dark.
@@ -70,7 +71,7 @@ def _shown(
     """before: whether others are suggested before it, which then are in both pictures."""
     seen = suggestion.photometry(cd_per_unit)
     amounts = ", ".join(filter(None, seen.amounts))
-    facts = [
+    told = [
         ("at", spoken_position(suggestion)),
         ("intensity", f"{' '.join(f'{v:.4g}' for v in suggestion.emission)} W/sr"),
         ("colour", seen.color),
@@ -78,7 +79,7 @@ def _shown(
         ("takes away", f"{spoken_percent(suggestion.gain_share)} of what is missed"),
         ("leaves", f"{spoken_percent(suggestion.missed_share)} of it"),
     ]
-    listed = "".join(f"<dt>{k}</dt><dd>{escape(v)}</dd>" for k, v in facts if v)
+    listed = facts((k, v) for k, v in told if v)
     swatch = f'<span class="swatch" style="background: {seen.hex}"></span>' if seen.hex else ""
     where = (
         "the ring is where it would be, perhaps behind something"

@@ -5,8 +5,6 @@ Names of lights, targets and scenes come from other people's files and are escap
 
 import importlib.metadata
 import platform
-from html import escape
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.report.html import facts, row
 from lightpaint.report.verdict import (
     codes_missed,
     linear_residual,
@@ -34,8 +33,7 @@ def fit_table(solution: Solution) -> str:
         ("red", "green", "blue"), q.relative_objective, each, q.kkt_residual, q.sweeps, strict=True
     )
     rows = [
-        f'<tr><th scope="row">{name}</th><td>{objective:.3g}{error}</td>'
-        f"<td>{np.sqrt(objective):.3g}</td><td>{kkt:.1e}</td><td>{sweeps}</td></tr>"
+        row(name, f"{objective:.3g}{error}", f"{np.sqrt(objective):.3g}", f"{kkt:.1e}", f"{sweeps}")
         for name, objective, error, kkt, sweeps in columns
     ]
     total = relative_residual(solution)
@@ -52,10 +50,10 @@ def fit_table(solution: Solution) -> str:
 def verification_table(verification: Verification | None) -> str:
     """How far prediction and render are apart, each number beside what is allowed."""
     if verification is None:
-        return _facts([("Result", "not verified")])
+        return facts([("Result", "not verified")])
     v = verification
     means = ", ".join(f"{value:+.2f}" for value in v.z_mean).replace("-", "−")
-    return _facts(
+    return facts(
         [
             ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
             ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
@@ -80,31 +78,32 @@ def render_table(
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
     adjusted = int((~basis.is_fixed).sum())
-    facts = [
+    told = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
     ]
-    facts += _fitted_facts(solution, predicted)
+    told += _fitted(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:
-            facts.append(("Kept as they are", ", ".join(light.members)))
+            told.append(("Kept as they are", ", ".join(light.members)))
     if q.unreached:
-        facts.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
+        told.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
     if target.not_finite:
-        facts.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
-    return _facts(facts)
+        told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
+    return facts(told)
 
 
-def _fitted_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
+def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
     """What was compared with the painting, where it was not plain light."""
     if solution.problem.is_linear or solution.reweighting is None:
         return []
-    q, facts = solution.certificate, []
+    q = solution.certificate
+    told: list[tuple[str, str]] = []
     if q.display:
-        facts += [
+        told += [
             ("Fitted in display space", f"as {q.display} shows it"),
             (
                 "Missed on the display",
@@ -120,14 +119,14 @@ def _fitted_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, st
     if isinstance(loss, PaintingLoss) and loss.at_least[solution.importance > 0].any():
         its = loss.at_least & (solution.importance > 0)[..., None]
         brighter = its & (predicted.image > loss.painted)
-        facts.append(
+        told.append(
             (
                 "Painted as at least so bright",
                 f"{its.any(axis=-1).sum()} pixels, {brighter.any(axis=-1).sum()} of which are "
                 "brighter now",
             )
         )
-    return [*facts, ("Linear problems solved", f"{q.rounds}, each certified")]
+    return [*told, ("Linear problems solved", f"{q.rounds}, each certified")]
 
 
 def _samples(basis: Basis) -> str:
@@ -162,7 +161,3 @@ def _lights_off(solution: Solution) -> int:
 
 def _seen_note(target: Target, seen: int) -> str:
     return ", which do not count" if seen and target.everything else ""
-
-
-def _facts(facts: list[tuple[str, Any]]) -> str:
-    return "".join(f"<dt>{escape(k)}</dt><dd>{escape(str(v))}</dd>" for k, v in facts)

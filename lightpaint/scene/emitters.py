@@ -1,7 +1,9 @@
 """The emitters of a loaded scene, as Mitsuba has them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,9 @@ from lightpaint.scene.emission import (
     why_not_adjusted,
 )
 from lightpaint.scene.parsed import ParsedScene
+
+#: Characters of a name beyond which it is a mistake.
+MAX_NAME = 1000
 
 #: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
 NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
@@ -110,6 +115,14 @@ def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
             )
         )
     return tuple(sorted(found, key=lambda emitter: emitter.node))
+
+
+def check_emitters(path: Path, emitters: Sequence[Emitter]) -> None:
+    """Raise SceneError for a scene without light, and for a name that nobody can mean."""
+    if not emitters:
+        raise SceneError(f"{path} has no lights: add at least one emitter")
+    if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
+        raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
 
 
 def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:

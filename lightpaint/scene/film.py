@@ -137,6 +137,11 @@ def check_film(path: Path, film: Film, spp: int) -> None:
         )
 
 
+def camera_named(loaded: Any, name: str) -> Any:
+    """The sensor of that name in a loaded scene."""
+    return next(sensor for sensor in loaded.sensors() if sensor.id() == name)
+
+
 def sensor_index(wanted: int | str | None, names: Sequence[str], path: Path) -> int:
     """Of the sensor with that index or name, the first by default. Raises SceneError."""
     if not names:

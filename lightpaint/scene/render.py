@@ -1,6 +1,5 @@
 """Ordinary Mitsuba renders of a scene, in passes, as an `Estimate` with its noise."""
 
-import gc
 from collections.abc import Mapping
 from enum import IntEnum
 from itertools import zip_longest
@@ -83,53 +82,47 @@ def render(
     spp: samples per pixel in all (the scene's own number by default).
     Returns linear Rec.709 radiance, (h, w, 3).
     """
-    loaded = scene.load(emission)
-    try:
+
+    def rendered(loaded: Any) -> Estimate:
         return render_loaded(
-            loaded,
-            scene,
-            spp=scene.spp if spp is None else spp,
-            seed=seed,
-            stream=stream,
-            label=label,
-            progress=progress,
+            loaded, scene, spp=spp, seed=seed, stream=stream, label=label, progress=progress
         )
-    finally:
-        del loaded
-        gc.collect()
+
+    return scene.while_loaded(rendered, emission)
 
 
 def render_loaded(
     loaded: Any,
     scene: Scene,
     *,
-    spp: int,
+    spp: int | None = None,
     seed: int,
     stream: Stream,
     label: str = "render",
     progress: Progress = silent,
 ) -> Estimate:
     """As `render`, for a scene that is already loaded."""
-    import mitsuba as mi
-
     height, width = scene.size
-    passes = plan_passes(height * width, spp)
+    passes = plan_passes(height * width, scene.spp if spp is None else spp)
     halves = np.zeros((2, height, width, 3), np.float64)
     progress(label, 0, len(passes))
     with interruptible_between_pieces() as let_interrupts_through:
         for k, (half, pass_spp) in enumerate(passes):
-            image = mi.render(
-                loaded,
-                sensor=scene.camera(loaded),
-                seed=pass_seed(seed, stream, k),
-                spp=pass_spp,
-            )
-            # Integrators that wrap another add channels of their own behind R, G and B.
-            halves[half] += pass_spp * np.array(image)[..., :3].astype(np.float64)
+            image = render_pass(loaded, scene, seed=pass_seed(seed, stream, k), spp=pass_spp)
+            halves[half] += pass_spp * image.astype(np.float64)
             progress(label, k + 1, len(passes))
             let_interrupts_through()
     halves /= sum(size for _, size in passes) / 2
     return Estimate.of_halves(as_float32(halves[0]), as_float32(halves[1]))
+
+
+def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
+    """What the scene's own integrator makes of so many samples per pixel, (h, w, 3)."""
+    import mitsuba as mi
+
+    image = mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp)
+    # Integrators that wrap another add channels of their own behind R, G and B.
+    return np.array(image)[..., :3]
 
 
 def as_float32(image: Floats) -> Floats:

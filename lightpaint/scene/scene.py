@@ -6,10 +6,10 @@ time, and no reference to one of its emitters may outlive it.
 
 import gc
 import hashlib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,16 +19,15 @@ from lightpaint.files import file_length
 from lightpaint.scene.checks.xml import MAX_XML
 from lightpaint.scene.choice import REST, choose_lights
 from lightpaint.scene.emission import EmitterSetting
-from lightpaint.scene.emitters import Emitter, find_emitters, point_emitter
-from lightpaint.scene.film import Film, check_film, reduced, reduction, sensor_index
+from lightpaint.scene.emitters import Emitter, check_emitters, find_emitters, point_emitter
+from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import Integrator, ParsedScene, mitsuba_errors
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import Listed, Shown, some_of
 
-#: Characters of a name beyond which it is a mistake.
-MAX_NAME = 1000
+_Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ class Scene(Shown):
 
     def camera(self, loaded: Any) -> Any:
         """The sensor this scene is seen through, in what `load` returned."""
-        return _camera(loaded, self.sensor_names[self.sensor])
+        return camera_named(loaded, self.sensor_names[self.sensor])
 
     def eye(self, loaded: Any) -> Any:
         """Where that sensor stands, as an `mi.Point3f`."""
@@ -195,6 +194,17 @@ class Scene(Shown):
         """
         settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
         return self._parsed.instantiate(settings, self.film)
+
+    def while_loaded(
+        self, work: Callable[[Any], _Made], emission: Mapping[str, RGB] | None = None
+    ) -> _Made:
+        """What `work` makes of what `load` returns, which is let go of afterwards."""
+        loaded = self.load(emission)
+        try:
+            return work(loaded)
+        finally:
+            del loaded
+            gc.collect()
 
     def emitted_image(self, emitter: Emitter) -> Floats:
         """The image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
@@ -260,7 +270,8 @@ def load_scene(
     with mitsuba_errors(path):
         seen = _look_at(parsed, index)
     check_film(path, seen["film"], seen["spp"])
-    emitters = _checked(path, seen["emitters"])
+    emitters = seen["emitters"]
+    check_emitters(path, emitters)
     return Scene(
         path=path,
         parameters=values,
@@ -275,7 +286,7 @@ def load_scene(
 def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
     """What only the loaded scene tells, and the parsed one, as fields of a `Scene`."""
     loaded = parsed.instantiate({})
-    camera = _camera(loaded, parsed.sensor_names[sensor])
+    camera = camera_named(loaded, parsed.sensor_names[sensor])
     seen = {
         "emitters": find_emitters(parsed, loaded),
         "film": Film.of(camera, sensor),
@@ -292,18 +303,6 @@ def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
         "files": parsed.files,
         "content": parsed.content(sensor),
     }
-
-
-def _checked(path: Path, emitters: tuple[Emitter, ...]) -> tuple[Emitter, ...]:
-    if not emitters:
-        raise SceneError(f"{path} has no lights: add at least one emitter")
-    if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
-        raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
-    return emitters
-
-
-def _camera(loaded: Any, name: str) -> Any:
-    return next(sensor for sensor in loaded.sensors() if sensor.id() == name)
 
 
 def _has_null_surfaces(loaded: Any) -> bool:

@@ -1,6 +1,5 @@
 """What the camera sees first: colour, direction and distance of surfaces, and whose they are."""
 
-import gc
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -39,31 +38,25 @@ class Surfaces:
 
 def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent) -> Surfaces:
     """Look at `scene` without its light."""
+    return scene.while_loaded(lambda loaded: _surfaces(scene, loaded, seed, progress))
+
+
+def _surfaces(scene: Scene, loaded: Any, seed: int, progress: Progress) -> Surfaces:
     import mitsuba as mi
 
-    loaded = scene.load()
-    try:
-        integrator = mi.load_dict(
-            {"type": "aov", "aovs": "a:albedo,n:sh_normal,p:position,i:shape_index"}
-        )
-        samples = []
-        with interruptible_between_pieces() as let_interrupts_through:
-            for k in range(SAMPLES):
-                image = mi.render(
-                    loaded,
-                    sensor=scene.camera(loaded),
-                    integrator=integrator,
-                    spp=1,
-                    seed=pass_seed(seed, Stream.SURFACES, k),
-                )
-                samples.append(np.array(image))
-                progress("surfaces", k + 1, SAMPLES)
-                let_interrupts_through()
-        to_world = np.array(scene.camera(loaded).world_transform().matrix).reshape(4, 4)
-        return _averaged(np.stack(samples), np.linalg.inv(to_world), _names_by_index(loaded))
-    finally:
-        del loaded
-        gc.collect()
+    camera, samples = scene.camera(loaded), []
+    integrator = mi.load_dict(
+        {"type": "aov", "aovs": "a:albedo,n:sh_normal,p:position,i:shape_index"}
+    )
+    with interruptible_between_pieces() as let_interrupts_through:
+        for k in range(SAMPLES):
+            seed_k = pass_seed(seed, Stream.SURFACES, k)
+            image = mi.render(loaded, sensor=camera, integrator=integrator, spp=1, seed=seed_k)
+            samples.append(np.array(image))
+            progress("surfaces", k + 1, SAMPLES)
+            let_interrupts_through()
+    to_world = np.array(camera.world_transform().matrix).reshape(4, 4)
+    return _averaged(np.stack(samples), np.linalg.inv(to_world), _names_by_index(loaded))
 
 
 def _averaged(

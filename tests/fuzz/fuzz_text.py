@@ -16,7 +16,7 @@ import atheris
 with atheris.instrument_imports(include=["lightpaint", "json", "tomllib"]):
     from lightpaint.errors import LightpaintError
     from lightpaint.lighting.constraints.file import read_constraints
-    from lightpaint.lighting.lighting import read_lighting
+    from lightpaint.lighting.file import read_lighting
     from lightpaint.scene.lights_file import read_lights_file
 
 PATH = Path(tempfile.mkdtemp()) / "text"

@@ -85,7 +85,7 @@ def test_there_and_back(tmp_path: Path):
     rng = np.random.default_rng(0)
     image, half = rng.random((2, 5, 7, 3)).astype(np.float32)
     write_estimate(tmp_path / "a.exr", Estimate(image, half), {"lightpaint.seed": "7"})
-    back = read_estimate(tmp_path / "a.exr")
+    back, _ = read_estimate(tmp_path / "a.exr")
     np.testing.assert_array_equal(back.image, image)
     np.testing.assert_array_equal(back.half_difference, half)
     assert back.image.dtype == back.half_difference.dtype == np.float32

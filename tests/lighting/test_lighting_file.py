@@ -9,12 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.errors import LightingError
+from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import (
     Certificate,
     Lighting,
     LightSetting,
-    read_lighting,
-    write_lighting,
 )
 
 AMOUNTS = st.floats(min_value=0, allow_nan=False, allow_infinity=False)

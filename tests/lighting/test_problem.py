@@ -176,7 +176,12 @@ def test_what_was_painted_on_is_not_painted_on_again(make_basis: Any) -> None:
         {"image": [np.nan, 0, 0]},
         {"importance": -1.0},
         {"importance": np.inf},
+        {"importance": np.nan},
         {"importance": np.ones((9, 8))},
+        # What fits beside what does not: not even the next stroke finds any of it.
+        {"image": np.ones((9, 9, 4)), "importance": 0.5},
+        {"image": [1, 1, 1], "importance": 0.5, "region": (slice(3, 0, -1), slice(0, 3))},
+        {"image": [1, 1, 1], "importance": 0.5, "at_least": np.ones((2, 2, 3), bool)},
     ],
 )
 def test_a_stroke_that_does_not_fit_changes_nothing(
@@ -186,10 +191,14 @@ def test_a_stroke_that_does_not_fit_changes_nothing(
     region = (slice(0, 9), slice(0, 9))
     problem = Problem.of(basis, target).painted(region, [0.5, 0.5, 0.5])
     with pytest.raises(ValueError):  # noqa: PT011 (numpy's words for what does not fit)
-        problem.painted(region, **stroke)
-    again = problem.painted((slice(0, 0), slice(0, 0)), [0, 0, 0])
-    assert again.equations.M.tobytes() == problem.equations.M.tobytes()
-    assert again.equations.b.tobytes() == problem.equations.b.tobytes()
+        problem.painted(**{"region": region, **stroke})
+    nowhere = (slice(0, 0), slice(0, 0))
+    for there in (nowhere, (slice(1, 2), slice(1, 2))):
+        untouched = Problem.of(basis, target).painted(region, [0.5, 0.5, 0.5])
+        untouched = untouched.painted(there, [0.1, 0.2, 0.3], 1.0)
+        problem = problem.painted(there, [0.1, 0.2, 0.3], 1.0)
+        assert problem.equations.M.tobytes() == untouched.equations.M.tobytes()
+        assert problem.equations.b.tobytes() == untouched.equations.b.tobytes()
 
 
 def test_what_is_no_target(make_basis: Any) -> None:

@@ -12,9 +12,11 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError
+from lightpaint.files import write_bytes
+from lightpaint.images.png import png_bytes
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.comparison import SURROUND, comparison_image, write_comparison
+from lightpaint.report.comparison import SURROUND, comparison_image
 from lightpaint.report.pictures import (
     DIVERGING,
     coverage,
@@ -112,7 +114,7 @@ def test_the_exposure_stands_in_the_caption(make_basis: Any):
 
 def test_the_file_holds_the_image(make_basis: Any, tmp_path: Path):
     look = _look(make_basis)
-    write_comparison(tmp_path / "comparison.png", **look)
+    write_bytes(tmp_path / "comparison.png", png_bytes(comparison_image(**look)))
     data = (tmp_path / "comparison.png").read_bytes()
     with Image.open(io.BytesIO(data)) as file:
         np.testing.assert_array_equal(np.asarray(file), comparison_image(**look))

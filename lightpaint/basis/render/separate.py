@@ -15,7 +15,7 @@ from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.budget import SHORTER, Budget, Clock, Keeper, next_pair
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces
-from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes
+from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_pass
 from lightpaint.scene.scene import Scene
 
 WHITE: RGB = (1.0, 1.0, 1.0)
@@ -161,19 +161,11 @@ def _alone(scene: Scene, light: int) -> Any:
 def _add_pass(
     loaded: Any, scene: Scene, sums: LightSums, light: int, half: int, spp: int, seed: int
 ) -> None:
-    import mitsuba as mi
-
     # Each light has samples of its own.
     of_light = pass_seed(seed, Stream.BASIS, light)
     number = 2 * int(sums.passes[light, half]) + half
-    image = mi.render(
-        loaded,
-        sensor=scene.camera(loaded),
-        seed=pass_seed(of_light, Stream.BASIS, number),
-        spp=spp,
-    )
-    # Integrators that wrap another add channels of their own behind R, G and B.
-    sums.planes[half, light] += spp * as_float32(np.array(image)[..., :3])
+    image = render_pass(loaded, scene, seed=pass_seed(of_light, Stream.BASIS, number), spp=spp)
+    sums.planes[half, light] += spp * as_float32(image)
     sums.spp[light, half] += spp
     sums.passes[light, half] += 1
 

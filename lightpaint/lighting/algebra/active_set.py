@@ -35,7 +35,7 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
         move = _newton(q, x, gradient, working)
         target = x + move
         beyond = working.free & ((target < q.lower) | (target > q.upper))
-        exceeded = _exceeded(q, x, target, working)
+        exceeded = _exceeded(q, target, working)
         if not beyond.any() and not exceeded.any():
             progress += _rise(q, gradient, move)
             x = target
@@ -102,7 +102,7 @@ def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> D
     return move
 
 
-def _exceeded(q: Quadratic, x: Doubles, target: Doubles, working: _Working) -> Bools:
+def _exceeded(q: Quadratic, target: Doubles, working: _Working) -> Bools:
     """Caps, not held yet, that the step to target would leave."""
     if not q.groups:
         return np.zeros(0, bool)

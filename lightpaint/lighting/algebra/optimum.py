@@ -16,8 +16,6 @@ from lightpaint.lighting.algebra.nearest import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED, Cap, Quadratic, scaled
 from lightpaint.lighting.algebra.threads import one_thread, side_by_side
 
-__all__ = ["Cap", "Method", "Optimum", "minimise", "minimise_each"]
-
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]
 

@@ -1,10 +1,10 @@
 """All that is asked of an answer, once: how sure it is, why it is not closer, and at what cost."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.costs import without_constraints
-from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose, with_diagnosis
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
@@ -55,7 +55,7 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     found = []
     for view in solution.views:
         diagnosis = diagnose(view)
-        told = with_diagnosis(view, diagnosis)
+        told = view.told(bounds=diagnosis.bounds)
         found.append(Analysis(told, uncertainty, diagnosis, alike, without_constraints(view)))
     return tuple(found)
 
@@ -63,5 +63,4 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
 def with_bounds(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
     """The answer to all views with what was found of it, for lighting.json."""
     first = analyses[0]
-    told = with_error_bars(solution, first.uncertainty)
-    return replace(with_diagnosis(told, first.diagnosis))
+    return with_error_bars(solution, first.uncertainty).told(bounds=first.diagnosis.bounds)

@@ -11,12 +11,12 @@ After reweighting, all of it is of the last linear problem: without what a displ
 a scale of its own.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.lighting.analysis.directions import all_columns, block_diagonal
 from lightpaint.lighting.analysis.noise import pseudo_inverse
@@ -180,12 +180,6 @@ def _given_up(solution: Solution) -> float:
     return max(solution.energy - alone.energy, 0.0)
 
 
-def with_diagnosis(solution: Solution, diagnosis: Diagnosis) -> Solution:
-    """`solution` whose certificate has the bounds, for lighting.json."""
-    certificate = replace(solution.certificate, bounds=diagnosis.bounds)
-    return replace(solution, lighting=solution.lighting.with_certificate(certificate))
-
-
 def of_any_sign(solution: Solution) -> Doubles:
     """The weights (n, 3) that come closest if they may be negative; kept lights stay at 1."""
     equations, weights = solution.equations, solution.weights
@@ -223,8 +217,8 @@ def _place(solution: Solution, unreachable: Floats) -> Place | None:
         region=(int(worst[0]), int(worst[1])),
         share=float(region[worst] / energy.sum()),
         box=(int(rows[y]), int(columns[x]), int(rows[y + 1]), int(columns[x + 1])),
-        painted=_rgb(painted),
-        reached=_rgb(painted - lacking[y, x]),
+        painted=as_rgb(painted),
+        reached=as_rgb(painted - lacking[y, x]),
     )
 
 
@@ -232,8 +226,3 @@ def _edges(length: int, parts: int) -> npt.NDArray[np.int_]:
     """Where `length` pixels are cut into that many nearly equal parts, or single pixels."""
     parts = min(length, parts)
     return np.asarray(np.arange(parts + 1) * length // parts, dtype=np.int_)
-
-
-def _rgb(values: Floats) -> tuple[float, float, float]:
-    r, g, b = (float(v) for v in values)
-    return r, g, b

@@ -12,8 +12,9 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.lighting.bound import Kind, Per
+from lightpaint.lighting.constraints.knobs import Knob, Unknown
 from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum
-from lightpaint.lighting.constraints.reduction import Knob, Reduction, Unknown
+from lightpaint.lighting.constraints.reduction import Reduction
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.analysis.held import Answer, Held, all_held
 from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import Knob, Reduction
+from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.errors import BasisError
 from lightpaint.lighting.analysis.directions import (
     Room,
@@ -210,13 +210,11 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
         return solution
     lights: list[LightSetting] = []
     for light, error in zip(solution.lighting.lights, uncertainty.standard_error, strict=True):
-        r, g, b = (float(v) for v in error)
         kept = light.is_fixed or light.name in solution.certificate.unreached
-        lights.append(light if kept else replace(light, standard_error=(r, g, b)))
-    r, g, b = (float(v) for v in uncertainty.objective_error)
-    certificate = replace(solution.certificate, objective_error=(r, g, b))
-    lighting = replace(solution.lighting, lights=tuple(lights), certificate=certificate)
-    return replace(solution, lighting=lighting)
+        lights.append(light if kept else replace(light, standard_error=as_rgb(error)))
+    lighting = replace(solution.lighting, lights=tuple(lights))
+    error = as_rgb(uncertainty.objective_error)
+    return replace(solution, lighting=lighting).told(objective_error=error)
 
 
 def _propagated(M: Doubles, C: Doubles, room: Room, gradient: Doubles) -> tuple[Doubles, Doubles]:

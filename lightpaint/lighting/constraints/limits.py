@@ -8,7 +8,8 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Level, LightConstraint
+from lightpaint.lighting.constraints.constraints import LightConstraint
+from lightpaint.lighting.constraints.values import Level
 
 #: Share by which a lower limit may exceed an upper one before they contradict: round-off.
 ROUND_OFF = 1e-12

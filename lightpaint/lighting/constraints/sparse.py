@@ -11,8 +11,9 @@ import numpy as np
 
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.optimum import minimise
+from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem
-from lightpaint.lighting.constraints.reduction import Knob, Reduction
+from lightpaint.lighting.constraints.reduction import Reduction
 
 #: Sizes beyond K that are tried, so that people see what a few more lights would bring.
 BEYOND = 2

@@ -12,10 +12,10 @@ from scipy.optimize import lsq_linear
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.errors import LightingError
 from lightpaint.lighting.analysis import held, release
-from lightpaint.lighting.analysis.diagnosis import diagnose, with_diagnosis
+from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.lighting import read_lighting, write_lighting
+from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -392,7 +392,7 @@ def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None
     found = diagnose(solution)
     assert found.bounds
     path = tmp_path / "lighting.json"
-    write_lighting(path, with_diagnosis(solution, found).lighting)
+    write_lighting(path, solution.told(bounds=found.bounds).lighting)
     assert read_lighting(path).certificate.bounds == found.bounds  # type: ignore[union-attr]
     data = json.loads(path.read_text(encoding="utf-8"))
     assert set(data["solve"]["bounds"][0]) == {

@@ -14,7 +14,7 @@ from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import problems
-from lightpaint.lighting.lighting import read_lighting, write_lighting
+from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 

@@ -1,0 +1,157 @@
+"""All in one call: from arguments to a job, and its run."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, overload
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.obtain import check_same_view
+from lightpaint.colour.transform import TransformChoice
+from lightpaint.errors import SceneError, TargetError
+from lightpaint.job import Job
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.pipeline import run
+from lightpaint.progress import Progress, silent
+from lightpaint.results import Look
+from lightpaint.scene.scene import Scene
+from lightpaint.settings import Settings
+from lightpaint.sources import BasisFile, Painting, SceneFile, check_needed
+from lightpaint.target.target import Target
+
+AnyScene = str | Path | Scene
+AnyTarget = str | Path | Target
+
+
+@overload
+def paint_with_light(
+    scene: AnyScene | None, target: AnyTarget, folder: str | Path, **how: Any
+) -> Look: ...
+
+
+@overload
+def paint_with_light(
+    scene: Sequence[AnyScene], target: Sequence[AnyTarget], folder: str | Path, **how: Any
+) -> list[Look]: ...
+
+
+def paint_with_light(
+    scene: AnyScene | Sequence[AnyScene] | None,
+    target: AnyTarget | Sequence[AnyTarget],
+    folder: str | Path,
+    *,
+    basis: str | Path | Basis | LightGroups | list[Basis] | None = None,
+    constraints: Constraints | None = None,
+    mask: str | Path | None = None,
+    sensor: int | str | None = None,
+    parameters: Mapping[str, object] | None = None,
+    lights: Iterable[str] | None = None,
+    groups: Mapping[str, Iterable[str]] | None = None,
+    progress: Progress = silent,
+    **settings: Any,
+) -> Look | list[Look]:
+    """Find the lighting of `scene` that comes closest to a painting, and prove it.
+
+    Args:
+        scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer. For several
+            views a list: the same scene, loaded through another sensor each; `target` is then a
+            list of what each is to show, and a list comes back.
+        target: Painting, as a file or read; for several views a list.
+        folder: Receives lighting.json, predicted.exr, comparison.png and report.html and, with a
+            scene, relit.xml and verified.exr; of a list, the pictures lie in a folder for each
+            sensor.
+        basis: One made before of the same scene; taken from the cache or rendered if not given. Of
+            light groups that another renderer made, `folder` receives the answer for other
+            programs, too. For several views a list, which is emptied, so that no pixel is held
+            twice.
+        constraints: What is asked of the lights; it goes before what the scene's lights file asks.
+        mask: As `read_target` takes it, where `target` is a path.
+        sensor: Index or id, where `scene` is a path.
+        parameters: Values of `$name` parameters, where `scene` is a path.
+        lights: Names or patterns of those to adjust, where `scene` is a path.
+        groups: Emitters that are one light, by its name, where `scene` is a path.
+        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
+        **settings: Any of `Settings`, by name, like spp=64.
+
+    Returns:
+        The look; of a list of views, a list.
+
+    Raises:
+        LightpaintError: For what cannot be; all that a user gives is checked before anything is
+            rendered.
+
+    Examples:
+        >>> look = lp.paint_with_light("room.xml", "painting.exr", "evening", spp=4)
+        >>> look
+        Look(of painting: The lighting meets ... % of the painting ...)
+        >>> look.verification.agrees
+        True
+    """
+    how = {
+        "sensor": sensor,
+        "parameters": {key: str(value) for key, value in (parameters or {}).items()},
+        "lights": None if lights is None else tuple(lights),
+        "groups": {name: tuple(members) for name, members in (groups or {}).items()},
+    }
+    bases = basis if isinstance(basis, list) else None
+    if bases is not None:
+        scene = [_on_film_of(x, its) for x, its in zip(_listed(scene), bases, strict=True)]
+        # They are on the films of their bases already.
+        basis, settings = None, settings | {"resolution": "1/1"}
+    job = _job(
+        (scene, {key: value for key, value in how.items() if value not in (None, {})}),
+        (target, mask),
+        Path(folder),
+        basis,
+        Constraints() if constraints is None else constraints,
+        Settings(**settings),
+    )
+    looks = run(job, progress, bases=bases)
+    return looks if job.by_sensor else looks[0]
+
+
+def _job(
+    scene: tuple[Any, Mapping[str, Any]],
+    target: tuple[Any, str | Path | None],
+    folder: Path,
+    basis: Any,
+    constraints: Constraints,
+    settings: Settings,
+) -> Job:
+    """What the arguments of `paint_with_light` ask for. scene, target: and how to read them."""
+    (scenes, how), (targets, mask) = scene, target
+    by_sensor = isinstance(scenes, list | tuple)
+    painted: dict[str, Any] = {
+        "mask": mask and str(mask),
+        "transform": TransformChoice.of(settings.transform),
+    }
+    scenes = [SceneFile(str(x), **how) if _is_path(x) else x for x in _listed(scenes)]
+    targets = [Painting(str(x), **painted) if _is_path(x) else x for x in _listed(targets)]
+    if how and not scenes:
+        check_needed(how, basis)
+    if how and not any(isinstance(x, SceneFile) for x in scenes):
+        named = ", ".join(f"{name}=..." for name in how)
+        raise SceneError(f"{named} cannot change a scene that is already loaded: give its path")
+    if mask is not None and not any(isinstance(x, Painting) for x in targets):
+        raise TargetError("mask=... cannot change a target that is already read: give its path")
+    basis = BasisFile(str(basis)) if _is_path(basis) else basis
+    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, by_sensor)
+
+
+def _listed(given: Any) -> list[Any]:
+    """One or several or none, as several."""
+    if given is None:
+        return []
+    return list(given) if isinstance(given, list | tuple) else [given]
+
+
+def _is_path(given: Any) -> bool:
+    return isinstance(given, str | Path)
+
+
+def _on_film_of(scene: Any, basis: Basis) -> Scene:
+    """`scene`, through the sensor and on the film that `basis` was made with."""
+    if not isinstance(scene, Scene):
+        raise SceneError("bases of several views go with scenes that are loaded: use load_scene")
+    check_same_view(scene, basis)
+    return scene.reduced(f"{basis.size[1]}x{basis.size[0]}")

@@ -1,0 +1,203 @@
+"""Values of what is asked of a light, as people write them: levels, colours, temperatures."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import RGB, as_rgb
+from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
+from lightpaint.errors import ColorError, ConstraintError
+
+
+@dataclass(frozen=True)
+class Level:
+    """How bright: a luminance, an RGB emission, or a share of the present luminance."""
+
+    amount: float | RGB
+    is_share: bool = False
+
+    def __str__(self) -> str:
+        if isinstance(self.amount, tuple):
+            return " ".join(f"{v:g}" for v in self.amount)
+        return f"{100 * self.amount:g}%" if self.is_share else f"{self.amount:g}"
+
+
+@dataclass(frozen=True)
+class Lock:
+    """Not to be solved for. color: of luminance 1; what is None is as it is at present."""
+
+    level: Level | None = None
+    color: RGB | None = None
+
+
+def check_keys(asked: Any, known: Iterable[str], where: str) -> None:
+    """Raise ConstraintError unless it is a table of keys that are `known`."""
+    if not isinstance(asked, Mapping):
+        raise ConstraintError(f"{where} is {asked!r}: expected keys like lock = true")
+    if unknown := [key for key in asked if key not in known]:
+        raise ConstraintError(f"{where} has the key {unknown[0]!r}: known are {', '.join(known)}")
+
+
+def lock_of(value: Any, where: str) -> Lock:
+    """What to stay at, from `true`, a level, or a colour and a level."""
+    if value is True:
+        return Lock()
+    expected = "expected true, a level like 2.5 or 40%, three numbers, or a colour and a level"
+    if isinstance(value, str):
+        words = value.split()
+        if len(words) not in (1, 2):
+            raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")
+        colors = [word for word in words if word.startswith("#") or word.upper().endswith("K")]
+        levels = [word for word in words if word not in colors]
+        if len(colors) > 1 or len(levels) > 1:
+            raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")
+        level = level_of(levels[0], where, expected) if levels else None
+        return Lock(level, color_of(colors[0], where) if colors else None)
+    return Lock(level_of(value, where, expected))
+
+
+def level_of(value: Any, where: str, expected: str = "") -> Level:
+    """A level from `2.5`, `"40%"` or `[r, g, b]`."""
+    expected = expected or "expected a luminance like 2.5, a share like 40%, or three numbers >= 0"
+    if isinstance(value, str):
+        text = value.strip()
+        try:
+            number = float(text.removesuffix("%"))
+        except ValueError:
+            number = -1.0
+        if not 0 <= number < math.inf:
+            raise ConstraintError(f"{where} is {value!r}: {expected}")
+        return Level(number / 100, is_share=True) if text.endswith("%") else Level(number)
+    if _is_number(value) and 0 <= value < math.inf:
+        return Level(float(value))
+    if _is_rgb(value):
+        return Level(as_rgb(value))
+    raise ConstraintError(f"{where} is {value!r}: {expected}")
+
+
+def limits_of(value: Any, where: str) -> tuple[Level | None, Level | None]:
+    """Least and most, from a table of `min`, `max` or both."""
+    check_keys(value, ("min", "max"), where)
+    if not value:
+        raise ConstraintError(f"{where} is empty: expected min, max or both")
+    least, most = (
+        level_of(value[key], f"{where}.{key}") if key in value else None for key in ("min", "max")
+    )
+    if least and most and least.is_share == most.is_share:
+        low, high = np.array(least.amount), np.array(most.amount)
+        if low.ndim == high.ndim and (low > high).any():
+            raise ConstraintError(f"{where} has a min of {least} above its max of {most}")
+    return least, most
+
+
+def primaries_of(asked: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None:
+    """The colours that a light can mix, each of luminance 1; None where it is not asked."""
+    if "color" in asked:
+        return (color_of(asked["color"], f"{where}.color", duv=_duv(asked, where)),)
+    if "kelvin" in asked:
+        return _white(asked["kelvin"], _duv(asked, where), f"{where}.kelvin")
+    if "primaries" not in asked:
+        return None
+    given = asked["primaries"]
+    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+        raise ConstraintError(
+            f'{where}.primaries is {given!r}: expected a list of colours, ["#ff0000", "3000K"]'
+        )
+    return tuple(color_of(color, f"{where}.primaries") for color in given)
+
+
+def _white(value: Any, duv: float, where: str) -> tuple[RGB, ...]:
+    """One colour for one temperature, and for a range the colours at its ends."""
+    ends = [value] if _is_number(value) else value
+    is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
+    if not is_range or not all(map(_is_number, ends)) or sorted(ends) != list(ends):
+        raise ConstraintError(
+            f"{where} is {value!r}: expected a temperature, 3200, or a range from low to high, "
+            "[2700, 6500]"
+        )
+    return tuple(_kelvin(float(kelvin), duv, where) for kelvin in dict.fromkeys(ends))
+
+
+def color_of(value: Any, where: str, *, duv: float = 0.0) -> RGB:
+    """A colour of luminance 1 from `"#ffaa66"`, `"3200K"` or `[r, g, b]`."""
+    try:
+        if isinstance(value, str) and value.strip().startswith("#"):
+            rgb = hex_to_rgb(value)
+        elif isinstance(value, str) and value.strip().upper().endswith("K"):
+            return _kelvin(float(value.strip()[:-1]), duv, where)
+        elif _is_rgb(value):
+            rgb = np.array(value, dtype=np.float64)
+        else:
+            raise ColorError(f"{value!r} is no colour")
+    except (ColorError, ValueError):
+        raise ConstraintError(
+            f"{where} is {value!r}: expected a colour like #ffaa66, 3200K or three numbers >= 0"
+        ) from None
+    if not rgb.any():
+        raise ConstraintError(f"{where} is {value!r}, black, which is no colour of light: say off")
+    return as_rgb(rgb / luminance(rgb))
+
+
+def _kelvin(kelvin: float, duv: float, where: str) -> RGB:
+    try:
+        return as_rgb(kelvin_to_rgb(kelvin, duv))
+    except ColorError as error:
+        raise ConstraintError(f"{where}: {error}") from None
+
+
+def _duv(asked: Mapping[str, Any], where: str) -> float:
+    duv = asked.get("duv", 0.0)
+    if not (_is_number(duv) and math.isfinite(duv)):
+        raise ConstraintError(f"{where}.duv is {duv!r}: expected a number like 0.003")
+    return float(duv)
+
+
+def strength_of(value: Any, where: str) -> float:
+    """That of a pull, from a number or from a table of `current`."""
+    if isinstance(value, Mapping):
+        check_keys(value, ("current",), where)
+        value, where = value.get("current", 0.0), f"{where}.current"
+    if not (_is_number(value) and 0 <= value < math.inf):
+        raise ConstraintError(f"{where} is {value!r}: expected a strength >= 0, like 0.1")
+    return float(value)
+
+
+def count_of(value: Any, where: str) -> int | None:
+    """How many lights at most; None for any number."""
+    if value is not None and not (type(value) is int and value > 0):
+        raise ConstraintError(f"{where} is {value!r}: expected a whole number of lights > 0")
+    return value
+
+
+def described(key: str, value: Any) -> str:
+    """A key and its value in few words, for tables."""
+    if value is True:
+        return key
+    if key == "limits":
+        return f"limits {_text(value.get('min', 0))} to {_text(value.get('max', '∞'))}"
+    if key == "kelvin" and isinstance(value, Sequence):
+        return f"{_text(value[0])} to {_text(value[-1])} K"
+    return f"{_text(value)} K" if key == "kelvin" else f"{key} {_text(value)}"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return " ".join(map(_text, value))
+    return f"{value:g}" if _is_number(value) else str(value)
+
+
+def _is_number(value: Any) -> bool:
+    # bool is an int to Python, and no number to people.
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_rgb(value: Any) -> bool:
+    return (
+        isinstance(value, Sequence)
+        and not isinstance(value, str)
+        and len(value) == 3
+        and all(_is_number(v) and 0 <= v < math.inf for v in value)
+    )
