@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.constraints.file import read_constraints as read_constraints
     from lightpaint.lighting.file import read_lighting as read_lighting
     from lightpaint.lighting.file import write_lighting as write_lighting
+    from lightpaint.lighting.fit import Fit as Fit
     from lightpaint.lighting.lighting import Certificate as Certificate
     from lightpaint.lighting.lighting import Lighting as Lighting
     from lightpaint.lighting.lighting import combine as combine
@@ -87,6 +88,7 @@ _HOMES = {
     "Constraints": "lighting.constraints.constraints",
     "Diagnosis": "lighting.analysis.diagnosis",
     "Estimate": "images.estimate",
+    "Fit": "lighting.fit",
     "Job": "job",
     "LightGroups": "basis.lightgroups.read",
     "Lighting": "lighting.lighting",

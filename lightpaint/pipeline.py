@@ -56,9 +56,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         _obtained(job, bases, listen),
         [view.target for view in job.views],
         constraints=job.asked,
-        unpainted=settings.unpainted,
-        method=settings.method,
-        transform=job.display,
+        fit=replace(settings, transform=job.display),
     )
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)

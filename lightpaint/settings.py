@@ -1,14 +1,12 @@
 """What can be asked of a solve beside scene and painting."""
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields
-from numbers import Integral, Real
-from typing import Any, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
 
-from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.expected import SWITCH, Check, a, check_fields, number, one_of, whole
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Space
 from lightpaint.scene.film import check_resolution
 from lightpaint.scene.quality import Quality
@@ -18,16 +16,16 @@ MAX_REFINE = 100
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Fit):
     """How a painting is to be answered.
 
     Attributes:
         unpainted: Weight of unpainted pixels against the current look.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
-        resize: Whether a target of another size is resampled.
-        space: `linear`, or `display` to come closest in what a display shows.
         transform: The display meant by `space`; None for that of the painting or, where it holds
             light, sRGB at an exposure that shows something.
+        resize: Whether a target of another size is resampled.
+        space: `linear`, or `display` to come closest in what a display shows.
         spp: Samples per pixel of the basis and of the verification.
         time_s: Instead of spp, seconds in which the basis is rendered, of all views together.
         seed: Of the basis and, with other random numbers, of the verification.
@@ -56,11 +54,8 @@ class Settings:
         lightpaint.errors.LightpaintError: refine is -1: expected a whole number >= 0, at most 100
     """
 
-    unpainted: float = 0.0
-    method: Method = "polished"
     resize: bool = False
     space: Space = "linear"
-    transform: ViewTransform | None = None
     spp: int | None = None
     time_s: float | None = None
     seed: int = 0
@@ -73,11 +68,26 @@ class Settings:
     cd_per_unit: float | None = None
     command: str = ""
 
+    expected: ClassVar[Mapping[str, Check]] = {
+        **Fit.expected,
+        "resize": SWITCH,
+        "space": one_of(Space),
+        # Two halves of the samples tell the noise.
+        "spp": whole(2),
+        "time_s": number("seconds"),
+        "seed": whole(0),
+        "resolution": a(str, "a part of the film like '1/4' or '320x180'"),
+        "quality": one_of(Quality),
+        "use_cache": SWITCH,
+        "noise_correction": SWITCH,
+        "refine": whole(0, MAX_REFINE),
+        "suggest": whole(0),
+        "cd_per_unit": number("cd/m²"),
+        "command": a(str, "the text of a shell command"),
+    }
+
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value, (fits, expected) = getattr(self, field.name), _EXPECTED[field.name]
-            if not (fits(value) or (value is None and field.default is None)):
-                raise LightpaintError(f"{field.name} is {value!r}: expected {expected}")
+        check_fields(self, self.expected)
         if self.spp is not None and self.time_s is not None:
             raise LightpaintError(
                 f"spp is {self.spp} and time_s {self.time_s:g}: expected a number of samples or a "
@@ -90,61 +100,3 @@ class Settings:
     def checks_as_basis(self) -> bool:
         """Whether the verification has as many samples as the basis, whatever their films."""
         return self.spp is None and (self.time_s is not None or self.quality is not None)
-
-
-#: Whether a value will do, and what else is expected of it.
-Check = tuple[Callable[[Any], bool], str]
-
-
-def _whole(least: int, most: float = math.inf) -> Check:
-    # bool is an int to Python, and no number to people.
-    def fits(value: Any) -> bool:
-        return isinstance(value, Integral) and not _is_bool(value) and least <= int(value) <= most
-
-    return fits, f"a whole number >= {least}" + (f", at most {most}" if most < math.inf else "")
-
-
-def _number(about: str, *, may_be_zero: bool = False) -> Check:
-    def fits(value: Any) -> bool:
-        if not isinstance(value, Real) or _is_bool(value):
-            return False
-        return 0 < float(value) < math.inf or (may_be_zero and value == 0)
-
-    return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}"
-
-
-def _one_of(words: Any) -> Check:
-    known = get_args(words)
-    expected = " or ".join(map(repr, known))
-    return lambda value: isinstance(value, str) and value in known, expected
-
-
-def _a(kind: type, about: str) -> Check:
-    return lambda value: isinstance(value, kind), about
-
-
-def _is_bool(value: Any) -> bool:
-    return isinstance(value, bool)
-
-
-_SWITCH: Check = (_is_bool, "True or False")
-
-_EXPECTED: dict[str, Check] = {
-    "unpainted": _number("a weight", may_be_zero=True),
-    "method": _one_of(Method),
-    "resize": _SWITCH,
-    "space": _one_of(Space),
-    "transform": _a(ViewTransform, "a ViewTransform, like ViewTransform('agx', 1.0)"),
-    # Two halves of the samples tell the noise.
-    "spp": _whole(2),
-    "time_s": _number("seconds"),
-    "seed": _whole(0),
-    "resolution": _a(str, "a part of the film like '1/4' or '320x180'"),
-    "quality": _one_of(Quality),
-    "use_cache": _SWITCH,
-    "noise_correction": _SWITCH,
-    "refine": _whole(0, MAX_REFINE),
-    "suggest": _whole(0),
-    "cd_per_unit": _number("cd/m²"),
-    "command": _a(str, "the text of a shell command"),
-}

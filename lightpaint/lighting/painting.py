@@ -61,8 +61,6 @@ def what_counts(target: Target, seen: Bools) -> Target:
 
 def present_look(basis: Basis, unpainted: float) -> Floats | None:
     """(h, w, 3), what unpainted pixels are held to; None if nothing is."""
-    if unpainted < 0 or not np.isfinite(unpainted):
-        raise TargetError(f"unpainted is {unpainted:g}: expected a weight >= 0")
     return basis.mix(basis.present_weights) if unpainted > 0 else None
 
 

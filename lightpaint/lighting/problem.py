@@ -10,12 +10,11 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, TargetError
-from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.painting import (
@@ -66,8 +65,7 @@ class Problem:
         reduction: What constraints leave to solve for.
         full: The same with all lights that `sparse` has not chosen.
         start: (n, 3), the weights to begin with: lights that reach nothing keep them.
-        unpainted: Weight of what is not painted, against the current look.
-        method: As of `solve`.
+        fit: How close is measured, and how the closest is found.
         corrected: The equations without that part of the noise; None where none was taken out.
         noise_removed: The part of the noise in `equations` that is not in `corrected`, where some
             was taken out.
@@ -93,8 +91,7 @@ class Problem:
     reduction: Reduction
     full: Reduction
     start: Doubles
-    unpainted: float = 0.0
-    method: Method = "polished"
+    fit: Fit
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     refinement: Refinement | None = None
@@ -110,10 +107,8 @@ class Problem:
         target: Target | Sequence[Target],
         *,
         constraints: Constraints | None = None,
-        unpainted: float = 0.0,
         start: Doubles | None = None,
-        method: Method = "polished",
-        transform: ViewTransform | None = None,
+        fit: Fit | None = None,
     ) -> "Problem":
         """Of one view, or of several: their bases and targets in the same order. As of `solve`.
 
@@ -126,17 +121,18 @@ class Problem:
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
         whole, parts = joint_basis(bases)
+        fit = fit or Fit()
         asked = constraints_of(whole.asked).and_then(constraints or Constraints())
         fitted = [
             what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
             for its, one in zip(targets, parts, strict=True)
         ]
         views = Views(parts, tuple(fitted))
-        word = joint_squares(views, unpainted=unpainted)
+        word = joint_squares(views, unpainted=fit.unpainted)
         loss = loss_of(
             word,
             brighter_will_do(views),
-            transform,
+            fit.transform,
             painted=lambda: painted_light(views),
             current=lambda: whole.mix(whole.present_weights),
         )
@@ -151,8 +147,7 @@ class Problem:
             reduction=reduction,
             full=reduction,
             start=whole.present_weights if start is None else start,
-            unpainted=unpainted,
-            method=method,
+            fit=fit,
         )
 
     @property
@@ -253,7 +248,7 @@ class Problem:
         """
         painting = self.painting
         if painting is None:
-            painting = Painting(self.basis, self.views, unpainted=self.unpainted)
+            painting = Painting(self.basis, self.views, unpainted=self.fit.unpainted)
         elif painting.strokes != self.strokes:
             raise ValueError("this problem was painted on already: go on from what that returned")
         painting.paint(view, region, image, importance, at_least)

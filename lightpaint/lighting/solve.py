@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
-from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import (
     ReducedOptimum,
@@ -17,6 +16,7 @@ from lightpaint.lighting.constraints.reduced_problem import (
 )
 from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.constraints.sparse import best_knobs
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Certificate, Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
@@ -33,10 +33,8 @@ def solve(
     target: Target | Sequence[Target],
     *,
     constraints: Constraints | None = None,
-    unpainted: float = 0.0,
     start: Lighting | None = None,
-    method: Method = "polished",
-    transform: ViewTransform | None = None,
+    **fit: Any,
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
 
@@ -49,13 +47,11 @@ def solve(
         target: Of one view; or of several, in the same order.
         constraints: What else is asked of the lights; it goes before what the lights file of the
             scene asks, which a basis that was rendered here knows.
-        unpainted: Weight of what is not painted, against the current look.
         start: Lighting to begin with (the present one by default): a good guess saves sweeps, the
             answer is the same, but for what no painted pixel tells: lights that reach none keep the
             start.
-        method: `gauss-seidel` is the paper's iteration alone, which may run out of sweeps; the
-            certificate of the answer then says that it has not converged.
-        transform: For an answer that comes closest in what this view transform shows, instead of in
+        **fit: Any of `Fit`, by name: `unpainted=0.1` also holds what is not painted to the current
+            look, `transform=lp.ViewTransform("agx")` comes closest in what that shows instead of in
             linear light.
 
     Returns:
@@ -74,14 +70,7 @@ def solve(
         >>> solution
         Solution(closest there is (KKT residual ...)...)
     """
-    problem = Problem.of(
-        basis,
-        target,
-        constraints=constraints,
-        unpainted=unpainted,
-        method=method,
-        transform=transform,
-    )
+    problem = Problem.of(basis, target, constraints=constraints, fit=Fit(**fit))
     begin = problem.start if start is None else start.weights_for(problem.basis)
     return solution_of(replace(problem, start=begin))
 
@@ -149,7 +138,7 @@ def _linear(problem: Problem, start: Doubles) -> Solution:
 def _one(problem: Problem, start: Doubles) -> Solution:
     """The solution of the squares as the reduction has the lights."""
     equations = problem.pulled(problem.solved)
-    optimum = solve_reduced(equations, problem.reduction, start, method=problem.method)
+    optimum = solve_reduced(equations, problem.reduction, start, method=problem.fit.method)
     return _solution(problem, optimum, optimum.weights, equations)
 
 
@@ -158,7 +147,7 @@ def _descended(problem: Problem, start: Doubles) -> Solution:
 
     def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
         asked = problem.pulled(equations)
-        return solve_reduced(asked, problem.reduction, begin, method=problem.method)
+        return solve_reduced(asked, problem.reduction, begin, method=problem.fit.method)
 
     found = descend(
         problem.basis,

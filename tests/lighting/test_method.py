@@ -41,7 +41,7 @@ def test_both_methods_come_to_one_answer(make_basis: Any, seed: int, asked: Any)
         solve(basis, target, constraints=constraints, method=method)
         for method in ("polished", "gauss-seidel")
     )
-    assert swept.problem.method == "gauss-seidel"
+    assert swept.problem.fit.method == "gauss-seidel"
     assert polished.certificate.converged
     assert swept.certificate.converged
     assert min(swept.certificate.sweeps) > 0
@@ -77,8 +77,8 @@ def test_running_out_of_sweeps_is_said(make_basis: Any) -> None:
 def test_the_method_stays_where_the_answer_is_improved(make_basis: Any) -> None:
     basis, target = _alike(make_basis)
     better = correct_noise(solve(basis, target, method="gauss-seidel"))
-    assert better.problem.method == "gauss-seidel"
+    assert better.problem.fit.method == "gauss-seidel"
     assert max(better.certificate.sweeps) > 0
     views = solve([basis, basis], [target, target], method="gauss-seidel").views
-    assert [view.problem.method for view in views] == ["gauss-seidel"] * 2
+    assert [view.problem.fit.method for view in views] == ["gauss-seidel"] * 2
     assert not views[0].certificate.converged

@@ -12,6 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of, solve
 from lightpaint.target.target import Target
@@ -92,17 +93,18 @@ def test_painting_is_a_rebuild(
 ) -> None:
     basis, target = _basis(make_basis), _target(seed, everything=everything)
     strokes = _strokes(seed, count)
-    problem = Problem.of(basis, target, unpainted=unpainted, transform=transform)
+    fit = Fit(unpainted=unpainted, transform=transform)
+    problem = Problem.of(basis, target, fit=fit)
     for region, image, importance, at_least in strokes:
         problem = problem.painted(region, image, importance, at_least=at_least)
     by_hand = _painted_by_hand(target, basis.emitters_seen, strokes)
-    rebuilt = Problem.of(basis, by_hand, unpainted=unpainted, transform=transform)
+    rebuilt = Problem.of(basis, by_hand, fit=fit)
     # float64 sums of the same products in another order.
     _same_problem(problem, rebuilt, rtol=1e-12)
     # Bit for bit those of one stroke over all of it.
-    at_once = Problem.of(
-        basis, _target(seed + 1), unpainted=unpainted, transform=transform
-    ).painted(WHOLE, by_hand.image, by_hand.importance, at_least=by_hand.at_least)
+    at_once = Problem.of(basis, _target(seed + 1), fit=fit).painted(
+        WHOLE, by_hand.image, by_hand.importance, at_least=by_hand.at_least
+    )
     np.testing.assert_array_equal(problem.equations.M, at_once.equations.M)
     np.testing.assert_array_equal(problem.equations.b, at_once.equations.b)
 
@@ -116,7 +118,8 @@ def test_the_answer_is_that_of_the_rebuilt_problem(
 ) -> None:
     basis, target, strokes = _basis(make_basis), _target(3), _strokes(5, 5)
     constraints = Constraints.of(asked)
-    problem = Problem.of(basis, target, constraints=constraints, unpainted=0.1, transform=transform)
+    fit = Fit(unpainted=0.1, transform=transform)
+    problem = Problem.of(basis, target, constraints=constraints, fit=fit)
     for region, image, importance, at_least in strokes:
         # As a painter does: from the answer before the stroke.
         solution = solution_of(problem)
@@ -145,7 +148,7 @@ def test_strokes_in_several_views(make_basis: Any) -> None:
     bases = [_basis(make_basis, k, size) for k, size in enumerate(sizes)]
     targets = [_target(k, size) for k, size in enumerate(sizes)]
     strokes = [_strokes(7 + k, 3, size) for k, size in enumerate(sizes)]
-    problem = Problem.of(bases, targets, unpainted=0.2)
+    problem = Problem.of(bases, targets, fit=Fit(unpainted=0.2))
     for k in (0, 1):
         for region, image, importance, at_least in strokes[k]:
             problem = problem.painted(region, image, importance, at_least=at_least, view=k)
@@ -153,7 +156,7 @@ def test_strokes_in_several_views(make_basis: Any) -> None:
         _painted_by_hand(t, b.emitters_seen, s)
         for t, b, s in zip(targets, bases, strokes, strict=True)
     ]
-    _same_problem(problem, Problem.of(bases, by_hand, unpainted=0.2), rtol=1e-12)
+    _same_problem(problem, Problem.of(bases, by_hand, fit=Fit(unpainted=0.2)), rtol=1e-12)
 
 
 def test_what_was_painted_on_is_not_painted_on_again(make_basis: Any) -> None:

@@ -17,6 +17,7 @@ from lightpaint.lighting.analysis.refine import refine
 from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
@@ -242,7 +243,7 @@ def test_what_is_clipped_comes_back(make_basis: Any):
     rng = np.random.default_rng(0)
     basis = make_basis(images=0.2 + rng.random((2, *SIZE, 3)))
     truth = np.array([[0.2, 0.1, 0.3], [0.1, 0.2, 0.1]])
-    problem = Problem.of(basis, _target(_pictures(basis, truth)), transform=SRGB)
+    problem = Problem.of(basis, _target(_pictures(basis, truth)), fit=Fit(transform=SRGB))
 
     def linear(equations: Any, begin: Any) -> Any:
         return solve_reduced(equations, problem.reduction, begin).weights

@@ -10,7 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from lightpaint.errors import ConstraintError, LightingError, SizeError, TargetError
+from lightpaint.errors import (
+    ConstraintError,
+    LightingError,
+    LightpaintError,
+    SizeError,
+    TargetError,
+)
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.painting import squares_of
@@ -99,7 +105,7 @@ def test_nothing_but_emitters(make_basis: Any):
 
 @pytest.mark.parametrize("unpainted", [-1.0, -1e-9, float("nan"), float("inf")])
 def test_weights_of_the_unpainted_that_make_no_sense(make_basis: Any, unpainted: float):
-    with pytest.raises(TargetError, match="unpainted"):
+    with pytest.raises(LightpaintError, match=r"unpainted is .*: expected a weight >= 0"):
         solve(make_basis(3, SIZE), _random_target(), unpainted=unpainted)
 
 

@@ -17,5 +17,11 @@ def without_constraints(solution: Solution) -> Solution | None:
     if not problem.constraints or solution.whole is not None:
         return None
     free = reduce_to(Constraints(), solution.basis.lights)
-    anew = replace(problem, constraints=Constraints(), reduction=free, full=free, method="polished")
+    anew = replace(
+        problem,
+        constraints=Constraints(),
+        reduction=free,
+        full=free,
+        fit=replace(problem.fit, method="polished"),
+    )
     return solution_of(anew, start=solution.weights)

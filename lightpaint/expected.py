@@ -1,0 +1,63 @@
+"""What a value is to be, and the one line that says so where it is something else."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from numbers import Integral, Real
+from typing import Any, get_args
+
+from lightpaint.errors import LightpaintError
+
+#: Whether a value will do, and what else is expected of it.
+Check = tuple[Callable[[Any], bool], str]
+
+
+def check_fields(given: Any, expected: Mapping[str, Check]) -> None:
+    """Raise LightpaintError for the first field of a dataclass that is not what is expected.
+
+    A field that is None by default may be None.
+    """
+    for field in fields(given):
+        value, (fits, words) = getattr(given, field.name), expected[field.name]
+        if not (fits(value) or (value is None and field.default is None)):
+            raise LightpaintError(f"{field.name} is {value!r}: expected {words}")
+
+
+def whole(least: int, most: float = math.inf) -> Check:
+    """A whole number between these."""
+
+    # bool is an int to Python, and no number to people.
+    def fits(value: Any) -> bool:
+        return isinstance(value, Integral) and not _is_bool(value) and least <= int(value) <= most
+
+    return fits, f"a whole number >= {least}" + (f", at most {most}" if most < math.inf else "")
+
+
+def number(about: str, *, may_be_zero: bool = False) -> Check:
+    """A finite number > 0, or >= 0. about: what it is."""
+
+    def fits(value: Any) -> bool:
+        if not isinstance(value, Real) or _is_bool(value):
+            return False
+        return 0 < float(value) < math.inf or (may_be_zero and value == 0)
+
+    return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}"
+
+
+def one_of(words: Any) -> Check:
+    """One of the words of a Literal."""
+    known = get_args(words)
+    expected = " or ".join(map(repr, known))
+    return lambda value: isinstance(value, str) and value in known, expected
+
+
+def a(kind: type, about: str) -> Check:
+    """Anything of a type."""
+    return lambda value: isinstance(value, kind), about
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+SWITCH: Check = (_is_bool, "True or False")
