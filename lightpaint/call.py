@@ -53,32 +53,26 @@ def paint_with_light(
     """Find the lighting of `scene` that comes closest to a painting, and prove it.
 
     Args:
-        scene: Mitsuba XML, or None to solve from `basis` alone, without a renderer. For several
-            views a list: the same scene, loaded through another sensor each; `target` is then a
-            list of what each is to show, and a list comes back.
+        scene: Mitsuba XML, or None to solve from `basis` alone. For several views a list: the same
+            scene, loaded through another sensor each.
         target: Painting, as a file or read; for several views a list.
-        folder: Receives lighting.json, predicted.exr, comparison.png and report.html and, with a
-            scene, relit.xml and verified.exr; of a list, the pictures lie in a folder for each
-            sensor.
-        basis: One made before of the same scene; taken from the cache or rendered if not given. Of
-            light groups that another renderer made, `folder` receives the answer for other
-            programs, too. For several views a list, which is emptied, so that no pixel is held
-            twice.
+        folder: Receives the results; of several views, the pictures in a folder for each sensor.
+        basis: One made before, or another renderer's light groups; kept or rendered if not given.
+            For several views a list, which is emptied, so that no pixel is held twice.
         constraints: What is asked of the lights; it goes before what the scene's lights file asks.
         mask: As `read_target` takes it, where `target` is a path.
-        sensor: Index or id, where `scene` is a path.
-        parameters: Values of `$name` parameters, where `scene` is a path.
-        lights: Names or patterns of those to adjust, where `scene` is a path.
-        groups: Emitters that are one light, by its name, where `scene` is a path.
+        sensor: As of `load_scene`, as are the next three: index or id, where `scene` is a path.
+        parameters: Values of `$name` parameters.
+        lights: Names or patterns of those to adjust.
+        groups: Emitters that are one light, by its name.
         progress: Hears how far the work has come and, if it is a `Listener`, remarks.
         **settings: Any of `Settings`, by name, like spp=64.
 
     Returns:
-        The look; of a list of views, a list.
+        The look; of a list, a list.
 
     Raises:
-        LightpaintError: For what cannot be; all that a user gives is checked before anything is
-            rendered.
+        LightpaintError: For what cannot be, before anything is rendered.
 
     Examples:
         >>> look = lp.paint_with_light("room.xml", "painting.exr", "evening", spp=4)
@@ -98,14 +92,7 @@ def paint_with_light(
         scene = [_on_film_of(x, its) for x, its in zip(_listed(scene), bases, strict=True)]
         # They are on the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
-    job = _job(
-        (scene, {key: value for key, value in how.items() if value not in (None, {})}),
-        (target, mask),
-        Path(folder),
-        basis,
-        Constraints() if constraints is None else constraints,
-        Settings(**settings),
-    )
+    job = _job((scene, how), (target, mask), Path(folder), basis, constraints, Settings(**settings))
     looks = run(job, progress, bases=bases)
     return looks if job.by_sensor else looks[0]
 
@@ -115,11 +102,12 @@ def _job(
     target: tuple[Any, str | Path | None],
     folder: Path,
     basis: Any,
-    constraints: Constraints,
+    constraints: Constraints | None,
     settings: Settings,
 ) -> Job:
     """What the arguments of `paint_with_light` ask for. scene, target: and how to read them."""
     (scenes, how), (targets, mask) = scene, target
+    how = {name: value for name, value in how.items() if value not in (None, {})}
     by_sensor = isinstance(scenes, list | tuple)
     painted: dict[str, Any] = {
         "mask": mask and str(mask),
@@ -135,7 +123,8 @@ def _job(
     if mask is not None and not any(isinstance(x, Painting) for x in targets):
         raise TargetError("mask=... cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
-    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, by_sensor)
+    asked = Constraints() if constraints is None else constraints
+    return Job(tuple(scenes), tuple(targets), folder, basis, asked, settings, by_sensor)
 
 
 def _listed(given: Any) -> list[Any]:

@@ -73,19 +73,17 @@ def suggest_lights(
 
     Args:
         scene: What `basis` was made of, on the same film or a larger one.
-        basis: What the solution was solved with.
-        solution: Of that one view.
-        count: At most so many; none where nothing is missed, or no light would surely take a
-            hundredth of it away.
-        seed: Of the positions and of their images.
+        basis: What the solution, of that one view, was solved with.
+        solution: To be improved.
+        count: At most so many; none where no light would surely take a hundredth of the miss away.
+        seed: Of the positions and their images.
         progress: Hears how far the work has come.
 
     Raises:
-        SceneError: For scenes that one pass cannot serve (see `check_suggestible`).
+        SceneError: For scenes that one pass cannot serve.
 
     Examples:
-        >>> scene = lp.load_scene("room.xml")
-        >>> lp.suggest_lights(scene, basis, lp.solve(basis, target))  # nothing is missed
+        >>> lp.suggest_lights(lp.load_scene("room.xml"), basis, lp.solve(basis, target))
         ()
     """
     if count < 1:

@@ -237,8 +237,7 @@ def load_scene(
         sensor: Index or id of the sensor to look through (the first by default).
         parameters: Values for the `$name` parameters of the XML (Mitsuba's `-D`).
         variant: Mitsuba variant to run, where the process has none yet.
-        lights: Names or patterns (`window_*`) of the lights to adjust; the others are kept as they
-            are. All by default.
+        lights: Names or patterns (`window_*`) of those to adjust, all by default; others are kept.
         groups: Name → names or patterns of emitters that are adjusted as one light.
         lights_file: TOML with such lights and groups, instead of the one beside the scene. `lights`
             replaces what it lists, `groups` are added to its own or replace namesakes; without
@@ -250,8 +249,7 @@ def load_scene(
         BackendError: If Mitsuba cannot run.
 
     Examples:
-        >>> scene = lp.load_scene("room.xml")
-        >>> [light.name for light in scene.lights]
+        >>> [light.name for light in lp.load_scene("room.xml").lights]
         ['panel', 'bulb']
         >>> lp.load_scene("room.xml", lights=["bulb"]).lights
         (Light('bulb', ...),

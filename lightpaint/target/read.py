@@ -65,8 +65,8 @@ def read_target(
             else the file, else a template that was found for it, else sRGB.
         template: Folder that `lightpaint template` wrote.
         find: Whether one is looked for beside the painting if none is given.
-        paint: `light` takes colours for the light that falls on a surface, 1 being what makes white
-            look like 1, and multiplies them by its albedo (Schoeneman et al. 1993, section 3).
+        paint: `light` takes colours for the light that falls on a surface, and multiplies them by
+            its albedo: 1 makes white look like 1 (Schoeneman et al. 1993, section 3).
 
     Raises:
         ImageError: For files that cannot be read.
@@ -74,10 +74,8 @@ def read_target(
         SizeError: If target and mask or template differ in size.
 
     Examples:
-        >>> lp.read_target("painting.exr")
-        Target 'painting', 16x16
-          counts   100 % of the pixels
-        ...
+        >>> lp.read_target("painting.exr").size
+        (16, 16)
     """
     reading = _opened(Path(path), layer, transform, template, find=find)
     picture, made = reading.picture, reading.template
