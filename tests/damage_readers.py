@@ -54,7 +54,7 @@ class Reader:
         from lightpaint.scene.scene import load_scene
 
         scene = load_scene(path)
-        return scene.transform, scene.spp, scene.integrator, scene.emitters
+        return scene.film, scene.spp, scene.integrator, scene.emitters
 
     def opinion(self, path: Path, read: Any) -> str:
         """What is to be said of a damaged file that was read as something else than before."""
