@@ -8,7 +8,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -81,7 +80,8 @@ def run(folder: Path, *command: str, **environment: str) -> None:
     """Run a program that has 100 s, a home of its own, and none of our Python."""
     (folder / "home").mkdir(exist_ok=True)
     own = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "XDG_", "VIRTUAL"))}
-    path = [p for p in os.environ["PATH"].split(os.pathsep) if not p.startswith(sys.prefix)]
+    # Where its own Python looks for modules is decided by the first one on the path.
+    path = [*(str(Path(part).parent) for part in command if Path(part).is_absolute()), os.defpath]
     own |= {"HOME": str(folder / "home"), "PATH": os.pathsep.join(path), **environment}
     started = subprocess.Popen(
         command,
