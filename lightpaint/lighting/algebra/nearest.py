@@ -40,11 +40,11 @@ def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
     values, vectors = np.linalg.eigh(matrix)
     idle = vectors[:, values <= NULL]
     away = idle @ (idle.T @ (x - begin)[f])
-    if not away.any():
-        return x
+    # What is where it was has all the room there is.
+    f, away = f[away != 0], away[away != 0]
     # Straight back, up to the first bound.
     room = np.where(away > 0, x[f] - q.lower[f], q.upper[f] - x[f])
-    part = float(np.min(room / np.where(away != 0, np.abs(away), np.inf), initial=1.0))
+    part = float(np.min(room / np.abs(away), initial=1.0))
     moved = x.copy()
-    moved[f] = np.clip(x[f] - min(part, 1.0) * away, q.lower[f], q.upper[f])
-    return moved
+    moved[f] = np.clip(x[f] - part * away, q.lower[f], q.upper[f])
+    return moved if f.size else x

@@ -7,6 +7,7 @@ import pytest
 
 from lightpaint.lighting.algebra import optimum
 from lightpaint.lighting.algebra.capped_newton import capped_newton
+from lightpaint.lighting.algebra.nearest import nearest_equal
 from lightpaint.lighting.algebra.optimum import Cap, minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import moved_along, scaled
 
@@ -32,6 +33,16 @@ def test_copies_of_a_light_share_the_change_evenly(copies: int) -> None:
         expected = start[:copies] - (start[:copies].sum() - copies) / copies
         np.testing.assert_allclose(found.x, [*expected, 1, 1], atol=1e-9)
         assert found.converged
+
+
+def test_what_has_no_part_in_it_stays_to_the_bit() -> None:
+    """In closed form: two of three lights are one, and the third has nothing to do with them."""
+    q = scaled(np.array([[1.0, 1, 0], [1, 1, 0], [0, 0, 1]]), np.ones(3), 0.0, np.inf, ())
+    moved = nearest_equal(q, np.array([0.75, 0.25, 1.0]), np.array([0.3, 0.2, 5.0]))
+    np.testing.assert_allclose(moved, [0.55, 0.45, 1.0], atol=1e-15)
+    assert moved[2] == 1.0
+    stays = np.array([0.55, 0.45, 1.0])
+    assert nearest_equal(q, stays, stays) is stays
 
 
 def test_a_bound_ends_the_way_back() -> None:
