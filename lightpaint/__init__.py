@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from lightpaint.call import paint_with_light as paint_with_light
     from lightpaint.colour.transform import TransformChoice as TransformChoice
     from lightpaint.colour.transform import ViewTransform as ViewTransform
+    from lightpaint.demo import Demo as Demo
+    from lightpaint.demo import write_demo as write_demo
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
     from lightpaint.images.png import display_picture as display_picture
@@ -86,6 +88,7 @@ _HOMES = {
     "Basis": "basis.basis",
     "Certificate": "lighting.lighting",
     "Constraints": "lighting.constraints.constraints",
+    "Demo": "demo",
     "Diagnosis": "lighting.analysis.diagnosis",
     "Estimate": "images.estimate",
     "Fit": "lighting.fit",
@@ -130,6 +133,7 @@ _HOMES = {
     "verdict": "report.verdict",
     "verify": "relit.verify",
     "write_basis": "basis.file",
+    "write_demo": "demo",
     "write_exports": "relit.export.exports",
     "write_lighting": "lighting.file",
 }

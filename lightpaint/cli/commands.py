@@ -1,7 +1,9 @@
 """What each sub-command does: calls of the corridor, and tables of what came out."""
 
 import json
+import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from lightpaint.cli import tables, terminal
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.demo import write_demo
 from lightpaint.errors import OutputError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
@@ -27,7 +30,7 @@ from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.settings import Settings
-from lightpaint.sources import SceneFile
+from lightpaint.sources import Painting, SceneFile
 from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
 
 
@@ -89,6 +92,23 @@ def template(
     )
     if is_folder(output):
         terminal.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
+    return 0
+
+
+def demo(*, folder: Path, variant: str | None, settings: Settings) -> int:
+    """`lightpaint demo -o DIR`"""
+    made = write_demo(folder)
+    options = [f"--spp {settings.spp}"] if settings.spp else []
+    options += [f"-m {variant}"] if variant else []
+    files = shlex.join(map(str, (made.scene, made.painting, "-o", made.answer)))
+    command = " ".join(("lightpaint solve", files, *options))
+    terminal.say(f"a gallery, and a painting of it at evening, are in {folder}; what runs is")
+    terminal.say(command)
+    scene = SceneFile(str(made.scene), variant=variant)
+    painting, settings = Painting(str(made.painting)), replace(settings, command=command)
+    solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
+    terminal.write(f"\nOpen {made.answer / 'report.html'} in a browser. Then paint your own:")
+    terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
     return 0
 
 

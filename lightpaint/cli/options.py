@@ -48,6 +48,9 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
                 "settings": settings,
                 "force": options.force,
             }
+        case "demo":
+            output = output or Path("lightpaint-demo")
+            return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
             return {"jobs": jobs_of(options, settings)}
         case "relight":

@@ -12,6 +12,7 @@ from lightpaint.cli.option_groups import (
     add_resolution,
     add_sampling,
     add_scene,
+    add_spp,
     add_unit,
     add_variant,
     add_view,
@@ -71,6 +72,12 @@ def _template(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _demo(parser: argparse.ArgumentParser) -> None:
+    add_output(parser, "DIR", "folder for scene, painting and result (default: lightpaint-demo/)")
+    add_spp(parser, "the scene's")
+    add_variant(parser)
+
+
 def _solve(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
@@ -120,6 +127,7 @@ def _cache(parser: argparse.ArgumentParser) -> None:
 
 #: What each does, and how its options are added.
 _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
+    "demo": ("solve for a painting that comes along, to see what this is", _demo),
     "lights": ("list the lights of a scene", _lights),
     "basis": ("render the image of each light alone", _basis),
     "template": ("render the current look, to paint over", _template),

@@ -1,0 +1,69 @@
+"""A room and a painting of it that come with the package, to try it on.
+
+`gallery` and `evening.exr` are links to what stands in `scenes/` and `targets/`; a built package
+has the files.
+"""
+
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from lightpaint.errors import OutputError
+from lightpaint.files import write_bytes
+
+#: What is copied of the scene's folder, and what makes it is not.
+PATTERNS = ("scene.xml", "meshes/*.ply", "textures/*.png")
+
+
+@dataclass(frozen=True)
+class Demo:
+    """The demo in a folder of one's own.
+
+    Attributes:
+        scene: Mitsuba XML.
+        painting: EXR in linear light.
+        answer: Folder to solve into.
+
+    Examples:
+        >>> lp.write_demo("lightpaint-demo").answer
+        PosixPath('lightpaint-demo/evening')
+    """
+
+    scene: Path
+    painting: Path
+    answer: Path
+
+
+def write_demo(folder: str | Path) -> Demo:
+    """Copy the demo into `folder`; what is there and the same is left alone.
+
+    Args:
+        folder: Made if it is not there.
+
+    Returns:
+        Where the files are.
+
+    Raises:
+        OutputError: For a file there that differs, and for what cannot be written.
+
+    Examples:
+        >>> demo = lp.write_demo("lightpaint-demo")
+        >>> len(lp.load_scene(demo.scene).lights)
+        12
+    """
+    folder = Path(folder)
+    demo = Demo(folder / "gallery" / "scene.xml", folder / "evening.exr", folder / "evening")
+    with as_file(files(__name__)) as shipped:
+        room = [file for x in PATTERNS for file in (shipped / "gallery").glob(x)]
+        contents = {file.relative_to(shipped): file.read_bytes() for file in room}
+        contents[Path("evening.exr")] = (shipped / "evening.exr").read_bytes()
+    there = {file: data for file, data in contents.items() if (folder / file).exists()}
+    for file, data in there.items():
+        if not (folder / file).is_file() or (folder / file).read_bytes() != data:
+            raise OutputError(
+                f"{folder / file} is not as the demo has it: choose another folder, or move it away"
+            )
+    for file, data in contents.items():
+        if file not in there:
+            write_bytes(folder / file, data)
+    return demo

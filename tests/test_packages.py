@@ -1,0 +1,165 @@
+"""What is built of this works where there is no checkout; what it needs is bounded and known."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from importlib.metadata import PackageNotFoundError, requires
+from pathlib import Path
+
+import pytest
+from command import refused, run
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from renderer import REPOSITORY
+
+import lightpaint as lp
+
+PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["project"]
+PINNED = {
+    canonicalize_name(pin.name): pin
+    for line in (REPOSITORY / "constraints.txt").read_text("utf-8").splitlines()
+    if line and not line.startswith("#")
+    for pin in [Requirement(line)]
+}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the source distribution, and the wheel that was built of that."""
+    folder = tmp_path_factory.mktemp("built")
+    left_out = shutil.ignore_patterns(".*_cache", "__pycache__", "*.egg-info", ".git", "*.exr.tmp")
+    # A build leaves things beside the sources.
+    shutil.copytree(REPOSITORY, folder / "copy", ignore=left_out, symlinks=True)
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", "."]
+    done = subprocess.run([*command, "copy"], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
+    [wheel] = built.glob("*.whl")
+    site, folder = tmp_path / "site", tmp_path / "empty"
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
+    subprocess.run([*command, "--target", site, wheel], check=True)
+    folder.mkdir()
+    where = {"PYTHONPATH": str(site), "LIGHTPAINT_CACHE": str(tmp_path / "cache")}
+    done = lightpaint(folder, where, "demo", "--spp", "4")
+    assert done.returncode == 0, done.stderr
+    made = folder / "lightpaint-demo"
+    results = {"lighting.json", "relit.xml", "predicted.exr", "verified.exr", "comparison.png"}
+    assert {file.name for file in (made / "evening").iterdir()} == {*results, "report.html"}
+    # The very command that it says it runs has the same answer.
+    [said] = re.findall(r"lightpaint: lightpaint (solve .*)", done.stderr)
+    assert said in (made / "evening" / "report.html").read_text("utf-8")
+    answer = weights(made / "evening")
+    again = lightpaint(folder, where, *said.split())
+    assert again.returncode == 0, again.stderr
+    assert "kept from an earlier run" in again.stderr
+    assert weights(made / "evening") == answer
+    assert len(answer) == 12
+
+
+def test_source_distribution_has_all_that_the_checks_want(built: Path):
+    [archive] = built.glob("*.tar.gz")
+    with tarfile.open(archive) as file:
+        members = {Path(*Path(x.name).parts[1:]): x for x in file if not x.isdir()}
+    for folder in ("lightpaint", "scenes", "targets", "tests", "notebooks", "benchmarks", "docs"):
+        there = {x.relative_to(built / "copy") for x in (built / "copy" / folder).rglob("*")}
+        assert {x for x in there if (built / "copy" / x).is_file()} <= set(members)
+    for name in ("check", "constraints.txt", "README.md", "LICENSE", "pyproject.toml", ".ci/run"):
+        assert Path(name) in members
+    assert members[Path("check")].mode & 0o100
+    assert all(x.isfile() for x in members.values())  # what was a link is a file
+
+
+def test_wheel_has_no_more_than_it_needs(built: Path):
+    [wheel] = built.glob("*.whl")
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {Path(name).parts[0].partition("-")[0] for name in names} == {"lightpaint"}
+    assert not [name for name in names if name.endswith("make.py")]
+
+
+def test_the_demo_does_not_write_over_what_is_there(tmp_path: Path):
+    demo = lp.write_demo(tmp_path / "lightpaint-demo")
+    assert demo == lp.write_demo(tmp_path / "lightpaint-demo")
+    assert demo.painting.read_bytes() == shipped("targets/gallery/evening.exr")
+    demo.scene.write_text("<scene/>", "utf-8")
+    assert "is not as the demo has it" in refused(tmp_path, "demo")
+    assert demo.scene.read_text("utf-8") == "<scene/>"
+    (tmp_path / "file").write_text("mine", "utf-8")
+    assert "cannot write" in run(tmp_path, "demo", "-o", "file").stderr
+
+
+def test_what_can_break_is_bounded_from_above():
+    wanted = map(Requirement, PROJECT["dependencies"])
+    bounded = {x.name for x in wanted if any(y.operator == "<" for y in x.specifier)}
+    assert bounded >= {"mitsuba", "drjit", "numpy", "OpenEXR", "OpenImageIO", "pillow"}
+    assert "karellen-llvm-core" in bounded
+
+
+def test_every_package_is_pinned_within_its_bounds():
+    wanted = [*PROJECT["dependencies"]]
+    for extra in PROJECT["optional-dependencies"].values():
+        wanted += extra
+    seen: set[str] = set()
+    while wanted:
+        one = Requirement(wanted.pop())
+        name = canonicalize_name(one.name)
+        if name == "pip" or (one.marker is not None and not one.marker.evaluate()):
+            continue
+        assert name in PINNED, f"{name} is not in constraints.txt"
+        [pin] = PINNED[name].specifier
+        assert pin.operator == "=="
+        assert one.specifier.contains(pin.version), f"{one} and {PINNED[name]}"
+        if (name, *sorted(one.extras)) not in seen:
+            seen.add((name, *sorted(one.extras)))
+            wanted += _of(one)
+    assert len(seen) > 40
+
+
+def _of(package: Requirement) -> list[str]:
+    """What an installed package needs, with these extras."""
+    try:
+        needed = map(Requirement, requires(package.name) or [])
+    except PackageNotFoundError:  # an extra that is not installed here
+        return []
+    kept = []
+    for one in needed:
+        if one.marker is None or any(
+            one.marker.evaluate({"extra": x}) for x in ("", *package.extras)
+        ):
+            one.marker = None
+            kept.append(str(one))
+    return kept
+
+
+def lightpaint(
+    folder: Path, where: dict[str, str], *arguments: str
+) -> subprocess.CompletedProcess[str]:
+    """`lightpaint …` of what is installed at PYTHONPATH, and not of the checkout."""
+    code = "import sys, lightpaint; from lightpaint.cli import main; sys.stderr.write("
+    code += "lightpaint.__file__ + chr(10)); sys.exit(main())"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=folder,
+        env={**os.environ, **where},
+        capture_output=True,
+        text=True,
+    )
+    assert done.stderr.startswith(where["PYTHONPATH"])
+    return done
+
+
+def weights(folder: Path) -> dict[str, list[float]]:
+    data = json.loads((folder / "lighting.json").read_text("utf-8"))
+    return {name: light["emission"] for name, light in data["lights"].items()}
+
+
+def shipped(name: str) -> bytes:
+    return (REPOSITORY / name).read_bytes()
