@@ -13,13 +13,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.obtain import check_same_view
 from lightpaint.basis.render.render import basis_lights
-from lightpaint.colour.display import choose_exposure
-from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.fit import meant_by
 from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import check_relightable
@@ -76,7 +75,7 @@ class Job:
         by_sensor: Whether pictures go to a folder for each sensor, as they do of several.
         views: Found at birth: each view, with what it needs.
         asked: Found at birth: all constraints, those of the lights file first.
-        display: Found at birth: the view transform to come closest in; None for linear light.
+        fit: Found at birth: the settings, with all decided that follows from the paintings.
         remarks: Found at birth: what is worth saying to a person, in plain text.
 
     Raises:
@@ -99,7 +98,7 @@ class Job:
     by_sensor: bool = False
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
     asked: Constraints = field(init=False, repr=False)
-    display: ViewTransform | None = field(init=False, repr=False)
+    fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
     _relit: tuple[Path, ...] = field(init=False, repr=False)
 
@@ -135,7 +134,8 @@ class Job:
         relit = check_relightable(scenes[0], self.folder / "relit.xml") if scenes else []
         # The only place that sets what was found; frozen afterwards.
         born = vars(self)
-        born.update(views=views, asked=asked, display=self._display(views), _relit=tuple(relit))
+        fit = meant_by(self.settings, [view.target for view in views])
+        born.update(views=views, asked=asked, fit=fit, _relit=tuple(relit))
         born.update(remarks=tuple(self._remarks(targets)))
 
     @property
@@ -243,23 +243,6 @@ class Job:
         assert given is not None
         fitted = target.fitted_to(given.size, resize=self.settings.resize)
         return scene, fitted if self.groups is None else fitted.without(self.groups.holes)
-
-    def _display(self, views: Sequence[PaintedView]) -> ViewTransform | None:
-        """The one view through which all paintings are compared, None for linear light."""
-        if self.settings.space == "linear":
-            return None
-        if self.settings.transform is not None:
-            return self.settings.transform
-        seen = {view.target.transform for view in views if view.target.transform is not None}
-        if len(seen) > 1:
-            told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
-            raise TargetError(
-                f"the paintings were seen through {told}: say with transform=... which of them "
-                "is to be fitted"
-            )
-        return next(iter(seen), None) or ViewTransform(
-            "srgb", choose_exposure(views[0].target.image)
-        )
 
     def _remarks(self, targets: Sequence[Target]) -> list[str]:
         """What a person should know before this is run. targets: as they were read."""

@@ -49,14 +49,14 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         >>> np.round(look.lighting.emission["panel"], 3).tolist()
         [2.0, 1.5, 1.0]
     """
-    listen, settings = listener(progress), job.settings
+    listen = listener(progress)
     for remark in job.remarks:
         listen.say(remark)
     problem = Problem.of(
         _obtained(job, bases, listen),
         [view.target for view in job.views],
         constraints=job.asked,
-        fit=replace(settings, transform=job.display),
+        fit=job.fit,
     )
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
@@ -134,7 +134,7 @@ def _hearing(job: Job, view: PaintedView, listen: Listener) -> Listener:
 def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
     """What can be done against noise is done."""
     settings = job.settings
-    if settings.noise_correction:
+    if settings.corrects_noise(is_known=solution.basis.knows_noise):
         solution = correct_noise(solution)
     pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
     scenes = [(scene, basis) for scene, basis in pairs if scene is not None]

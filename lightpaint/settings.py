@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from lightpaint.errors import LightpaintError
-from lightpaint.expected import SWITCH, Check, a, check_fields, number, one_of, whole
+from lightpaint.expected import SWITCH, Check, a, number, one_of, whole
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.problem import Space
 from lightpaint.scene.film import check_resolution
 from lightpaint.scene.quality import Quality
 
@@ -20,12 +19,16 @@ class Settings(Fit):
     """How a painting is to be answered.
 
     Attributes:
-        unpainted: Weight of unpainted pixels against the current look.
+        space: As of `Fit`, as are the next six: `linear` or `display`; None as it was painted.
+        hold: Weight of all that is not painted beside all that is; None as it was painted.
+        colors: `free`, `gentle` or `white`; None as it was painted.
+        unpainted: Instead of `hold`, the weight of each pixel that is not painted.
+        literal: Whether the target is taken at its word, and noise is left in the equations, but
+            for what is said here.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
         transform: The display meant by `space`; None for that of the painting or, where it holds
             light, sRGB at an exposure that shows something.
         resize: Whether a target of another size is resampled.
-        space: `linear`, or `display` to come closest in what a display shows.
         spp: Samples per pixel of the basis and of the verification.
         time_s: Instead of spp, seconds in which the basis is rendered, of all views together.
         seed: Of the basis and, with other random numbers, of the verification.
@@ -34,7 +37,8 @@ class Settings(Fit):
         quality: Preset of spp and resolution, where these are not given. With a time or a preset
             the verification has about as many samples as the basis, whatever the resolution.
         use_cache: Whether a basis from an earlier run is taken, and this one kept.
-        noise_correction: Whether the noise's power, or part of it, is taken out of the equations.
+        noise_correction: Whether the noise's power, or part of it, is taken out of the equations;
+            None for wherever it is known, unless `literal`.
         refine: How often to render the scene as solved, with as many samples as the basis, and
             improve the answer by what that shows; needs a scene.
         suggest: How many point lights that would help most are looked for at most; needs a scene,
@@ -46,8 +50,8 @@ class Settings(Fit):
         LightpaintError: For a value that means nothing.
 
     Examples:
-        >>> lp.Settings(spp=64, refine=2).space
-        'linear'
+        >>> lp.Settings(spp=64, refine=2).refine
+        2
         >>> lp.Settings(refine=-1)
         Traceback (most recent call last):
             ...
@@ -55,14 +59,13 @@ class Settings(Fit):
     """
 
     resize: bool = False
-    space: Space = "linear"
     spp: int | None = None
     time_s: float | None = None
     seed: int = 0
     resolution: str | None = None
     quality: Quality | None = None
     use_cache: bool = True
-    noise_correction: bool = False
+    noise_correction: bool | None = None
     refine: int = 0
     suggest: int = 0
     cd_per_unit: float | None = None
@@ -71,7 +74,6 @@ class Settings(Fit):
     expected: ClassVar[Mapping[str, Check]] = {
         **Fit.expected,
         "resize": SWITCH,
-        "space": one_of(Space),
         # Two halves of the samples tell the noise.
         "spp": whole(2),
         "time_s": number("seconds"),
@@ -87,7 +89,7 @@ class Settings(Fit):
     }
 
     def __post_init__(self) -> None:
-        check_fields(self, self.expected)
+        super().__post_init__()
         if self.spp is not None and self.time_s is not None:
             raise LightpaintError(
                 f"spp is {self.spp} and time_s {self.time_s:g}: expected a number of samples or a "
@@ -95,6 +97,12 @@ class Settings(Fit):
             )
         if self.resolution is not None:
             check_resolution(self.resolution)
+
+    def corrects_noise(self, *, is_known: bool) -> bool:
+        """Whether noise is taken out of the equations. is_known: whether the basis knows it."""
+        if self.noise_correction is None:
+            return is_known and not self.literal
+        return self.noise_correction
 
     @property
     def checks_as_basis(self) -> bool:

@@ -27,12 +27,15 @@ FEW_LIGHTS = 256
 class NormalEquations:
     """Inner products of basis and target, per colour channel.
 
-    M: (3, n, n), ⟨Φ_i, Φ_j⟩. b: (3, n), ⟨Φ_i, Ψ⟩. target_norm2: (3,), ‖Ψ‖².
+    M: (3, n, n), ⟨Φ_i, Φ_j⟩. b: (3, n), ⟨Φ_i, Ψ⟩. target_norm2: (3,), ‖Ψ‖². across: (n, 3, 3),
+    what joins the channels of a light where something asks for its colour, 0 on the diagonal (the
+    rest is in M); None where nothing does.
     """
 
     M: Doubles
     b: Doubles
     target_norm2: Doubles
+    across: Doubles | None = None
 
     def __add__(self, other: "NormalEquations") -> "NormalEquations":
         """The problem of both pictures at once: of two tiles, cameras, frames or machines.
@@ -44,8 +47,12 @@ class NormalEquations:
                 f"a problem of {self.M.shape[1]} lights and one of {other.M.shape[1]} do not add: "
                 "both need the same lights in the same order"
             )
+        across = [x.across for x in (self, other) if x.across is not None]
         return NormalEquations(
-            self.M + other.M, self.b + other.b, self.target_norm2 + other.target_norm2
+            self.M + other.M,
+            self.b + other.b,
+            self.target_norm2 + other.target_norm2,
+            np.sum(across, axis=0) if across else None,
         )
 
     @property
@@ -57,14 +64,42 @@ class NormalEquations:
     def objective(self, w: Doubles) -> Doubles:
         """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3)."""
         quadratic = np.einsum("ic,cij,jc->c", w, self.M, w)
+        if self.across is not None:
+            quadratic += np.einsum("ic,icd,id->c", w, self.across, w)
         value = self.target_norm2 - 2 * np.einsum("ci,ic->c", self.b, w) + quadratic
         # A perfect fit leaves round-off of either sign.
         return np.asarray(np.maximum(value, 0))
+
+    def gradient(self, w: Doubles) -> Doubles:
+        """Half that of the objective, M w − b, (n, 3). w: (n, 3)."""
+        made = np.einsum("cij,jc->ic", self.M, w) - self.b.T
+        if self.across is not None:
+            made += np.einsum("icd,id->ic", self.across, w)
+        return np.asarray(made)
+
+    @property
+    def whole(self) -> Doubles:
+        """(3 n, 3 n), M for weights that lie flat, channel by channel."""
+        n = self.M.shape[1]
+        made = block_diagonal(self.M).reshape(3, n, 3, n)
+        if self.across is not None:
+            its = np.arange(n)
+            made[:, its, :, its] += self.across
+        return made.reshape(3 * n, 3 * n)
 
     @classmethod
     def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":
         """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w) or (h, w, 3)."""
         return cls(*inner_products(basis.images, image, importance))
+
+
+def block_diagonal(M: Doubles) -> Doubles:
+    """(3 n, 3 n), M (3, n, n) for weights that lie flat, channel by channel."""
+    n = M.shape[1]
+    whole = np.zeros((3, n, 3, n))
+    for c in range(3):
+        whole[c, :, c] = M[c]
+    return whole.reshape(3 * n, 3 * n)
 
 
 def inner_products(

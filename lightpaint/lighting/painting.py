@@ -11,6 +11,7 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.tiles import TiledEquations
@@ -76,6 +77,21 @@ def squares_of(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squar
     )
 
 
+def weight_of_rest(views: Views, fit: Fit) -> float:
+    """What each pixel that is not painted counts, h Σ D / Σ (1 − D) for hold h.
+
+    No more than one that is painted: where little is left, that does not rule the rest.
+    """
+    if fit.unpainted or not fit.hold:
+        return fit.unpainted
+    painted, rest = 0.0, 0.0
+    for basis, target in zip(views.bases, views.targets, strict=True):
+        a = target.importance.astype(np.float64)
+        painted += float(a.sum())
+        rest += float(np.maximum(1 - a, 0)[~basis.emitters_seen].sum())
+    return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
+
+
 def joint_squares(views: Views, *, unpainted: float) -> Squares:
     """All paintings, each taken at its word, as one problem."""
     each = [
@@ -132,20 +148,28 @@ class Painting:
     Updated in place: the arrays of `word` and of the targets are its own.
     """
 
-    def __init__(self, whole: Basis, views: Views, *, unpainted: float) -> None:
+    def __init__(self, whole: Basis, views: Views, fit: Fit) -> None:
         self.strokes = 0
-        self.unpainted = unpainted
+        self.fit = fit
         self.whole = whole
         self.views = replace(views, targets=tuple(_own(target) for target in views.targets))
         self.at_least = brighter_will_do(self.views)
         self.light = painted_light(self.views)
-        self.looks = [present_look(basis, unpainted) for basis in views.bases]
+        self._take(weight_of_rest(self.views, fit))
+
+    def _take(self, unpainted: float) -> None:
+        """Sums anew, with this weight for each pixel that is not painted."""
+        bases = self.views.bases
+        self.unpainted = unpainted
+        self.looks = [present_look(basis, unpainted) for basis in bases]
         self.word = joint_squares(self.views, unpainted=unpainted)
         self.tiles = [
             TiledEquations(
-                basis.images, views.part(self.word.image, k), views.part(self.word.weight, k)
+                basis.images,
+                self.views.part(self.word.image, k),
+                self.views.part(self.word.weight, k),
             )
-            for k, basis in enumerate(views.bases)
+            for k, basis in enumerate(bases)
         ]
 
     @cached_property
@@ -207,6 +231,10 @@ class Painting:
         # A stroke of colour leaves M as it is.
         self.tiles[k].update(region, with_M=importance is not None)
         self.strokes += 1
+        if importance is not None and self.fit.hold:
+            unpainted = weight_of_rest(self.views, self.fit)
+            if unpainted != self.unpainted:
+                self._take(unpainted)
 
 
 def _own(target: Target) -> Target:

@@ -3,18 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
-from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.constraints.whites import white_where_free
+from lightpaint.lighting.fit import Fit, Space, meant_by
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.painting import (
@@ -23,15 +24,18 @@ from lightpaint.lighting.painting import (
     joint_squares,
     loss_of,
     painted_light,
+    weight_of_rest,
     what_counts,
 )
+from lightpaint.lighting.pull import to_colors, to_present
 from lightpaint.lighting.reweighted import predicted
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
 
-#: What is compared with the painting: light, or what a display shows of it.
-Space = Literal["linear", "display"]
+#: Strength of the pull to the present colours: of what a light would do to the picture by changing
+#: its hue, this much is missed, in proportion to what is painted.
+GENTLE = 1.0
 
 
 @dataclass(frozen=True)
@@ -121,14 +125,16 @@ class Problem:
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
         whole, parts = joint_basis(bases)
-        fit = fit or Fit()
         asked = constraints_of(whole.asked).and_then(constraints or Constraints())
         fitted = [
             what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
             for its, one in zip(targets, parts, strict=True)
         ]
         views = Views(parts, tuple(fitted))
-        word = joint_squares(views, unpainted=fit.unpainted)
+        fit = meant_by(fit or Fit(), fitted)
+        if fit.colors == "white":
+            asked = white_where_free(asked, whole.lights)
+        word = joint_squares(views, unpainted=weight_of_rest(views, fit))
         loss = loss_of(
             word,
             brighter_will_do(views),
@@ -136,7 +142,7 @@ class Problem:
             painted=lambda: painted_light(views),
             current=lambda: whole.mix(whole.present_weights),
         )
-        reduction = reduce_to(asked, whole.lights)
+        reduction = reduced_by(asked, whole, fit)
         return cls(
             basis=whole,
             views=views,
@@ -170,30 +176,45 @@ class Problem:
         """The equations that the weights are to solve, noise taken out where that was asked."""
         return self.equations if self.corrected is None else self.corrected
 
-    @cached_property
+    @property
+    def brightness(self) -> float:
+        """By how much the view transform brightens the squares of light."""
+        transform = self.loss.transform
+        return 1.0 if transform is None else float(4.0**transform.stops)
+
+    @property
     def pull_strength(self) -> float:
         """That of the pull to the present, of light as bright as the view transform makes it."""
-        transform = self.loss.transform
-        return self.constraints.prefer_current * (
-            1.0 if transform is None else 4.0**transform.stops
-        )
+        return self.constraints.prefer_current * self.brightness
+
+    @cached_property
+    def color_strength(self) -> float:
+        """That of the pull to the present colours: in proportion to what is painted."""
+        if self.fit.colors != "gentle":
+            return 0.0
+        painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
+        pixels = sum(x.importance.size for x in self.views.targets)
+        return GENTLE * self.brightness * painted / pixels
+
+    @property
+    def keeps_color(self) -> Bools:
+        """(n,), the lights that are pulled to their colour: free to leave it, and seen to."""
+        free = {k for knob in self.full.knobs if knob.is_free for k in knob.lights}
+        its: Bools = np.array([k in free for k in range(len(self.basis.lights))], dtype=bool)
+        return its & self.equations.reached.any(axis=1)
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """What the pull to the present adds, if it is asked for.
-
-        It is strength · Σᵢ ‖Φᵢ‖² (wᵢ − presentᵢ)², ‖·‖ over the whole picture. The scale is
-        absolute: it does not depend on what is painted, and in units of w it asks the same of
-        every light. Pixels in which an emitter is seen do not count.
-        """
-        if not self.pull_strength:
-            return None
-        power, present = self.pull_strength * self.basis.power, self.basis.present_weights
-        M = np.einsum("ic,ij->cij", power, np.eye(len(power)))
-        return NormalEquations(M, (power * present).T, (power * present**2).sum(axis=0))
+        """What pulls to the present, or to the present colours, adds; None where none is asked."""
+        added = []
+        if self.pull_strength:
+            added.append(to_present(self.basis, self.pull_strength))
+        if self.color_strength:
+            added.append(to_colors(self.basis, self.color_strength, self.keeps_color))
+        return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
 
     def pulled(self, equations: NormalEquations) -> NormalEquations:
-        """`equations` with the pull to the present, if there is one."""
+        """`equations` with what pulls at the weights, if something does."""
         return equations if self.pull is None else equations + self.pull
 
     @property
@@ -248,7 +269,7 @@ class Problem:
         """
         painting = self.painting
         if painting is None:
-            painting = Painting(self.basis, self.views, unpainted=self.fit.unpainted)
+            painting = Painting(self.basis, self.views, self.fit)
         elif painting.strokes != self.strokes:
             raise ValueError("this problem was painted on already: go on from what that returned")
         painting.paint(view, region, image, importance, at_least)
@@ -266,6 +287,11 @@ class Problem:
             painting=painting,
             strokes=painting.strokes,
         )
+
+
+def reduced_by(asked: Constraints, basis: Basis, fit: Fit) -> Reduction:
+    """What constraints leave of the lights, and the fit of their colours."""
+    return replace(reduce_to(asked, basis.lights), is_joined=fit.colors == "gentle")
 
 
 def _bases(given: Any) -> list[Basis]:

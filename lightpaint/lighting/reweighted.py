@@ -134,7 +134,7 @@ def _fall(
     slope = squares.weight * (squares.image - x)
     fall = 2 * float((slope * (ahead - x)).sum())
     if pull is not None:
-        gradient = np.einsum("cij,jc->ic", pull.M, w) - pull.b.T
+        gradient = pull.gradient(w)
         fall -= 2 * float((gradient * (best - w)).sum())
     return fall
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.lighting.fit import Space
 from lightpaint.lighting.lighting import Certificate, Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, Space
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import Reweighting
 from lightpaint.screen import Shown
 

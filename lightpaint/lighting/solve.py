@@ -197,7 +197,7 @@ def _held_back(equations: NormalEquations, basis: Basis, weights: Doubles) -> Bo
     """
     lit = equations.reached
     power = np.where(lit, np.einsum("cii->ic", equations.M), 0)
-    g = np.where(lit, np.einsum("cij,jc->ic", equations.M, weights) - equations.b.T, 0)
+    g = np.where(lit, equations.gradient(weights), 0)
     size = np.abs(equations.b.T[lit] / np.sqrt(power[lit])).max(initial=0) or 1.0
     # Of what has one weight for all channels they pull together.
     scalar = np.array([light.is_scalar for light in basis.lights], dtype=bool)

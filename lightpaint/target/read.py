@@ -99,6 +99,10 @@ def read_target(
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
         transform=reading.transform,
+        through_view=picture.transform is not None,
+        # A layer that was saved alone lay over something; what a mask leaves out does not count.
+        over_look=made is not None
+        or (picture.transform is not None and picture.alpha is not None and mask is None),
     )
 
 

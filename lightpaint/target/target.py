@@ -32,6 +32,8 @@ class Target(Shown):
         content: Of the scene that it was painted on, where a template says.
         sensor: Id of the sensor it was painted through, where a template says.
         transform: What a display showed it through when it was painted; None if nobody knows.
+        through_view: Whether its values are those of a display, and not light.
+        over_look: Whether it was painted over the current look, which what it leaves is to keep.
 
     Examples:
         >>> image = np.full((16, 16, 3), 0.5)
@@ -52,6 +54,8 @@ class Target(Shown):
     content: str = ""
     sensor: str = ""
     transform: ViewTransform | None = None
+    through_view: bool = False
+    over_look: bool = False
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.problem import reduced_by
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 
@@ -16,7 +16,7 @@ def without_constraints(solution: Solution) -> Solution | None:
     problem = solution.problem
     if not problem.constraints or solution.whole is not None:
         return None
-    free = reduce_to(Constraints(), solution.basis.lights)
+    free = reduced_by(Constraints(), solution.basis, problem.fit)
     anew = replace(
         problem,
         constraints=Constraints(),

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
-from lightpaint.lighting.analysis.directions import all_columns, block_diagonal
+from lightpaint.lighting.analysis.directions import all_columns
 from lightpaint.lighting.analysis.noise import pseudo_inverse
 from lightpaint.lighting.analysis.release import bounds_of
 from lightpaint.lighting.bound import Bound
@@ -183,7 +183,7 @@ def _given_up(solution: Solution) -> float:
 def of_any_sign(solution: Solution) -> Doubles:
     """The weights (n, 3) that come closest if they may be negative; kept lights stay at 1."""
     equations, weights = solution.equations, solution.weights
-    whole = block_diagonal(equations.M)
+    whole = equations.whole
     for to in all_columns(solution):
         gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
         step = to @ pseudo_inverse(to.T @ whole @ to) @ (to.T @ gradient.ravel())

@@ -63,15 +63,6 @@ def answer_to(solution: Solution, equations: NormalEquations) -> Doubles:
     return solve_reduced(asked, problem.reduction, solution.weights).weights
 
 
-def block_diagonal(M: Doubles) -> Doubles:
-    """(3 n, 3 n), M (3, n, n) for weights that lie flat."""
-    n = M.shape[1]
-    whole = np.zeros((3, n, 3, n))
-    for c in range(3):
-        whole[c, :, c] = M[c]
-    return whole.reshape(3 * n, 3 * n)
-
-
 def all_columns(solution: Solution) -> Iterator[Doubles]:
     """(3 n, k), what every unknown changes of the weights, for each independent problem.
 

@@ -14,7 +14,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.directions import block_diagonal, moving
+from lightpaint.lighting.analysis.directions import moving
 from lightpaint.lighting.analysis.noise import (
     lacking_gradient,
     noise_sums,
@@ -95,9 +95,9 @@ def _share(solution: Solution, lacking: Doubles, known: Floats, rendered: Floats
     as known so far and as rendered. All measured by M⁻¹ along what nothing holds.
     """
     bias, spread = 0.0, np.zeros(2)
-    M = solution.problem.pulled(solution.problem.solved).M
+    M = solution.problem.pulled(solution.problem.solved).whole
     for to in moving(solution):
-        inverse = pseudo_inverse(to.T @ block_diagonal(M) @ to)
+        inverse = pseudo_inverse(to.T @ M @ to)
         lacks = to.T @ lacking.ravel()
         bias += float(lacks @ inverse @ lacks)
         for k, noise in enumerate((known, rendered)):

@@ -54,13 +54,12 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
 def _answer(solution: Solution, equations: NormalEquations) -> Answer:
     found = solve_reduced(equations, solution.problem.reduction, solution.weights)
     lit = equations.reached
-    gradient = np.einsum("cij,jc->ic", equations.M, found.weights) - equations.b.T
     return Answer(
         solution.basis,
         solution.problem.reduction,
         solution.problem.full,
         found,
-        np.where(lit, gradient, 0),
+        np.where(lit, equations.gradient(found.weights), 0),
         np.where(lit, np.einsum("cii->ic", equations.M), 0),
         tuple(light.is_active for light in solution.lighting.lights),
     )

@@ -14,7 +14,6 @@ from lightpaint.errors import BasisError
 from lightpaint.lighting.analysis.directions import (
     Room,
     answer_to,
-    block_diagonal,
     moving,
     rooms,
 )
@@ -27,7 +26,7 @@ from lightpaint.lighting.analysis.noise import (
     without_noise,
 )
 from lightpaint.lighting.lighting import LightSetting
-from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
 from lightpaint.screen import shortly
@@ -121,12 +120,12 @@ def error_bars(solution: Solution) -> Uncertainty | None:
 
     # How firmly lights are off, had there been no bias.
     asked = problem.pulled(unbiased)
-    gradient = (np.einsum("cij,jc->ci", asked.M, weights + bias) - asked.b).ravel()
+    gradient = asked.gradient(weights + bias).T.ravel()
     # A render of the mix shows all of an earlier error, of which a step by the noisy M leaves
     # a part; the unbiased answer, on which the interval hangs, has the scatter of its own M.
     scatters = problem.pulled(solved if problem.refinement is None else unbiased)
-    M, C = block_diagonal(scatters.M), noise.gradient.reshape(gradient.size, -1)
-    missed = block_diagonal(equations.M)
+    M, C = scatters.whole, noise.gradient.reshape(gradient.size, -1)
+    missed = equations.whole
     variance, excess = np.zeros(gradient.size), np.zeros(gradient.size)
     for room in rooms(solution, scatters):
         to = room.columns
@@ -193,10 +192,11 @@ def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
     bias = answer_to(solution, unbiased) - solution.weights
     shares = np.linspace(0, 1, SHARES + 1)
     cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, e.M, bias)
-    # The pull to the present keeps weights from moving, and is no part of what is missed.
-    pull = np.zeros_like(e.M) if solution.problem.pull is None else solution.problem.pull.M
+    # What pulls at the weights keeps them from moving, and is no part of what is missed.
+    pull = solution.problem.pull
+    stiffness = np.zeros((3 * n, 3 * n)) if pull is None else pull.whole
     for to in moving(solution):
-        M, left, stiff = (to.T @ block_diagonal(x) @ to for x in (e.M, least, pull))
+        M, left, stiff = (to.T @ x @ to for x in (e.whole, block_diagonal(least), stiffness))
         C = to.T @ noise.gradient.reshape(3 * n, 3 * n) @ to
         for k, s in enumerate(shares):
             inverse = pseudo_inverse((1 - s) * M + s * left + stiff)

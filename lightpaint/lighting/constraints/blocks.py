@@ -24,6 +24,27 @@ class Entries:
     values: Doubles
     first: Indices
 
+    @property
+    def counts(self) -> Indices:
+        """(j,), how many entries each column has."""
+        return np.diff(self.first, append=self.lights.size)
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Entries of two channels that are of one light: where what joins its channels goes.
+
+    one, other: which columns. value: the product of both entries. light, channel, next: of what
+    joins them.
+    """
+
+    one: Indices
+    other: Indices
+    value: Doubles
+    light: Indices
+    channel: Indices
+    next: Indices
+
 
 @dataclass(frozen=True)
 class Block:
@@ -43,6 +64,28 @@ class Block:
         """Whether its unknowns are weights of lights in one channel, as they are."""
         [first, *more] = self.entries
         return not more and bool((first.values == 1).all()) and first.lights.size == self.its.size
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """All of them, in either order."""
+        column, light, value, channel = (
+            np.concatenate(parts)
+            for parts in zip(
+                *(
+                    (np.repeat(e.here, e.counts), e.lights, e.values, np.full(e.lights.size, c))
+                    for c, e in zip(self.channels, self.entries, strict=True)
+                ),
+                strict=True,
+            )
+        )
+        found = []
+        by_light = np.argsort(light, kind="stable")
+        for its in np.split(by_light, np.flatnonzero(np.diff(light[by_light])) + 1):
+            a, b = (x.ravel() for x in np.meshgrid(its, its, indexing="ij"))
+            apart = channel[a] != channel[b]
+            found.append(np.stack([a[apart], b[apart]]))
+        a, b = np.concatenate(found, axis=1)
+        return Pairs(column[a], column[b], value[a] * value[b], light[a], channel[a], channel[b])
 
     @cached_property
     def is_in_order(self) -> bool:

@@ -106,7 +106,8 @@ def solve_reduced(
             reached[list(knob.lights)] = lit[list(knob.lights)].any()
     x = nearest(reduction, start, reached) if x is None else x.copy()
     how: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
-    optima = _optima(_left(equations, reduction, lit, start), reduction, x, how)
+    left = _left(equations, reduction, lit, start)
+    optima = _optima(left, equations.across, reduction, x, how)
     multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
     residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
     for block, optimum in zip(reduction.blocks, optima, strict=True):
@@ -129,7 +130,7 @@ def solve_reduced(
 
 def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
     """One problem for every set of channels that the unknowns couple."""
-    return _problems(_left(equations, reduction), reduction)
+    return _problems(_left(equations, reduction), equations.across, reduction)
 
 
 def _left(
@@ -148,15 +149,21 @@ def _left(
         is_coupled = len(reduction.channel_groups) < 3
         M, b = _in_the_dark(equations, lit, start, is_coupled=is_coupled)
     if reduction.holds_any:
+        # Lights that are held have no colour to keep: nothing joins their channels.
         b = b - np.einsum("cij,jc->ci", M, reduction.held)
     return M, b
 
 
-def _problems(left: tuple[Doubles, Doubles], reduction: Reduction) -> list[ReducedProblem]:
+def _problems(
+    left: tuple[Doubles, Doubles], across: Doubles | None, reduction: Reduction
+) -> list[ReducedProblem]:
     made = []
     for block in reduction.blocks:
         lower, upper = reduction.lower[block.its], reduction.upper[block.its]
         M, b = _of_block(*left, block)
+        if across is not None:
+            p = block.pairs
+            np.add.at(M, (p.one, p.other), p.value * across[p.light, p.channel, p.next])
         made.append(ReducedProblem(block.channels, block.its, M, b, lower, upper, block.caps))
     return made
 
@@ -237,7 +244,11 @@ def _within(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
 
 
 def _optima(
-    left: tuple[Doubles, Doubles], reduction: Reduction, x: Doubles, how: dict[str, Any]
+    left: tuple[Doubles, Doubles],
+    across: Doubles | None,
+    reduction: Reduction,
+    x: Doubles,
+    how: dict[str, Any],
 ) -> list[Optimum]:
     """The optimum of each block, begun at its part of x; of three alike by the same calls."""
     if (alike := reduction.alike) is not None:
@@ -251,7 +262,7 @@ def _optima(
         begin = x[p.its]
         return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **how)
 
-    parts = _problems(left, reduction)
+    parts = _problems(left, across, reduction)
     return side_by_side(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
 
 

@@ -36,11 +36,13 @@ class Reduction:
     held: (n, 3), w₀: the emission of lights without a knob; 0 for the others.
     labels: for each light what is asked of it in few words; "" for nothing.
     knobs: their unknowns one after the other are the x.
+    is_joined: whether something beside these couples the channels, a pull to colours.
     """
 
     held: Doubles
     labels: tuple[str, ...]
     knobs: tuple[Knob, ...]
+    is_joined: bool = False
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -149,6 +151,8 @@ class Reduction:
     @cached_property
     def channel_groups(self) -> list[list[int]]:
         """Channels that one problem couples; apart where no unknown and no limit joins them."""
+        if self.is_joined:
+            return [[0, 1, 2]]
         unknown, _, rgb = self.columns
         touched: Bools = np.zeros((len(self.unknowns) + len(self.caps), 3), dtype=bool)
         np.logical_or.at(touched, unknown, rgb != 0)
