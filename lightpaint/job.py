@@ -251,7 +251,7 @@ class Job:
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))
         for target, view in zip(targets, self.views, strict=True):
-            remarks += remarks_of_target(target, view.target.size, view.scene, self.settings)
+            remarks += remarks_of_target(target, view.target.size, view.scene, self.fit)
         return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
 
 

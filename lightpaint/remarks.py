@@ -38,18 +38,18 @@ def remarks_of_memory(scene: Scene) -> list[str]:
 
 
 def remarks_of_target(
-    target: Target, size: tuple[int, int], scene: Scene | None, settings: Settings
+    target: Target, size: tuple[int, int], scene: Scene | None, fit: Settings
 ) -> list[str]:
-    """How `target` was read. size: of the basis that it is solved on."""
+    """How `target` was read. size: of the basis that it is solved on. fit: with all decided."""
     remarks = []
     if scene is not None and target.content not in ("", scene.content):
         remarks.append("the scene has changed since its template was made")
     (height, width), (mine_h, mine_w) = size, target.size
-    is_asked_for = settings.resize or settings.resolution or settings.quality
+    is_asked_for = fit.resize or fit.resolution or fit.quality
     if size != target.size and not is_asked_for:
         remarks.append(f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}")
     name = "srgb" if target.transform is None else target.transform.name
-    if settings.space == "linear" and name not in ("srgb", "linear"):
+    if fit.space == "linear" and name not in ("srgb", "linear"):
         remarks.append(
             f"painted through {name}, whose highlights stand for very much light and rule the "
             'fit: space="display" fits what the eye sees'

@@ -58,11 +58,37 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
 def add_method(parser: argparse.ArgumentParser) -> None:
     """How a painting is answered."""
     parser.add_argument(
+        "--hold",
+        type=arguments.number(may_be_zero=True),
+        metavar="H",
+        help="weight of all that is not painted, against the current look, beside that of all that "
+        "is; 0 lets it go (default: 0.3 where it was painted over the current look, else 0)",
+    )
+    parser.add_argument(
+        "--colors",
+        choices=("free", "gentle", "white"),
+        help="of lamps. free: whatever is best; gentle: those they have, unless the painting asks "
+        "for others; white: 2200 to 9000 K (default: gentle where it was painted over the current "
+        "look or through a view, else free)",
+    )
+    parser.add_argument(
+        "--space",
+        choices=("linear", "display"),
+        help="linear: come closest in light; display: in what the eye sees of it through --view "
+        "(default: display for what was painted through a view, 8 and 16 bits, else linear)",
+    )
+    parser.add_argument(
+        "--literal",
+        action="store_true",
+        help="take the painting at its word, as the paper does: linear light, nothing held, any "
+        "colour, noise left in; but for what other options say",
+    )
+    parser.add_argument(
         "--unpainted",
         type=arguments.number(may_be_zero=True),
         default=0.0,
         metavar="W",
-        help="weight of unpainted pixels against the current look (default: %(default)s)",
+        help="instead of --hold: weight of each pixel that is not painted (default: %(default)s)",
     )
     parser.add_argument(
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
@@ -70,9 +96,9 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--correct-noise",
         dest="noise_correction",
-        action="store_true",
-        help="take half of the noise's power, as the halves of the samples show it, out of the "
-        "equations: closer to the answer of many samples at low --spp, and costs next to nothing",
+        action=argparse.BooleanOptionalAction,
+        help="take the power of the noise, as far as that pays, out of the equations: closer to "
+        "the answer of many samples (default: where it is known)",
     )
     parser.add_argument(
         "--refine",
@@ -81,13 +107,6 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="times to render the scene as solved, with as many samples as the basis, and improve "
         "the answer by what that shows (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--space",
-        choices=("linear", "display"),
-        default="linear",
-        help="linear: come closest in light; display: in what the eye sees of it through --view, "
-        "where dark parts count for more (default: %(default)s)",
     )
     parser.add_argument(
         "--method",

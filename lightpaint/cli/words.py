@@ -5,9 +5,12 @@ import re
 #: Arguments of the library that errors and remarks name, and their options.
 OPTIONS = {
     "cd_per_unit": "--unit",
+    "colors": "--colors",
     "groups": "--group",
+    "hold": "--hold",
     "layer": "--layer",
     "lights": "--lights",
+    "literal": "--literal",
     "mask": "--mask",
     "noise_correction": "--correct-noise",
     "paint": "--paint",
@@ -31,7 +34,7 @@ OPTIONS = {
 #: What is spelled otherwise than by an option and a value.
 SPELLINGS = {
     "find=False": "--no-template",
-    "noise_correction=False": "no --correct-noise",
+    "noise_correction=False": "--no-correct-noise",
     "use_cache=False": "--no-cache",
 }
 

@@ -17,6 +17,9 @@ FORMAT = "lightpaint-lighting 1"
 #: Fields of a lighting that stand in its file under their own names.
 READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
 
+#: Fields of a certificate that say how the lighting was found, where it is not the paper's way.
+FIT = ("display", "rounds", "hold", "colors", "noise_removed")
+
 
 def write_lighting(path: str | Path, lighting: Lighting) -> None:
     """Write lighting.json (docs/formats.md), whole or not at all.
@@ -50,7 +53,7 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
         },
     }
     if (q := lighting.certificate) is not None:
-        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", "display", "rounds")
+        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", *FIT)
     write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 

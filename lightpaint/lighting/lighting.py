@@ -87,6 +87,9 @@ class Certificate:
         display: The view transform through which the objective is seen; "" where it is of linear
             light.
         rounds: Linear problems solved one after the other, the last of which is the certified one.
+        hold: Weight of all that was not painted, against the current look, beside that of what was.
+        colors: How free lamps were to change their colour: `free`, `gentle` or `white`.
+        noise_removed: Share of the noise that was taken out of the equations.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -107,6 +110,9 @@ class Certificate:
     objective_error: RGB | None = None
     display: str = ""
     rounds: int = 1
+    hold: float = 0.0
+    colors: str = "free"
+    noise_removed: float = 0.0
 
     __repr__ = shortly
 

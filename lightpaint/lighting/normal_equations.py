@@ -62,11 +62,14 @@ class NormalEquations:
         return np.asarray(power > UNREACHED * power.max(initial=0))
 
     def objective(self, w: Doubles) -> Doubles:
-        """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3)."""
+        """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3).
+
+        What joins channels is halved between the two, so that one alone may be below 0.
+        """
         quadratic = np.einsum("ic,cij,jc->c", w, self.M, w)
-        if self.across is not None:
-            quadratic += np.einsum("ic,icd,id->c", w, self.across, w)
         value = self.target_norm2 - 2 * np.einsum("ci,ic->c", self.b, w) + quadratic
+        if self.across is not None:
+            return np.asarray(value + np.einsum("ic,icd,id->c", w, self.across, w))
         # A perfect fit leaves round-off of either sign.
         return np.asarray(np.maximum(value, 0))
 

@@ -177,6 +177,9 @@ def _solution(
         converged=optimum.converged,
         unreached=tuple(n for n, ok in zip(names, optimum.reached, strict=True) if not ok),
         display="" if transform is None else transform.spoken,
+        hold=problem.fit.hold or 0.0,
+        colors=problem.fit.colors or "free",
+        noise_removed=problem.noise_removed,
     ).of(problem.objective(weights), problem.norm2)
     labels = problem.reduction.labels
     asked = [(label, False) for label in labels]

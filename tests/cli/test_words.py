@@ -119,7 +119,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
         ("by alpha or mask=... what was painted", "by alpha or --mask what was painted"),
         ("pass find=False if all of it counts", "pass --no-template if all of it counts"),
         ("weighed against it: use refine=0", "weighed against it: use --refine 0"),
-        ("use noise_correction=False, and", "use no --correct-noise, and"),
+        ("use noise_correction=False, and", "use --no-correct-noise, and"),
         ('space="display" fits', "--space display fits"),
         ("like pattern='Light_{name}'; its", "like --pattern 'Light_{name}'; its"),
         ("profile (transform=..., mask=...), or", "profile (--view, --mask), or"),
