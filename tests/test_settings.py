@@ -10,10 +10,13 @@ import pytest
 from lightpaint import LightpaintError, Settings, ViewTransform
 
 WRONG = {
+    "hold": (-0.1, math.nan, math.inf, "1", True),
+    "colors": ("White", 1, ["free"]),
+    "literal": ("yes", 1, None),
     "unpainted": (-0.1, math.nan, math.inf, "1", None, True),
     "method": ("Gauss-Seidel", "newton", None, ["polished"]),
     "resize": ("yes", 1, None, 0),
-    "space": ("Display", None, 1),
+    "space": ("Display", 1),
     "transform": ("srgb", ("agx", 1.0)),
     "spp": (1, 0, -4, 2.5, "64", True, math.inf),
     "time_s": (0, -1, math.nan, math.inf, "3", True),
@@ -21,7 +24,7 @@ WRONG = {
     "resolution": ("half", "1/x", "", 4, (320, 180)),
     "quality": ("best", "Final", 1),
     "use_cache": ("no", 0, None),
-    "noise_correction": ("True", 1, None),
+    "noise_correction": ("True", 1),
     "refine": (-1, 101, 1.0, "1", None, True),
     "suggest": (-1, 1.5, None, True),
     "cd_per_unit": (0, -100, math.nan, math.inf, "100", True),
@@ -29,10 +32,13 @@ WRONG = {
 }
 
 RIGHT = {
+    "hold": (None, 0, 0.3, np.float64(2)),
+    "colors": (None, "free", "gentle", "white"),
+    "literal": (True, False),
     "unpainted": (0, 0.5, np.float64(2)),
     "method": ("polished", "gauss-seidel"),
     "resize": (True, False),
-    "space": ("linear", "display"),
+    "space": (None, "linear", "display"),
     "transform": (None, ViewTransform("agx", 1.0)),
     "spp": (None, 2, np.int64(64)),
     "time_s": (None, 0.1, 3),
@@ -40,7 +46,7 @@ RIGHT = {
     "resolution": (None, "1/4", "320x180"),
     "quality": (None, "preview", "final"),
     "use_cache": (True, False),
-    "noise_correction": (True, False),
+    "noise_correction": (None, True, False),
     "refine": (0, 100),
     "suggest": (0, 3),
     "cd_per_unit": (None, 100, 0.5),
@@ -72,3 +78,9 @@ def test_a_value_that_means_something_is_taken(name: str, value: Any) -> None:
 def test_samples_and_a_time_at_once_are_refused() -> None:
     with pytest.raises(LightpaintError, match=r"spp is 4 and time_s 2: .* not both"):
         Settings(spp=4, time_s=2)
+
+
+def test_what_is_not_painted_is_weighed_one_way() -> None:
+    with pytest.raises(LightpaintError, match=r"unpainted is 0\.1 and hold 0\.3: expected one"):
+        Settings(unpainted=0.1, hold=0.3)
+    assert Settings(unpainted=0.1, hold=0).unpainted == 0.1
