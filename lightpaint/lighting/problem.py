@@ -35,7 +35,7 @@ from lightpaint.target.target import Target
 
 #: Strength of the pull to the present colours: of what a light would do to the picture by changing
 #: its hue, this much is missed, in proportion to what is painted.
-GENTLE = 1.0
+GENTLE = 0.5
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,185 @@
+"""How well an answer guesses what somebody meant, who painted it the way people paint.
+
+    python benchmarks/intent.py [--scenes gallery stage cornell] [--styles spot blob all full]
+                                [--cases 12] [--first 0] [--settings literal default ...]
+
+A case means a lighting: the present one with one to three lights changed by 1 to 2.5 stops, up or
+down, most of them warmer or cooler, in a quarter of the cases everything else dimmed by 1 to 3
+stops. Painted is only part of what that would do, and not exactly: the look times 2^(log ratio),
+blurred, its strength wrong by a factor of 0.75 to 1.35, its hue off by 0.15 stops, with soft edges,
+in 8 bits. Styles: `spot`, only the strongest part of the strongest region; `blob`, that region;
+`all`, whatever changes clearly; `full`, the whole picture. Judged is the whole picture, painted or
+not: mean CIEDE2000 between the answer and what was meant, at the exposure of the painting.
+
+Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports 12 to 23.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, label
+
+import lightpaint as lp
+from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
+from lightpaint.colour.display import choose_exposure
+
+SCENES = Path(__file__).parent.parent / "scenes"
+SIZES = {"gallery": "160x90", "stage": "160x90", "cornell": "64x64"}
+SPP = 256
+
+STYLES = ("spot", "blob", "all", "full")
+
+#: What is tried; the first is the paper's own reading, the last what nobody has to ask for.
+SETTINGS: dict[str, dict[str, Any]] = {
+    "literal": {"literal": True},
+    "unpainted .1": {"literal": True, "unpainted": 0.1},
+    "display": {"literal": True, "space": "display"},
+    "display, hold": {"colors": "free"},
+    "linear, hold, gentle": {"space": "linear"},
+    "white": {"colors": "white"},
+    "default": {},
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """What was meant and how it was painted. meant, current: (h, w, 3) linear."""
+
+    meant: np.ndarray
+    current: np.ndarray
+    target: lp.Target
+
+    def judged(self, image: np.ndarray) -> float:
+        """Mean ΔE of a picture against what was meant, as the display shows both."""
+        transform = self.target.transform
+        assert transform is not None
+        shown = (transform.decode(transform.encode(x)) for x in (image, self.meant))
+        return float(delta_e(*(x * 2**transform.stops for x in shown)).mean())
+
+
+def main() -> None:
+    """Print a table for each scene."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scenes", nargs="+", default=list(SIZES), choices=SIZES)
+    parser.add_argument("--styles", nargs="+", default=list(STYLES), choices=STYLES)
+    parser.add_argument("--settings", nargs="+", default=list(SETTINGS), choices=SETTINGS)
+    parser.add_argument("--cases", type=int, default=12, metavar="N", help="of each style")
+    parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
+    options = parser.parse_args()
+    for name in options.scenes:
+        scene = lp.load_scene(SCENES / name / "scene.xml").reduced(SIZES[name])
+        basis = obtain_basis(scene, spp=SPP)
+        print(f"\n{name} {SIZES[name]}, {SPP} spp, cases {options.first} to ", end="")
+        print(f"{options.first + options.cases - 1}: mean and worst ΔE")
+        shown = "".join(f"{style:>14s}" for style in options.styles)
+        print(f"{'':22s}{shown}{'mean':>8s}{'harm':>7s}{'s':>6s}")
+        cases = {
+            style: [
+                painted(basis, style, np.random.default_rng([STYLES.index(style), k]))
+                for k in range(options.first, options.first + options.cases)
+            ]
+            for style in options.styles
+        }
+        nothing = {style: [x.judged(x.current) for x in its] for style, its in cases.items()}
+        row("doing nothing", nothing, nothing)
+        for setting in options.settings:
+            start_s = time.perf_counter()
+            found = {
+                style: [x.judged(answer(basis, x, SETTINGS[setting])) for x in its]
+                for style, its in cases.items()
+            }
+            taken_s = time.perf_counter() - start_s
+            row(setting, found, nothing, taken_s / (options.cases * len(cases)))
+
+
+def row(
+    name: str, errors: dict[str, list[float]], nothing: dict[str, list[float]], taken_s: float = 0
+) -> None:
+    """One line: by style, their mean, and how much worse than doing nothing a case is at most."""
+    columns = "".join(f"{np.mean(x):8.2f} {max(x):5.1f}" for x in errors.values())
+    mean = np.mean([np.mean(x) for x in errors.values()])
+    harm = max(
+        a - b
+        for x, y in zip(errors.values(), nothing.values(), strict=True)
+        for a, b in zip(x, y, strict=True)
+    )
+    print(f"{name:22s}{columns}{mean:8.2f}{harm:7.1f}{taken_s:6.2f}", flush=True)
+
+
+def answer(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
+    """What the solve makes of the painting, noise taken out as the command line does."""
+    solution = lp.solve(basis, case.target, **settings)
+    if not settings.get("literal"):
+        solution = lp.correct_noise(solution)
+    return basis.mix(solution.weights)
+
+
+def painted(basis: lp.Basis, style: str, rng: np.random.Generator) -> Case:
+    """A lighting that somebody means, and a painting of it in that style."""
+    current = basis.mix(basis.present_weights)
+    meant, ratio = next(
+        (image, ratio)
+        for image, ratio in intentions(basis, current, rng)
+        if (np.abs(ratio).max(axis=-1) > 0.5).mean() > 0.005
+    )
+    soft = basis.size[1] / 80
+    ratio = np.dstack([gaussian_filter(plane, soft) for plane in np.moveaxis(ratio, -1, 0)])
+    strong = np.abs(ratio).max(axis=-1)
+    off = rng.normal(0, 0.15, 3) * (strong > 0.2)[..., None]
+    image = current * 2 ** (ratio * rng.uniform(0.75, 1.35) + off)
+    mask = np.ones(basis.size)
+    if style != "full":
+        mask = gaussian_filter(region(strong, style).astype(float), soft)
+        mask[mask < 0.02] = 0
+    transform = lp.ViewTransform("srgb", choose_exposure(current))
+    codes = np.round(255 * transform.encode(image)) / 255
+    target = lp.Target(
+        style,
+        transform.decode(codes).astype(np.float32),
+        mask.astype(np.float32),
+        everything=style == "full",
+        at_least=codes >= 1,
+        transform=transform,
+        through_view=True,
+        over_look=True,
+    )
+    return Case(meant, current, target)
+
+
+def intentions(
+    basis: lp.Basis, current: np.ndarray, rng: np.random.Generator
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pictures (h, w, 3) of lightings that one may mean, and their log₂ ratio to the current."""
+    lights = np.flatnonzero(~basis.is_fixed)
+    dark = 0.01 * current.mean()
+    while True:
+        weights = basis.present_weights.copy()
+        if rng.random() < 0.25:
+            weights[lights] *= 2 ** -rng.uniform(1, 3)
+        for k in rng.choice(lights, size=rng.integers(1, 4), replace=False):
+            stops = rng.choice([-1, 1]) * rng.uniform(1, 2.5)
+            weights[k] = basis.present_weights[k] * 2**stops
+            if rng.random() < 0.6:
+                tint = kelvin_to_rgb(rng.uniform(2800, 9500)) / kelvin_to_rgb(6500)
+                weights[k] *= tint / luminance(tint)
+        image = basis.mix(weights)
+        yield image, np.log2((image + dark) / (current + dark))
+
+
+def region(strong: np.ndarray, style: str) -> np.ndarray:
+    """(h, w) bool, where somebody paints who sees a change of so many stops, (h, w)."""
+    if style == "all":
+        return strong > max(0.35, 0.25 * strong.max())
+    parts, count = label(strong > (0.5 if style == "blob" else 0.75) * strong.max())
+    sums = [strong[parts == k].sum() for k in range(1, count + 1)]
+    return parts == 1 + int(np.argmax(sums))
+
+
+if __name__ == "__main__":
+    main()
