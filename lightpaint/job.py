@@ -21,6 +21,7 @@ from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import meant_by
 from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.relight import check_relightable
 from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
 from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
@@ -115,6 +116,7 @@ class Job:
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
             folders = [self.folder / name for name in view_names(scenes)]
+        self._check_painting_is_no_light()
         told = scenes[0] if scenes else basis
         asked = self.constraints
         if isinstance(told, Scene | Basis):
@@ -227,6 +229,18 @@ class Job:
             self.basis,
         )
 
+    def _check_painting_is_no_light(self) -> None:
+        """Raise BasisError where a folder of light groups has the painting among its lights."""
+        if self.groups is None or not self.groups.path.is_dir():
+            return
+        files = {layer.file.resolve() for layer in self.groups.layers}
+        for target in self.targets:
+            if isinstance(target, Painting) and Path(target.path).resolve() in files:
+                raise BasisError(
+                    f"the painting {target.path} is among the lights of {self.groups.path}: pass "
+                    "it to read_light_groups in leave_out, or move it elsewhere"
+                )
+
     def _on_one_film(
         self, scene: Scene | None, target: Target, basis: Basis | None
     ) -> tuple[Scene | None, Target]:
@@ -246,7 +260,9 @@ class Job:
 
     def _remarks(self, targets: Sequence[Target]) -> list[str]:
         """What a person should know before this is run. targets: as they were read."""
-        remarks = list(self.groups.remarks) if self.groups is not None else []
+        remarks = []
+        if self.groups is not None:
+            remarks += [*self.groups.remarks, *spoken_unreadable(self.groups, self.folder)]
         rendered = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))

@@ -110,11 +110,12 @@ class GroupsFile:
 
     path: str
     pattern: str | None = None
+    leave_out: Sequence[str] = ()
 
     @cached_property
     def content(self) -> LightGroups:
         """The light groups, as they are when they are first asked for."""
-        return read_light_groups(self.path, pattern=self.pattern)
+        return read_light_groups(**vars_of(self))
 
 
 #: What of a job can be sent.
@@ -215,6 +216,8 @@ def _made(given: Any) -> BasisFile | GroupsFile | None:
     if given is None:
         return None
     [(kind, values)] = given.items()
+    if kind == "GroupsFile":
+        values["leave_out"] = tuple(values.get("leave_out", ()))
     return GroupsFile(**values) if kind == "GroupsFile" else BasisFile(**values)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from light_groups import interleaved, pictures
+from light_groups import channels, interleaved, pictures, write
 from renderer import LIGHTS, write_room
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_with_light, run
@@ -57,6 +57,32 @@ def _flat(basis: Basis, **how: Any) -> Target:
 def _from_basis(**how: Any) -> Job:
     how = {"basis": BasisFile("a.basis.exr"), "targets": (Painting("p.exr"),)} | how
     return Job((), folder=Path("out"), **how)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_painting_in_the_folder_of_the_lights(tmp_path: Path):
+    (tmp_path / "lights").mkdir()
+    for name, image in zip(("key", "fill"), pictures(2), strict=True):
+        write(tmp_path / "lights" / f"{name}.exr", ("rgb", channels("", image)))
+    painting = write(tmp_path / "lights" / "noon.exr", ("rgb", channels("", pictures()[2])))
+    how = {"targets": (Painting(str(painting)),)}
+    for basis in (GroupsFile("lights"), read_light_groups("lights")):
+        with pytest.raises(BasisError, match=r"noon\.exr is among the lights of lights: pass it"):
+            _from_basis(basis=basis, **how)
+    job = _from_basis(basis=GroupsFile("lights", leave_out=(str(painting),)), **how)
+    assert job.groups is not None
+    assert job.groups.basis.names == ("fill", "key")
+    assert Job.from_json(job.to_json()) == job
+    assert isinstance(back := Job.from_json(job.to_json()).basis, GroupsFile)
+    assert back.leave_out == (str(painting),)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_path_that_nuke_would_evaluate_is_told_before_the_solve(tmp_path: Path):
+    path = (tmp_path / "groups.exr").rename(tmp_path / "take #2.exr")
+    job = _from_basis(basis=GroupsFile(str(path)), targets=(Painting("g.exr"),))
+    [told] = [remark for remark in job.remarks if "Nuke" in remark]
+    assert told.startswith("Nuke would evaluate # in the path")
 
 
 ASKED = Constraints.of(

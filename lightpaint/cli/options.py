@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.file import is_basis_file
-from lightpaint.basis.lightgroups.read import is_light_groups
+from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.job import Job
@@ -145,10 +145,10 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
     basis: BasisFile | GroupsFile
     if given and _is_file_to_be(given, source):
         _check_light_groups(given)
-        basis, names = GroupsFile(given, options.pattern), None
         options.targets = [options.source, *options.targets]
+        basis, names = _groups_file(given, options), None
     elif source.suffix.lower() != ".xml" and is_light_groups(source):
-        basis = GroupsFile(options.source, options.pattern)
+        basis = _groups_file(options.source, options)
     elif options.pattern:
         raise BasisError(
             f"--pattern names the layers of light groups, and {source} has none: leave it out, or "
@@ -174,22 +174,29 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
     return basis
 
 
+def _groups_file(path: str, options: Namespace) -> GroupsFile:
+    """Light groups, in whose folder what this command paints with may lie."""
+    pictures = (*options.targets, *(options.masks or ()))
+    return GroupsFile(path, options.pattern, leave_out=pictures)
+
+
 def _is_file_to_be(given: str, source: Path) -> bool:
     """Whether `--lights` means a file or folder, and not lights of a scene or a basis."""
     if given.lower().endswith(".exr"):
         return True
-    # A folder may well have the name of a light: results are kept in such.
-    return source.suffix.lower() != ".xml" and Path(given).is_dir()
+    # A folder or file may well have the name of a light: results are kept in such.
+    return source.suffix.lower() != ".xml" and Path(given).exists()
 
 
 def _check_light_groups(given: str) -> None:
-    """Raise BasisError for a `--lights` that names something else."""
+    """Raise BasisError for a `--lights` that names something else, ImageError for one damaged."""
     path = Path(given)
     if not path.exists():
         raise BasisError(f"no such file or folder of light groups: --lights {given}")
     if path.is_dir() and not is_light_groups(path):
         raise BasisError(f"--lights {given} is a folder without an .exr file")
-    if not is_light_groups(path):
+    # What is no EXR at all is refused where it is read.
+    if path.is_file() and is_exr(path) and is_own_basis(path):
         raise BasisError(
             f"--lights {given} holds no light groups: give an EXR of another renderer's, or a "
             "folder of them; a basis of lightpaint's own stands where the scene does"

@@ -120,11 +120,7 @@ def show_look(look: Look, folder: Path) -> None:
     if curve := certificate.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
-    if certificate.unreached:
-        terminal.say(
-            f"no painted pixel sees {', '.join(certificate.unreached)}: kept as it is; "
-            "paint where it shines, or pass --unpainted"
-        )
+    _say_unreached(look)
     for ambiguity in look.analysis.ambiguities:
         terminal.say(ambiguity.sentence)
     if not certificate.converged:
@@ -134,6 +130,19 @@ def show_look(look: Look, folder: Path) -> None:
         )
     if look.verification is not None and not look.verification.agrees:
         terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
+
+
+def _say_unreached(look: Look) -> None:
+    """Say of which lights nothing is known, and what would help."""
+    unreached = look.solution.certificate.unreached
+    dark = [name for name in unreached if not look.basis.image(name).any()]
+    if dark:
+        terminal.say(f"the picture holds nothing of {', '.join(dark)}: kept as it is")
+    if seen := [name for name in unreached if name not in dark]:
+        terminal.say(
+            f"no painted pixel sees {', '.join(seen)}: kept as it is; "
+            "paint where it shines, or pass --unpainted"
+        )
 
 
 def _show_solved(look: Look) -> None:

@@ -5,6 +5,7 @@ reference library lets pass silently (a cut-off file, missing parts, deep pixels
 ImageError here.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,6 +20,11 @@ from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import first_line, replacing
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.silence import silenced
+from lightpaint.version import __version__
+
+#: How the names of lightpaint's own text attributes begin, and the one that every file of its has.
+OWN = "lightpaint."
+VERSION_KEY = f"{OWN}version"
 
 #: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
 #: is refused before any is decoded. Pictures compress to less only where they are empty.
@@ -90,6 +96,13 @@ def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
         return [_texts(header) for header in headers], _windows(headers[0])[0]
 
 
+def read_channels(path: Path) -> set[str]:
+    """Names of the channels of all parts of an EXR file, without pixels. Raises ImageError."""
+    with silenced():
+        declared = _declared(path)
+        return {channel.name for _, header in declared for channel in header["channels"]}
+
+
 def read_parts(path: Path) -> list[Part]:
     """All parts of the EXR file at `path`.
 
@@ -125,9 +138,18 @@ def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
         declared = [(part.name(), dict(part.header)) for part in header.parts]
         _windows(declared[0][1])
     except Exception as error:
-        reason = first_line(error)
-        raise ImageError(f"{path} is not a readable OpenEXR file: {reason}") from error
+        raise ImageError(_why_unreadable(path, first_line(error))) from error
     return declared
+
+
+def _why_unreadable(path: Path, reason: str) -> str:
+    """What is wrong with a file whose header cannot be read. reason: the library's."""
+    if kind_of(head_of(path, 16)) != "exr":
+        return f"{path} is not a readable OpenEXR file: {reason}"
+    # The library names the file again, and says of one that ends too soon no more than that.
+    said = re.sub(r"(^Unable|\s*when attempting) to open .*", "", reason)
+    which = f" ({said})" if said else ""
+    return f"{path} is cut off or damaged in its header{which}: export it again"
 
 
 def _texts(header: Mapping[str, Any]) -> dict[str, str]:
@@ -190,13 +212,16 @@ def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, in
 def write_parts(path: Path, parts: Sequence[Part]) -> None:
     """Write a multi-part EXR with lossless ZIP compression, whole or not at all.
 
-    All parts must have one display window; its size is that of the part where it says none.
+    The first part says which version of lightpaint wrote it, so that nobody takes it for a render
+    of another program. All parts must have one display window; its size is that of the part where
+    it says none.
     """
     exr_parts = []
-    for part in parts:
+    for k, part in enumerate(parts):
         header = {
             "type": OpenEXR.scanlineimage,
             "compression": OpenEXR.ZIP_COMPRESSION,
+            **({} if k else {VERSION_KEY: __version__}),
             **part.attributes,
         }
         if part.display is not None:

@@ -22,6 +22,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import descend
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.traces import without_traces
 from lightpaint.target.target import Target
 
 #: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
@@ -169,6 +170,9 @@ def _solution(
 ) -> Solution:
     """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull."""
     transform, names = problem.loss.transform, problem.basis.names
+    labels = problem.reduction.labels
+    is_asked = np.array([bool(label) for label in labels], dtype=bool)
+    weights = without_traces(problem.basis, weights, problem.squares.image, is_asked=is_asked)
     certificate = Certificate(
         kkt_residual=as_rgb(optimum.kkt_residual),
         objective=(0, 0, 0),
@@ -181,7 +185,6 @@ def _solution(
         colors=problem.fit.colors or "free",
         noise_removed=problem.noise_removed,
     ).of(problem.objective(weights), problem.norm2)
-    labels = problem.reduction.labels
     asked = [(label, False) for label in labels]
     if any(labels):
         held = _held_back(equations, problem.basis, optimum.weights)

@@ -15,7 +15,8 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.checksums import CHECKSUMS_KEY
 from lightpaint.basis.file import LIGHT_KEY, ORIGIN_KEY, read_basis, read_origin, write_basis
-from lightpaint.basis.lightgroups.read import MAX_FILES, is_light_groups, read_light_groups
+from lightpaint.basis.lightgroups.folder import MAX_FILES, is_light_groups
+from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
 

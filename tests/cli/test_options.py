@@ -1,5 +1,6 @@
 """What `solve` starts from, as it is given on the command line."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.cli.options import basis_of, jobs_of, settings_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
-from lightpaint.errors import BasisError
+from lightpaint.errors import BasisError, ImageError
 from lightpaint.sources import BasisFile, GroupsFile
 from lightpaint.target.target import Target
 
@@ -56,7 +57,8 @@ def _jobs(*given: str) -> Any:
 @pytest.mark.usefixtures("here")
 def test_light_groups_by_either_spelling(given: str, path: str, targets: list[str]):
     options = _options(*given.split())
-    assert basis_of(options) == GroupsFile(path)
+    # A painting may lie in the folder of the lights.
+    assert basis_of(options) == GroupsFile(path, leave_out=tuple(targets))
     assert options.targets == targets
 
 
@@ -88,6 +90,41 @@ def test_everything_else_is_what_it_was(given: str, basis: BasisFile | None):
 def test_slips_are_said(given: str, says: str):
     with pytest.raises(BasisError, match=says):
         basis_of(_options(*given.split()))
+
+
+@pytest.mark.usefixtures("here")
+def test_the_mask_is_no_light_either():
+    found = basis_of(_options("a.exr", "--mask", "m.exr", "--lights", "key"))
+    assert found == GroupsFile("key", leave_out=("a.exr", "m.exr"))
+
+
+@pytest.mark.parametrize("name", ["groups", "groups.exr.tmp", "groups.EXR"])
+@pytest.mark.parametrize("given", ["{} a.exr", "a.exr --lights {}"])
+def test_light_groups_are_known_by_how_they_begin(here: Path, name: str, given: str):
+    (here / "groups.exr").rename(here / name)
+    found = basis_of(_options(*given.format(name).split()))
+    assert found == GroupsFile(name, leave_out=("a.exr",))
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (lambda c: c[:200], r"^x\.exr is cut off or damaged in its header: export it again$"),
+        (
+            lambda c: c[:40] + b"\xff" * 60 + c[100:],
+            r"^x\.exr is cut off or damaged in its header \(.*ttribute.*\): export it again$",
+        ),
+        (lambda c: c[:-50], r"^x\.exr is .*(cut off|damaged)"),
+        (lambda c: b"", r"^x\.exr is no OpenEXR file"),
+        (lambda c: b"\x89PNG\r\n\x1a\n" + c[8:], r"^x\.exr is a PNG file"),
+    ],
+)
+@pytest.mark.parametrize("given", ["x.exr painting.exr", "painting.exr --lights x.exr"])
+def test_what_is_wrong_with_a_file_is_said(here: Path, made: Any, says: str, given: str):
+    (here / "x.exr").write_bytes(made((here / "groups.exr").read_bytes()))
+    with pytest.raises((BasisError, ImageError)) as raised:
+        _jobs(*given.split())
+    assert re.search(says, str(raised.value)), raised.value
 
 
 @pytest.mark.parametrize(

@@ -247,9 +247,9 @@ TOO_MANY = r"huge\.exr declares .* bytes of pixels, in a file of .*: too many to
         ((0, 0, 2**20, 2**20), TOO_MANY),
         ((-500_000, 7, 500_000, 9_000), TOO_MANY),
         # These the library itself refuses.
-        ((0, 0, 2**31 - 2, 2**31 - 2), "not a readable OpenEXR file"),
-        ((-(2**31), -(2**31), 2**31 - 1, 2**31 - 1), "not a readable OpenEXR file"),
-        ((5, 5, 0, 0), "not a readable OpenEXR file"),
+        ((0, 0, 2**31 - 2, 2**31 - 2), "cut off or damaged in its header"),
+        ((-(2**31), -(2**31), 2**31 - 1, 2**31 - 1), "cut off or damaged in its header"),
+        ((5, 5, 0, 0), "cut off or damaged in its header"),
     ],
 )
 def test_absurd_sizes_are_refused_at_once(

@@ -1,7 +1,7 @@
 """Whether light groups are all of the picture: their sum, held against the beauty."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,16 +19,25 @@ EXCEEDING = 1e-3
 #: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
 HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
 
+#: Most pictures of which the sum of all but two is sought: each is tried with each.
+MOST_TRIED = 40
+
 #: Every how many rows and columns a pixel is looked at first, where most pictures are others.
 COARSE = 8
 
 
 def spoken_sum(
-    rest: Floats, whole: Floats, layers: Sequence[RenderLayer], missing: float, exceeding: float
+    rest: Floats,
+    whole: Floats,
+    layers: Sequence[RenderLayer],
+    missing: float,
+    exceeding: float,
+    name: str,
 ) -> tuple[str, bool]:
     """A sentence on the sum of the groups, and whether what they lack is more than rounding.
 
-    All of it in the primaries of the file: in others, light of a wide gamut is negative.
+    name: of the light that is what they lack. All of it is in the primaries of the file: in
+    others, light of a wide gamut is negative.
     """
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
     truly_missing, truly_exceeding = shares(beyond, whole)
@@ -36,14 +45,14 @@ def spoken_sum(
         off = missing + exceeding
         return f"the groups add up to the beauty (to {off:.1g} of its light)", False
     told = (
-        f"the groups lack {_percent(missing)} of the light of the beauty: "
-        "that is kept as it is, as the light rest"
+        f"the groups lack {spoken_share(missing)} of the light of the beauty: "
+        f"that is kept as it is, as the light {name}"
     )
     if truly_exceeding > EXCEEDING:
         warning = (
-            f"WARNING: in places the groups exceed the beauty, by {_percent(exceeding)} of its "
-            "light in all, which the light rest takes away: is the beauty denoised or clamped, or "
-            "a light in two groups?"
+            f"WARNING: in places the groups exceed the beauty, by {spoken_share(exceeding)} of its "
+            f"light in all, which the light {name} takes away: is the beauty denoised or clamped, "
+            "a light in two groups, or one of them no light?"
         )
         told = f"{warning} {told[0].upper()}{told[1:]}" if truly_missing > NOTHING else warning
     return told, True
@@ -96,6 +105,11 @@ class LayerSum:
         with np.errstate(invalid="ignore"):
             total = self.total + layer.image
         return LayerSum(total, self.bound + rounding([layer]))
+
+    def without(self, layer: RenderLayer) -> "LayerSum":
+        """Less one that is among what was added up."""
+        with np.errstate(invalid="ignore"):
+            return LayerSum(self.total - layer.image, self.bound)
 
     def lacks(self, beauty: RenderLayer) -> float:
         """Σ |beauty − total|, where both are finite."""
@@ -150,5 +164,48 @@ def beauty_among(layers: Sequence[RenderLayer]) -> RenderLayer | None:
     return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
 
 
-def _percent(share: float) -> str:
+def stranger_among(
+    layers: Sequence[RenderLayer], beauty: RenderLayer | None
+) -> tuple[RenderLayer, RenderLayer] | None:
+    """The one layer without which the others add up to the picture, and that picture.
+
+    beauty: the picture; without one it is sought among the layers. None where all of them are
+    needed, where no single one is in the way, and where they are too many to try.
+    """
+    if len(layers) < (2 if beauty else 4) or (beauty is None and len(layers) > MOST_TRIED):
+        return None
+    if beauty is not None and LayerSum.of(layers).is_of(beauty):
+        return None
+    # A few pixels tell that most pairs are none.
+    few, whole = list(map(_coarse, layers)), beauty and _coarse(beauty)
+    for k in _strangers(few, whole):
+        others = [*layers[:k], *layers[k + 1 :]]
+        if beauty is None and (found := beauty_among(others)) is not None:
+            return layers[k], found
+        if beauty is not None and LayerSum.of(others).is_of(beauty):
+            return layers[k], beauty
+    return None
+
+
+def _strangers(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
+    """Places of those without which the others may add up to the picture."""
+    added = LayerSum.of(layers)
+    found = []
+    for k, layer in enumerate(layers):
+        less = added.without(layer)
+        if beauty is not None and less.is_of(beauty):
+            found.append(k)
+        if beauty is None and any(
+            less.is_of(other, less_itself=True) for j, other in enumerate(layers) if j != k
+        ):
+            found.append(k)
+    return found
+
+
+def _coarse(layer: RenderLayer) -> RenderLayer:
+    return replace(layer, image=layer.image[::COARSE, ::COARSE])
+
+
+def spoken_share(share: float) -> str:
+    """`0.4 %`, `25 %`."""
     return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

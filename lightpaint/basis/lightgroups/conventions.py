@@ -10,8 +10,8 @@ NAME = "{name}"
 #: The whole picture, in the words of most renderers; names compare without regard to case.
 BEAUTIES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
 
-#: A light group of this name is all of them.
-ALL = "all"
+#: What stands before a marker that no other word looks like: files are often named after a shot.
+PREFIX = r"(?:(?P<prefix>.+?)[ ._-])??"
 
 #: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
 BESIDE = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
@@ -24,8 +24,10 @@ JOINTS = " ._-"
 class Convention:
     """How one family of renderers names its light groups.
 
-    layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer.
+    layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer,
+    `prefix` what tells apart lights of one name.
     beauty: name of the picture that they add up to, before BEAUTIES are tried.
+    whole: name of the group that is all of them, where a renderer calls one so.
     beside: layers that add to it too, in some versions and settings (in lower case).
     light: what the light is called.
     """
@@ -33,6 +35,7 @@ class Convention:
     renderer: str
     layer: re.Pattern[str]
     beauty: str = ""
+    whole: str | None = None
     beside: tuple[str, ...] = ()
     light: str = NAME
 
@@ -45,16 +48,21 @@ CONVENTIONS = (
     ),
     Convention("Arnold", re.compile(r"RGBA_(?P<name>.+)"), "RGBA"),
     Convention("Karma", re.compile(r"C_(?P<name>.+)"), "C"),
-    Convention("RenderMan or Redshift", re.compile(r"(?:[Bb]eauty|Ci)_(?P<name>.+)"), "beauty"),
+    Convention(
+        "RenderMan or Redshift",
+        re.compile(r"(?:[Bb]eauty|Ci)_(?P<name>.+)"),
+        "beauty",
+        whole="all",  # Redshift's Beauty_all
+    ),
     Convention(
         "LuxCore",
-        re.compile(r"RADIANCE_GROUP_(?P<name>\d+)"),
+        re.compile(PREFIX + r"RADIANCE_GROUP_(?P<name>\d+)(?:[ ._-].*)?"),
         "RGBA",
         light="group_{name}",
     ),
     Convention(
         "V-Ray or Corona",
-        re.compile(r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
+        re.compile(PREFIX + r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
         "RGBA",
         beside=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
     ),

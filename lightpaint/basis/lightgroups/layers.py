@@ -4,7 +4,7 @@ A layer is three channels that share all but the last part of their names, `key.
 `key.B`; in a part of its own it may have plain `R`, `G`, `B` and the part its name.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.conventions import is_known
+from lightpaint.basis.lightgroups.folder import files_in
 from lightpaint.basis.lightgroups.naming import short_names
 from lightpaint.colour.primaries import are_same, converted, to_rec709
 from lightpaint.errors import BasisError, ImageError
@@ -56,15 +57,23 @@ class RenderLayer:
         return f"{self.file}{f' ({self.name})' if self.name else ''}"
 
 
-def read_layers(path: Path) -> list[RenderLayer]:
+def read_layers(
+    path: Path, *, leave_out: Iterable[str | Path] = ()
+) -> tuple[list[RenderLayer], list[str]]:
     """The RGB layers of the file or of the files in the folder at `path`, in their order.
 
     In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
-    names share. Raises ImageError for files that cannot be read, BasisError if there are none,
-    if they differ in size or if names repeat.
+    names share; `leave_out` and what else cannot be a light (folder.py) is passed by, which the
+    sentences that come along say. Raises ImageError for files that cannot be read, BasisError if
+    there are none, if they differ in size or if names repeat.
     """
     path = Path(path)
-    layers = _of_folder(path) if path.is_dir() else _of_file(path)
+    remarks: list[str] = []
+    if path.is_dir():
+        files, remarks = files_in(path, leave_out)
+        layers = _of_files(files)
+    else:
+        layers = _of_file(path)
     if not layers:
         raise BasisError(f"{path} has no RGB layers: give the multi-layer EXR, or a folder of them")
     first = layers[0]
@@ -85,13 +94,11 @@ def read_layers(path: Path) -> list[RenderLayer]:
             f"{path} has the layers {', '.join(name or 'R, G, B' for name in twice)} more than "
             "once: is it a sequence of frames, or several views? give one file of one view"
         )
-    return layers
+    return layers, remarks
 
 
-def _of_folder(folder: Path) -> list[RenderLayer]:
-    files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".exr" and f.is_file())
-    if not files:
-        raise BasisError(f"{folder} holds no .exr file: give the one with the light groups")
+def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
+    """Of the files of a folder; one alone may have any layers and no name of its own."""
     if len(files) == 1:
         return _of_file(files[0])
     read = {file: _of_file(file) for file in files}

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lightpaint.basis.lightgroups.conventions import (
-    ALL,
     BESIDE,
     CONVENTIONS,
     JOINTS,
@@ -19,18 +18,23 @@ from lightpaint.basis.lightgroups.conventions import (
 )
 from lightpaint.errors import BasisError
 
+#: Who has named files that no convention knows.
+FILES = "one file per light"
+
 
 @dataclass(frozen=True)
 class Choice:
     """Which layers are what.
 
     lights: name of the light → name of its layer. beside: the same, of layers that may or may
-    not be part of the sum. beauty: name of its layer; None if none is known by its name.
+    not be part of the sum. whole: the same, of the group whose name says that it is all of them,
+    which the sum shows. beauty: name of its layer; None if none is known by its name.
     """
 
     renderer: str
     lights: Mapping[str, str]
     beside: Mapping[str, str] = field(default_factory=dict)
+    whole: Mapping[str, str] = field(default_factory=dict)
     beauty: str | None = None
     view: str = ""
     remarks: tuple[str, ...] = ()
@@ -70,7 +74,7 @@ def choose_files(layers: Iterable[str]) -> Choice:
     """Of files with one layer each, that no convention knows: all but the beauty are lights."""
     names = list(layers)
     beauty = beauty_among(names)
-    return Choice("one file per light", {n: n for n in names if n != beauty}, beauty=beauty)
+    return Choice(FILES, {n: n for n in names if n != beauty}, beauty=beauty)
 
 
 def short_names(stems: Sequence[str]) -> dict[str, str]:
@@ -114,22 +118,35 @@ def _by_convention(
         )
     found = [m for m in found if (m.groupdict().get("view") or "") == view]
     _check_one_eye([m[0] for m in found], where)
-    # Redshift's name for the whole beauty among its light groups.
-    whole = next((m[0] for m in found if m["name"] == ALL), None) if len(found) > 1 else None
-    found = [m for m in found if m[0] != whole]
-    lights = _named([(convention.light.replace(NAME, m["name"]), m[0]) for m in found], where)
-    rest = [name for name in layers if name not in lights.values() and name != whole]
+    lights = _named(_light_names(convention, found), where)
+    # By its name alone: no other group can be left out of a single one.
+    whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
+    lights = {name: layer for name, layer in lights.items() if name not in whole}
+    rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
     beside = [name for name in rest if name.casefold() in convention.beside]
     first = convention.beauty.replace("{view}", f"{view}." if view else "")
-    beauty = beauty_among((name for name in rest if name not in beside), first=first)
     return Choice(
         convention.renderer,
         lights,
         {name: name for name in beside if name not in lights},
-        whole if beauty is None else beauty,
+        whole,
+        beauty_among((name for name in rest if name not in beside), first=first),
         view,
         tuple(remarks),
     )
+
+
+def _light_names(convention: Convention, found: list[re.Match[str]]) -> list[tuple[str, str]]:
+    """Name of the light and of its layer; with what stands before them where that differs."""
+    prefixes = [m.groupdict().get("prefix") or "" for m in found]
+    several = len(set(prefixes)) > 1
+    return [
+        (
+            f"{prefix}_" * bool(several and prefix) + convention.light.replace(NAME, m["name"]),
+            m[0],
+        )
+        for prefix, m in zip(prefixes, found, strict=True)
+    ]
 
 
 def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -> Choice:

@@ -5,7 +5,7 @@ lack of the beauty becomes one more light, `rest`, that stays as it is.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,26 +14,15 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, BasisLight, Origin, free_name
-from lightpaint.basis.file import FORMAT_KEY
-from lightpaint.basis.lightgroups.beauty import (
-    LayerSum,
-    beauty_among,
-    beauty_by_sum,
-    shares,
-    spoken_sum,
-)
-from lightpaint.basis.lightgroups.conventions import is_known
+from lightpaint.basis.lightgroups.beauty import NOTHING, shares, spoken_share, spoken_sum
 from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
-from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers
-from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.exr import read_headers
+from lightpaint.basis.lightgroups.naming import FILES
+from lightpaint.basis.lightgroups.roles import Roles, roles_of
+from lightpaint.errors import BasisError
 from lightpaint.screen import shortly
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
-
-#: Files that a folder of light groups may have: more are the frames of a film.
-MAX_FILES = 1000
 
 #: Name of what the groups lack of the beauty, with underscores added should a light have it.
 REST = "rest"
@@ -86,27 +75,17 @@ class LightGroups:
         return all(layer.is_half for layer in self.layers)
 
 
-def is_light_groups(path: Path) -> bool:
-    """Whether `path` is a folder with an EXR, or an EXR that is no basis of lightpaint's own."""
-    path = Path(path)
-    if path.is_dir():
-        return bool(_files(path))
-    if path.suffix.lower() != ".exr" or not path.is_file():
-        return False
-    try:
-        headers, _ = read_headers(path)
-    except ImageError:
-        return False
-    return not any(FORMAT_KEY in header for header in headers)
-
-
-def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightGroups:
+def read_light_groups(
+    path: str | Path, *, pattern: str | None = None, leave_out: Iterable[str | Path] = ()
+) -> LightGroups:
     """Read the light groups of an EXR file, or of a folder with a file for each.
 
     Args:
-        path: EXR file, or folder.
+        path: EXR file, or folder, of which hidden files, what lightpaint has made and paintings
+            that can be told are passed by; `remarks` names them.
         pattern: `Light_{name}`, which layers, parts or files are lights; by default the names that
             known renderers give them (naming.py).
+        leave_out: Files of the folder that are no lights, like the painting.
 
     Raises:
         ImageError: For a file that cannot be read or is not linear Rec.709.
@@ -118,72 +97,25 @@ def read_light_groups(path: str | Path, *, pattern: str | None = None) -> LightG
         ('Arnold', ('fill', 'key', 'rim'))
     """
     path = Path(path)
-    if path.is_dir() and len(files := _files(path)) > MAX_FILES:
-        raise BasisError(
-            f"{path} holds {len(files)} EXR files, more than {MAX_FILES}: is it a sequence of "
-            "frames? give a folder with the light groups of one"
-        )
-    layers = {layer.name: layer for layer in read_layers(path)}
-    choice = _choose(path, layers, pattern)
-    beauty = layers[choice.beauty] if choice.beauty is not None else None
-    names, lights = list(choice.lights), [layers[name] for name in choice.lights.values()]
-    used = {id(layer) for layer in lights}
-    others = [layer for layer in layers.values() if id(layer) not in used]
-    if beauty is None:
-        beauty = beauty_by_sum(others, lights)
-    if beauty is None and choice.renderer == "one file per light" and len(lights) > 2:
-        # One of them may be the picture under a name of its own.
-        beauty = beauty_among(lights)
-        kept = [(n, x) for n, x in zip(names, lights, strict=True) if x is not beauty]
-        names, lights = [n for n, _ in kept], [x for _, x in kept]
-    for name, layer in choice.beside.items():
-        here = layers[layer]
-        # Whether a renderer counts these among its groups depends on version and settings.
-        if beauty is None or not lights or _helps(here, lights, beauty):
-            names.append(name)
-            lights.append(here)
-    return _light_groups(path, choice, names, lights, beauty)
+    layers, told = read_layers(path, leave_out=leave_out)
+    return _light_groups(path, roles_of(path, layers, pattern), told)
 
 
-def _files(folder: Path) -> list[Path]:
-    """What may be EXR files in a folder. Raises BasisError if it cannot be looked into."""
-    try:
-        return [file for file in folder.iterdir() if file.suffix.lower() == ".exr"]
-    except OSError as error:
-        raise BasisError(f"cannot read {folder}: {error.strerror or error}") from None
-
-
-def _helps(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
-    """Whether the lights come closer to the beauty with that layer."""
-    added = LayerSum.of(lights)
-    return added.and_also(layer).lacks(beauty) < added.lacks(beauty)
-
-
-def _choose(path: Path, layers: dict[str, RenderLayer], pattern: str | None) -> Choice:
-    by_file: dict[Path, int] = {}
-    for layer in layers.values():
-        by_file[layer.file] = by_file.get(layer.file, 0) + 1
-    if pattern is None and len(by_file) == len(layers) > 1 and not any(map(is_known, layers)):
-        return choose_files(layers)
-    others = {name: layer.others for name, layer in layers.items()}
-    return choose_layers(others, pattern=pattern, where=str(path))
-
-
-def _light_groups(
-    path: Path,
-    choice: Choice,
-    names: list[str],
-    lights: list[RenderLayer],
-    beauty: RenderLayer | None,
-) -> LightGroups:
+def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
+    """told: sentences that come before those of the roles."""
+    names, lights, beauty = list(roles.lights), list(roles.lights.values()), roles.beauty
     if not lights:
         raise BasisError(f"{path} has no light group beside its beauty {beauty and beauty.name!r}")
     read = [*lights, beauty] if beauty is not None else lights
     holes = ~np.logical_and.reduce([np.isfinite(x.image).all(axis=-1) for x in read])
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
-    rest, missing, exceeding, told = _what_is_missing(lights, beauty, holes)
-    remarks = [f"light groups as of {choice.renderer}: {', '.join(names)}", *choice.remarks, told]
+    missing = _what_is_missing(roles, holes)
+    listed = f"light groups as of {roles.renderer}: {', '.join(names)}"
+    if beauty is not None:
+        listed += f"; the whole picture: {beauty.name or 'R, G, B'}"
+    remarks = [*told, listed, *roles.remarks, missing.told]
+    remarks += _spoken_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are of its channels in linear "
@@ -191,44 +123,68 @@ def _light_groups(
         )
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
-    basis = _basis(path, choice, dict(zip(names, lights, strict=True)), rest, holes)
+    basis = _basis(path, roles, missing.rest, holes)
     without_pixels = np.empty((0, 0, 3))
     layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
     return LightGroups(
         basis,
         path,
-        choice.renderer,
+        roles.renderer,
         tuple(layers),
         beauty,
-        missing,
-        exceeding,
+        missing.share,
+        missing.exceeding,
         holes,
         tuple(remarks),
     )
 
 
-def _what_is_missing(
-    lights: list[RenderLayer], beauty: RenderLayer | None, holes: npt.NDArray[np.bool_]
-) -> tuple[Floats | None, float | None, float | None, str]:
-    """What the groups lack of the beauty, if that is more than rounding; its shares, in words."""
+@dataclass(frozen=True)
+class _Missing:
+    """What the groups lack of the beauty.
+
+    rest: (h, w, 3), None if it is no more than rounding. share, exceeding: of the beauty, None
+    without one. told: that in words.
+    """
+
+    rest: Floats | None
+    share: float | None
+    exceeding: float | None
+    told: str
+
+
+def _what_is_missing(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
+    lights, beauty = list(roles.lights.values()), roles.beauty
     if beauty is None:
         told = "no beauty among the layers, so that nothing tells whether the groups are all of it"
-        return None, None, None, told
+        if roles.renderer == FILES:
+            told += ", and each of them a light"
+        return _Missing(None, None, None, told)
     whole = _filled(beauty.image, holes).astype(np.float64)
     rest = whole - sum(_filled(layer.image, holes).astype(np.float64) for layer in lights)
     missing, exceeding = shares(rest, whole)
-    told, is_missing = spoken_sum(rest, whole, [*lights, beauty], missing, exceeding)
-    return rest if is_missing else None, missing, exceeding, told
+    name = free_name(REST, roles.lights)
+    told, is_missing = spoken_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
+    return _Missing(rest if is_missing else None, missing, exceeding, told)
 
 
-def _basis(
-    path: Path,
-    choice: Choice,
-    lights: dict[str, RenderLayer],
-    rest: Floats | None,
-    holes: npt.NDArray[np.bool_],
-) -> Basis:
+def _spoken_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
+    """Says so where the file holds nothing of a light, and what may be its own."""
+    black = [name for name, layer in lights.items() if not layer.image.any()]
+    if not black:
+        return []
+    told = f"the file holds nothing of {', '.join(black)}: black in every pixel, so kept as it is"
+    if missing is None or missing <= NOTHING:
+        return [f"{told}; is the light off, or the group renamed?"]
+    return [
+        f"{told}; {spoken_share(missing)} of the light of the beauty is in no group: was the group "
+        "renamed after its lights were given it?"
+    ]
+
+
+def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.bool_]) -> Basis:
     """In linear Rec.709; `rest`, if there is one, as a light that stays as it is."""
+    lights = roles.lights
     made = [_light(name, layer.name, "light group") for name, layer in lights.items()]
     height, width = holes.shape
     images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
@@ -245,7 +201,7 @@ def _basis(
         images=images,
         half_differences=np.zeros_like(images),
         emitters_seen=np.zeros(holes.shape, dtype=bool),
-        origin=_origin(path, choice, images, [*lights]),
+        origin=_origin(path, roles, images, [*lights]),
     )
 
 
@@ -254,7 +210,7 @@ def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> Bas
     return BasisLight(name, plugin, "", AS_RENDERED, (1.0, 1.0, 1.0), form, is_fixed=is_fixed)
 
 
-def _origin(path: Path, choice: Choice, images: Floats, names: Sequence[str]) -> Origin:
+def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> Origin:
     """Of samples nothing is known: no half has any, and so there are no error bars."""
     digest = hashlib.sha256(repr((names, images.shape)).encode())
     for image in images:
@@ -262,9 +218,9 @@ def _origin(path: Path, choice: Choice, images: Floats, names: Sequence[str]) ->
     return Origin(
         scene=path.name,
         scene_identity=digest.hexdigest()[:32],
-        sensor=choice.view or "as rendered",
+        sensor=roles.view or "as rendered",
         seed=0,
-        method=f"light groups of {choice.renderer}",
+        method=f"light groups of {roles.renderer}",
         halves=(0, 0),
         passes=(0, 0),
     )

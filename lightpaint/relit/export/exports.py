@@ -14,10 +14,10 @@ from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
 from lightpaint.images.exr import Part, rgb_channels, write_parts
 from lightpaint.lighting.lighting import Lighting, LightSetting
-from lightpaint.relit.export.nuke import nuke_script
+from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 
 #: Everything that `write_exports` may write.
-EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", "relit.exr")
+EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", LAYERS, "relit.exr")
 
 #: Renderers whose answer a Blender script may take; a pattern may be of Blender as well.
 BLENDER = ("Blender", "pattern")
@@ -30,7 +30,8 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
     """Write `lighting`, solved from `groups`, into `folder` for other programs.
 
     lights.csv, a table of multipliers; set_lights.py for Blender's light groups, unless another
-    renderer made the file; relit.nk for Nuke; relit.exr, the sum with these multipliers.
+    renderer made the file; relit.nk for Nuke, with relit_layers.exr where Nuke could not tell the
+    layers of the file apart; relit.exr, the sum with these multipliers.
 
     Args:
         folder: Receives the files.
@@ -54,16 +55,22 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
     texts = {"lights.csv": lights_table(groups, lighting)}
     if groups.renderer.startswith(BLENDER):
         texts["set_lights.py"] = blender_script(groups, lighting)
-    texts["relit.nk"] = nuke_script(groups, lighting)
-    parts = [relit_part(groups, lighting)]
+    texts["relit.nk"] = nuke_script(groups, lighting, folder)
+    parts = {"relit.exr": relit_part(groups, lighting)}
+    if needs_copy(groups):
+        parts[LAYERS] = copied_part(groups)
     for name, text in texts.items():
         write_text(folder / name, text)
-    write_parts(folder / "relit.exr", parts)
-    return [folder / name for name in EXPORTS if name in texts or name == "relit.exr"]
+    for name, part in parts.items():
+        write_parts(folder / name, [part])
+    return [folder / name for name in EXPORTS if name in texts or name in parts]
 
 
 def lights_table(groups: LightGroups, lighting: Lighting) -> str:
-    """CSV: name, layer, multipliers, and what they do to the luminance of a white light."""
+    """CSV: name, layer, multipliers, and what they do to the luminance of a white light.
+
+    Stops are `off` at 0, and `unknown` of lights that reach nothing painted.
+    """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["light", "layer", "red", "green", "blue", "luminance", "stops", "kept"])
@@ -71,9 +78,12 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         light.name: layer.name
         for light, layer in zip(groups.basis.lights, groups.layers, strict=False)
     }
+    unreached = lighting.certificate.unreached if lighting.certificate is not None else ()
     for light in lighting.lights:
         y = float(luminance(np.array(light.weight)))
-        stops = f"{math.log2(y):+.3f}" if y > 0 else "off"
+        # Adding 0 takes the sign from what rounds to it.
+        stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
+        stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
         kept = "yes" if light.is_fixed else "no"
         table.writerow([light.name, layers.get(light.name, ""), *numbers, stops, kept])

@@ -1,59 +1,77 @@
 """A Nuke script that multiplies the layers of the rendered file and adds them up.
 
 A `.nk` file is Tcl: each node takes its inputs from a stack, the top one first, and leaves itself
-there. Names that come from elsewhere stand only where they can be quoted.
+there. Names that come from elsewhere are quoted for that parser. Some knobs are then evaluated
+once more: names of files and labels replace Tcl in brackets, and names of files also the number of
+the frame and the view. How those could be quoted is written nowhere, so nothing that they would
+replace is put into them.
 """
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.basis.basis import free_name
 from lightpaint.basis.lightgroups.layers import RenderLayer
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.primaries import to_rec709
+from lightpaint.files import one_line
+from lightpaint.images.exr import Part, rgb_channels
 from lightpaint.lighting.lighting import Lighting
 
 #: What needs a backslash in a quoted word of Tcl that itself stands in braces.
 SPECIAL = re.compile(r'[\\"\[\]${}]')
 
+#: What Nuke evaluates in the name of a file: Tcl, numbers of frames, views; what cannot be written.
+EVALUATED = re.compile(r"[\[\]$\\%#\x00-\x1f\x7f\ud800-\udfff]")
 
-def nuke_script(groups: LightGroups, lighting: Lighting) -> str:
-    """The text of relit.nk: Σ multiplier × layer, and the rest as it is."""
-    files = list(dict.fromkeys(x.file for x in _read(groups)))
+#: The layers under names that Nuke tells apart, beside the script.
+LAYERS = "relit_layers.exr"
+
+
+@dataclass(frozen=True)
+class _Source:
+    """Where Nuke finds a picture: which of the files, and what it calls the layer."""
+
+    file: Path
+    layer: str
+
+
+def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
+    """The text of relit.nk: Σ multiplier × layer, and the rest as it is.
+
+    folder: where it is to stand, beside what `copied_part` makes of layers that Nuke would mix up.
+    """
+    lights, beauty = _sources(groups, folder)
+    sources = [*lights, *([beauty] if beauty is not None else [])]
+    files = list(dict.fromkeys(x.file for x in sources))
     lines = ["version 12.0 v1"]
-    for name in dict.fromkeys(map(nuke_layer, _read(groups))):
+    for name in dict.fromkeys(x.layer for x in sources):
         if name != "rgba":
             lines.append(f"add_layer {{{name} {name}.red {name}.green {name}.blue {name}.alpha}}")
     lines += _node("StickyNote", inputs="0", name="lightpaint_note", label=quoted(_note(groups)))
     for k, file in enumerate(files):
-        path = Path(file).absolute().as_posix()
-        lines += _node("Read", inputs="0", file=quoted(path), raw="true", name=f"Read_{k}")
+        lines += [*_node("Read", inputs="0", **_file_knobs(file), raw="true", name=f"Read_{k}")]
         lines.append(f"set R{k} [stack 0]")
 
-    has_alpha = groups.beauty is not None and groups.beauty.alpha is not None
-    if has_alpha:
-        lines += _shuffle(groups.beauty, files, "Alpha")
     # Multipliers are of Rec.709; what comes out has the primaries of the file again.
     primaries = groups.layers[0].primaries
     matrix = None if primaries is None else to_rec709(primaries)
+    to_light = None if needs_copy(groups) else matrix
+    has_alpha = groups.beauty is not None and groups.beauty.alpha is not None
+    if has_alpha:
+        lines += _shuffle(beauty, files, "Alpha")
     if groups.has_rest:
-        lines += _rest(groups, files) + _matrix(matrix, "Rest_in_Rec709")
-    settings = {light.name: light for light in lighting.lights}
-    for k, (light, layer) in enumerate(zip(groups.basis.lights, groups.layers, strict=False)):
-        lines += _shuffle(layer, files, f"Layer_{k}") + _matrix(matrix, f"Layer_{k}_in_Rec709")
-        r, g, b = (f"{v:.9g}" for v in settings[light.name].weight)
-        lines += _node(
-            "Multiply",
-            channels="rgb",
-            value=f"{{{r} {g} {b} 1}}",
-            name=f"Light_{k}",
-            label=quoted(_plain(light.name)),
-        )
-        if k or groups.has_rest:
-            lines += _node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
+        lines += _rest(lights, beauty, files) + _matrix(to_light, "Rest_in_Rec709")
+    shuffled = [
+        _shuffle(x, files, f"Layer_{k}") + _matrix(to_light, f"Layer_{k}_in_Rec709")
+        for k, x in enumerate(lights)
+    ]
+    lines += _sum(groups, lighting, shuffled)
     lines += _matrix(None if matrix is None else np.linalg.inv(matrix), "As_in_the_file")
     if has_alpha:
         lines += _node(
@@ -62,16 +80,91 @@ def nuke_script(groups: LightGroups, lighting: Lighting) -> str:
     return "\n".join(lines) + "\n"
 
 
+def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
+    """Says so where relit.nk in `folder` cannot name a file that it reads."""
+    lights, beauty = _sources(groups, folder)
+    files = dict.fromkeys(x.file for x in [*lights, *([beauty] if beauty is not None else [])])
+    if not (bad := [file for file in files if _is_evaluated(file)]):
+        return []
+    # What the path holds may be on its way to a terminal.
+    which = one_line(str(bad[0])) + (f" and {len(bad) - 1} more" if len(bad) > 1 else "")
+    found = "".join(sorted({c for file in bad for c in EVALUATED.findall(_path(file))}))
+    return [
+        f"Nuke would evaluate {one_line(found)} in the path {which}: relit.nk leaves it out, to be "
+        "chosen by hand in its Read nodes; or rename it"
+    ]
+
+
+def needs_copy(groups: LightGroups) -> bool:
+    """Whether Nuke would read two layers of a file as one, or not as red, green and blue."""
+    layers = [*dict.fromkeys((x.file, x.part, x.channels) for x in _read(groups))]
+    called = {(x.file, nuke_layer(x)) for x in _read(groups)}
+    return len(called) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
+
+
+def copied_part(groups: LightGroups) -> Part:
+    """The layers in linear Rec.709 float32, under names that Nuke tells apart."""
+    channels: dict[str, Floats] = {}
+    *names, beauty = _copied_names(groups)
+    for name, image in zip(names, groups.basis.images, strict=False):
+        channels |= rgb_channels(image, name)
+    if groups.beauty is not None:
+        there = np.where(groups.holes[..., None], np.float32(0), groups.beauty.image)
+        channels |= rgb_channels(groups.beauty.in_rec709(there), beauty)
+        if groups.beauty.alpha is not None:
+            channels[f"{beauty}.A"] = groups.beauty.alpha.astype(np.float32)
+    return Part("layers", channels)
+
+
 def nuke_layer(layer: RenderLayer) -> str:
     """What Nuke calls a layer of an EXR file; of plain R, G, B in a file of one part, `rgba`.
 
-    It takes digits from the front of each piece between dots, makes everything that is no letter
-    or digit an underscore, and joins the pieces with underscores.
+    It takes digits from the front of each piece between dots, makes every byte that is no letter
+    or digit an underscore, and joins the pieces with underscores. Two names may become one.
     """
     prefix, _, _ = layer.channels[0].rpartition(".")
-    pieces = [piece.lstrip("0123456789") for piece in (prefix or layer.part).split(".")]
-    name = "_".join(re.sub(r"[^A-Za-z0-9]", "_", piece) for piece in pieces if piece)
+    name = _in_nuke(prefix or layer.part)
     return "rgba" if name in ("", "Ci") else name
+
+
+def _in_nuke(name: str) -> str:
+    pieces = [piece.lstrip("0123456789") for piece in name.split(".")]
+    told = "_".join(piece for piece in pieces if piece).encode("utf-8", "surrogateescape")
+    return re.sub(rb"[^A-Za-z0-9]", b"_", told).decode("ascii")
+
+
+def _copied_names(groups: LightGroups) -> list[str]:
+    """What the lights and the beauty are called in the copy, no two the same."""
+    names: list[str] = []
+    for light in (*(light.name for light in groups.basis.lights[: len(groups.layers)]), "beauty"):
+        names.append(free_name(_in_nuke(light) or "light", names))
+    return names
+
+
+def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source | None]:
+    """Of each light and of the beauty."""
+    if needs_copy(groups):
+        file = Path(folder) / LAYERS
+        *lights, beauty = (_Source(file, name) for name in _copied_names(groups))
+        return lights, beauty if groups.beauty is not None else None
+    found = [_Source(x.file, nuke_layer(x)) for x in groups.layers]
+    whole = groups.beauty
+    return found, None if whole is None else _Source(whole.file, nuke_layer(whole))
+
+
+def _file_knobs(file: Path) -> dict[str, str]:
+    """The file, or where Nuke would make something else of its name, a request to choose it."""
+    if not _is_evaluated(file):
+        return {"file": quoted(_path(file))}
+    return {"file": '""', "label": quoted(f"choose by hand: {_plain(file.name)}")}
+
+
+def _is_evaluated(file: Path) -> bool:
+    return bool(EVALUATED.search(_path(file)))
+
+
+def _path(file: Path) -> str:
+    return file.absolute().as_posix()
 
 
 def quoted(text: str) -> str:
@@ -84,11 +177,30 @@ def _read(groups: LightGroups) -> list[RenderLayer]:
     return [*groups.layers, *([groups.beauty] if groups.beauty is not None else [])]
 
 
-def _rest(groups: LightGroups, files: Sequence[Path]) -> list[str]:
+def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]]) -> list[str]:
+    """Each light, as `shuffled` leaves it, multiplied and added to what is there."""
+    lines: list[str] = []
+    settings, labels = {light.name: light for light in lighting.lights}, list[str]()
+    for k, (light, nodes) in enumerate(zip(groups.basis.lights, shuffled, strict=False)):
+        r, g, b = (f"{v:.9g}" for v in settings[light.name].weight)
+        labels.append(free_name(_plain(light.name), labels))
+        lines += nodes + _node(
+            "Multiply",
+            channels="rgb",
+            value=f"{{{r} {g} {b} 1}}",
+            name=f"Light_{k}",
+            label=quoted(labels[-1]),
+        )
+        if k or groups.has_rest:
+            lines += _node("Merge2", inputs="2", operation="plus", name=f"Sum_{k}")
+    return lines
+
+
+def _rest(lights: Sequence[_Source], beauty: _Source | None, files: Sequence[Path]) -> list[str]:
     """The beauty less all groups."""
-    lines = _shuffle(groups.beauty, files, "Beauty")
-    for k, layer in enumerate(groups.layers):
-        lines += _shuffle(layer, files, f"Without_{k}")
+    lines = _shuffle(beauty, files, "Beauty")
+    for k, light in enumerate(lights):
+        lines += _shuffle(light, files, f"Without_{k}")
         lines += _node("Merge2", inputs="2", operation="minus", name=f"Rest_{k}")
     return lines
 
@@ -100,10 +212,10 @@ def _matrix(matrix: Floats | None, name: str) -> list[str]:
     return _node("ColorMatrix", matrix=f"{{{rows}}}", name=name)
 
 
-def _shuffle(layer: RenderLayer | None, files: Sequence[Path], name: str) -> list[str]:
-    assert layer is not None
-    read = f"push $R{files.index(layer.file)}"
-    return [read, *_node("Shuffle", **{"in": nuke_layer(layer)}, name=name)]
+def _shuffle(source: _Source | None, files: Sequence[Path], name: str) -> list[str]:
+    assert source is not None
+    read = f"push $R{files.index(source.file)}"
+    return [read, *_node("Shuffle", **{"in": source.layer}, name=name)]
 
 
 def _node(kind: str, **knobs: str) -> list[str]:

@@ -104,12 +104,48 @@ def test_of_several_eyes_one_must_be_named():
     assert list(_choose("C", "C_lamp.1", "C_lamp.2", "C_key").lights) == ["lamp.1", "lamp.2", "key"]
 
 
-def test_the_group_of_all_lights_is_none_of_them():
-    found = _choose("Beauty_all", "Beauty_key", "Beauty_other")
-    assert (list(found.lights), found.beauty) == (["key", "other"], "Beauty_all")
+def test_only_where_a_renderer_calls_the_sum_so_a_group_may_be_all_of_them():
     found = _choose("Beauty", "Beauty_all", "Beauty_key")
-    assert (list(found.lights), found.beauty) == (["key"], "Beauty")
+    assert (list(found.lights), found.whole, found.beauty) == (
+        ["key"],
+        {"all": "Beauty_all"},
+        "Beauty",
+    )
     assert list(_choose("Beauty", "Beauty_all").lights) == ["all"]
+
+
+@pytest.mark.parametrize(
+    ("layer", "beauty"),
+    [
+        ("ViewLayer.Combined_{}", "ViewLayer.Combined"),
+        ("RGBA_{}", "RGBA"),
+        ("C_{}", "C"),
+        ("LightSelect_{}", ""),
+    ],
+)
+def test_elsewhere_a_light_may_be_called_all(layer: str, beauty: str):
+    found = _choose(beauty, layer.format("all"), layer.format("key"))
+    assert (list(found.lights), found.whole, found.beauty) == (["all", "key"], {}, beauty)
+
+
+@pytest.mark.parametrize(
+    ("names", "lights"),
+    [
+        (["on_RADIANCE_GROUP_0", "on_RADIANCE_GROUP_1"], ["group_0", "group_1"]),
+        (["on.RADIANCE_GROUP_0"], ["group_0"]),
+        (["my shot RADIANCE_GROUP_3_v2", "my shot RADIANCE_GROUP_4_v2"], ["group_3", "group_4"]),
+        (["on_RADIANCE_GROUP_0", "off_RADIANCE_GROUP_0"], ["on_group_0", "off_group_0"]),
+        (["RADIANCE_GROUP_0", "off_RADIANCE_GROUP_0"], ["group_0", "off_group_0"]),
+        (["s01_LightSelect_key", "s01_VRayLightSelect_fill"], ["key", "fill"]),
+        (["a.LightSelect_key", "b.LightSelect_key"], ["a_key", "b_key"]),
+        (["LightSelect_x_LightSelect_y"], ["x_LightSelect_y"]),
+    ],
+)
+def test_what_stands_before_a_marker_is_left_out_unless_it_tells_lights_apart(
+    names: list[str], lights: list[str]
+):
+    assert list(_choose(*names).lights) == lights
+    assert list(_choose(*names).lights.values()) == names
 
 
 def test_a_pattern_finds_what_no_convention_does():

@@ -10,7 +10,8 @@ import pytest
 from light_groups import SIZE, channels, interleaved, multi_part, pictures, write
 
 from lightpaint.basis.file import read_basis, write_basis
-from lightpaint.basis.lightgroups.read import LightGroups, is_light_groups, read_light_groups
+from lightpaint.basis.lightgroups.folder import is_light_groups
+from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
@@ -146,6 +147,51 @@ def test_a_light_called_rest_keeps_its_name(tmp_path: Path):
     assert groups.basis.names == ("rest", "rest_")
 
 
+def test_messages_call_the_rest_by_its_name(tmp_path: Path):
+    image = pictures()[0]
+    groups = read_light_groups(
+        interleaved(tmp_path / "a.exr", {"RGBA_rest": image, "RGBA": 2 * image})
+    )
+    assert any("kept as it is, as the light rest_" in x for x in groups.remarks)
+    layers = {"RGBA_rest": 2 * image, "RGBA": image}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    assert any("which the light rest_ takes away" in x for x in groups.remarks)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.6])
+def test_whether_beauty_all_is_a_light_the_sum_tells(tmp_path: Path, share: float):
+    """Redshift's is the sum. share: of the light of the picture that is in no group."""
+    a, b = pictures(2)
+    lights = {"Beauty_a": a, "Beauty_b": b}
+    whole = (a + b) / (1 - share)
+    layers = {"Beauty": whole, **lights, "Beauty_all": whole}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    assert [light.name for light in groups.basis.lights if not light.is_fixed] == ["a", "b"]
+    assert any("Beauty_all: taken for the sum" in x for x in groups.remarks)
+    # A light that is called so.
+    c = pictures(3)[2]
+    layers = {"Beauty": a + b + c, **lights, "Beauty_all": c}
+    groups = read_light_groups(interleaved(tmp_path / "b.exr", layers))
+    assert sorted(groups.basis.names) == ["a", "all", "b"]
+    # Without another picture it is the picture.
+    groups = read_light_groups(interleaved(tmp_path / "c.exr", lights | {"Beauty_all": a + b}))
+    assert groups.basis.names == ("a", "b")
+    assert groups.beauty is not None
+    assert groups.beauty.name == "Beauty_all"
+
+
+def test_a_group_without_a_pixel_is_told_and_what_the_beauty_lacks(tmp_path: Path):
+    images = np.ones((3, *SIZE, 3), np.float32)
+    layers = _layers(images) | {"ViewLayer.Combined_a": 0 * images[0]}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    [told] = [x for x in groups.remarks if "holds nothing of a:" in x]
+    assert "33 % of the light of the beauty is in no group" in told
+    layers["ViewLayer.Combined"] = 2 * images[0]
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    [told] = [x for x in groups.remarks if "holds nothing of a:" in x]
+    assert "is the light off" in told
+
+
 @pytest.mark.parametrize("names", [("r", "g", "b"), ("red", "green", "blue")])
 def test_channels_in_other_words(tmp_path: Path, names: tuple[str, ...]):
     images = pictures()
@@ -166,6 +212,7 @@ def test_parts_with_plain_channels_have_their_names(tmp_path: Path):
     ("files", "lights"),
     [
         (["RADIANCE_GROUP_0", "RADIANCE_GROUP_1", "RGB"], ["group_0", "group_1"]),
+        (["on_RADIANCE_GROUP_0", "on_RADIANCE_GROUP_1", "on_RGB"], ["group_0", "group_1"]),
         (["shot_key_v2", "shot_fill_v2", "shot_beauty_v2"], ["fill", "key"]),
         (["s.LightSelect_a", "s.LightSelect_b", "s.RGB_color"], ["a", "b"]),
         (["whatever", "key", "fill"], ["fill", "key"]),  # the last by its sum

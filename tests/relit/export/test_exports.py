@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -23,7 +24,13 @@ from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.export.exports import EXPORTS, blender_script, lights_table, write_exports
-from lightpaint.relit.export.nuke import nuke_layer, nuke_script
+from lightpaint.relit.export.nuke import (
+    LAYERS,
+    copied_part,
+    nuke_layer,
+    nuke_script,
+    spoken_unreadable,
+)
 
 #: Names that break careless quoting, in the order of an EXR's channels.
 NASTY = sorted(['Key "Area"', "it's", "a\\n$HOME [exit] {", '"""', "grün, }"])
@@ -69,7 +76,7 @@ def test_relit_is_the_sum(tmp_path: Path, lacks: float):
     groups = _groups(tmp_path, lacks=lacks)
     lighting = _lighting(groups)
     files = write_exports(tmp_path / "out", groups, lighting)
-    assert [file.name for file in files] == list(EXPORTS)
+    assert [file.name for file in files] == [name for name in EXPORTS if name != LAYERS]
     assert all(file.is_file() for file in files)
     [part] = OpenEXR.File(str(tmp_path / "out" / "relit.exr")).parts
     pixels = part.channels["RGBA"].pixels
@@ -98,6 +105,22 @@ def test_the_table_has_every_light(tmp_path: Path):
     assert [row["kept"] for row in rows] == ["no"] * 5 + ["yes"]
 
 
+def test_what_nothing_tells_of_is_unknown(tmp_path: Path):
+    """Neither off nor as it was: a group without a pixel, and one that is painted off."""
+    images = pictures(3)
+    layers = {"RGBA": images[:2].sum(axis=0), "RGBA_none": 0 * images[2]}
+    layers |= {"RGBA_key": images[0], "RGBA_fill": images[1]}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    target = lp.Target.of((2 * images[0]).astype(np.float32))
+    lighting = lp.solve(groups.basis, target).lighting
+    rows = list(csv.DictReader(io.StringIO(lights_table(groups, lighting))))
+    assert {row["light"]: row["stops"] for row in rows} == {
+        "key": "+1.000",
+        "fill": "off",
+        "none": "unknown",
+    }
+
+
 def test_the_blender_script_holds_the_multipliers(tmp_path: Path):
     groups = _groups(tmp_path, lacks=1)
     script = blender_script(groups, replace(_lighting(groups), target='x"""; raise\\'))
@@ -118,6 +141,42 @@ def test_only_what_may_be_of_blender_gets_its_script(tmp_path: Path):
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
     files = [file.name for file in write_exports(tmp_path, groups, _lighting(groups))]
     assert files == ["lights.csv", "relit.nk", "relit.exr"]
+
+
+def evaluated(text: str, run: Any = None) -> str:
+    """What Nuke makes of the name of a file: Tcl's substitutions, frame 1, and the view `main`.
+
+    run: the commands in brackets go there; nobody else runs them.
+    """
+
+    def one(found: Any) -> str:
+        said = found[0]
+        if said[0] == "[":
+            return str(run(said[1:-1])) if run else ""
+        return said[1] if said[0] == "\\" else ""
+
+    text = re.sub(r"\[.*?\]|\$\w+|\$\{.*?\}|\\.", one, text, flags=re.DOTALL)
+    text = re.sub(r"#+|%\d*d", lambda found: "1", text)
+    return text.replace("%V", "main").replace("%v", "m")
+
+
+def knobs_in(script: str) -> list[dict[str, str]]:
+    """The knobs of each node, as Tcl's parser takes them: braces, then words in quotes."""
+    nodes = []
+    for body in re.findall(r"^\w+ \{\n((?: .*\n)*)\}$", script, flags=re.MULTILINE):
+        braces = re.sub(r"\\.", "", body)
+        depth = np.cumsum([{"{": 1, "}": -1}.get(c, 0) for c in braces])
+        assert depth.min() >= 0  # or the body would end there
+        assert depth[-1] == 0
+        knobs = dict(line[1:].split(" ", 1) for line in body.splitlines())
+        for name, value in knobs.items():
+            if value.startswith('"'):
+                assert re.fullmatch(r'"(?:[^"\\]|\\.)*"', value)
+                knobs[name] = re.sub(
+                    r"\\(.)", lambda x: {"n": "\n", "r": "\r"}.get(x[1], x[1]), value[1:-1]
+                )
+        nodes.append(knobs)
+    return nodes
 
 
 class Nuke:
@@ -164,6 +223,7 @@ class Nuke:
 
     def _read(self, knobs: Any) -> Any:
         assert knobs["raw"] == "true"
+        assert evaluated(knobs["file"]) == knobs["file"]
         self.read.append(knobs["file"])
         layers = {}
         parts = OpenEXR.File(knobs["file"], separate_channels=True).parts
@@ -171,7 +231,8 @@ class Nuke:
             for name, channel in part.channels.items():
                 prefix, _, last = name.rpartition(".")
                 layer = prefix or (part.name() if len(parts) > 1 else "")
-                layer = "".join(c if c.isascii() and c.isalnum() else "_" for c in layer) or "rgba"
+                layer = re.sub(rb"[^A-Za-z0-9]", b"_", layer.encode()).decode() or "rgba"
+                # Of two that become one, one is read.
                 layers.setdefault(layer, {})[last] = channel.pixels.astype(np.float64)
         return layers
 
@@ -200,11 +261,11 @@ class Nuke:
 @pytest.mark.parametrize("lacks", [0.0, 0.5])
 @pytest.mark.parametrize("alpha", [True, False])
 def test_the_nuke_script_comes_to_the_same(tmp_path: Path, lacks: float, alpha: bool):
-    folder = tmp_path / 'in "$a [b] {c'  # unbalanced, too
+    folder = tmp_path / 'in "a {c'  # unbalanced, too
     groups = _groups(folder, lacks=lacks, alpha=alpha)
     lighting = _lighting(groups)
     nuke = Nuke()
-    result = nuke.run(nuke_script(groups, lighting))
+    result = nuke.run(nuke_script(groups, lighting, tmp_path))
     assert nuke.read == [str(groups.path)]
     np.testing.assert_allclose(result[..., :3], _sum(groups, lighting), rtol=FLOAT32, atol=FLOAT32)
     if alpha:
@@ -212,13 +273,78 @@ def test_the_nuke_script_comes_to_the_same(tmp_path: Path, lacks: float, alpha: 
         np.testing.assert_array_equal(result[..., 3], groups.beauty.alpha)
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["[exec touch owned]", "$env(HOME)", "a\\nb", "take #2", "100%d", "%V", "a\nb\rc", "a\tb"],
+)
+@pytest.mark.parametrize("is_file", [True, False])
+def test_nuke_evaluates_nothing_of_a_path(tmp_path: Path, name: str, is_file: bool):
+    folder = tmp_path / ("plain" if is_file else name)
+    groups = _groups(folder)
+    if is_file:
+        groups = read_light_groups(groups.path.rename(folder / f"{name}.exr"))
+    ran: list[str] = []
+    nodes = knobs_in(nuke_script(groups, _lighting(groups), tmp_path))
+    for knob in [node[k] for node in nodes for k in ("file", "label") if k in node]:
+        assert evaluated(knob, ran.append) == knob
+    assert ran == []
+    assert [node["file"] for node in nodes if "file" in node] == [""]
+    [told] = spoken_unreadable(groups, tmp_path)
+    assert "relit.nk leaves it out" in told
+    assert told.isprintable()
+
+
+def test_a_path_that_nuke_takes_as_it_is_is_named(tmp_path: Path):
+    folder = tmp_path / 'it\'s "a" {b ~ grün'
+    groups = _groups(folder)
+    nodes = knobs_in(nuke_script(groups, _lighting(groups), tmp_path))
+    assert [node["file"] for node in nodes if "file" in node] == [str(groups.path)]
+    assert spoken_unreadable(groups, tmp_path) == []
+
+
+ALIKE = ["key 1", "key-1", "key/1", "key_1", "1key 1"]
+
+
+@pytest.mark.parametrize("lacks", [0.0, 0.5])
+def test_layers_that_nuke_would_read_as_one_are_copied(tmp_path: Path, lacks: float):
+    groups = _groups(tmp_path, names=ALIKE, lacks=lacks)
+    lighting = _lighting(groups)
+    files = write_exports(tmp_path / "out", groups, lighting)
+    assert LAYERS in [file.name for file in files]
+    script = (tmp_path / "out" / "relit.nk").read_text()
+    assert script == nuke_script(groups, lighting, tmp_path / "out")
+    nodes = knobs_in(script)
+    shuffles = [node["in"] for node in nodes if node.get("name", "").startswith("Layer_")]
+    assert len(set(shuffles)) == len(ALIKE)
+    labels = [node["label"] for node in nodes if node.get("name", "").startswith("Light_")]
+    assert len(set(labels)) == len(ALIKE)
+    result = Nuke().run(script)
+    np.testing.assert_allclose(result[..., :3], _sum(groups, lighting), rtol=FLOAT32, atol=FLOAT32)
+    assert groups.beauty is not None
+    np.testing.assert_array_equal(result[..., 3], groups.beauty.alpha)
+    # The other forms have the names as they are.
+    rows = list(csv.DictReader(io.StringIO(lights_table(groups, lighting))))
+    assert [row["light"] for row in rows][:5] == sorted(ALIKE)
+    assert repr("key 1") in (tmp_path / "out" / "set_lights.py").read_text()
+
+
+def test_a_name_with_more_dots_than_nuke_parts_is_copied(tmp_path: Path):
+    layers = {f"C_{name}": x for name, x in zip(["a.b.c", "a.b.d"], pictures(2), strict=True)}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    assert sorted(copied_part(groups).channels) == [
+        f"a_b_{name}.{c}" for name in "cd" for c in "BGR"
+    ]
+
+
 ACESCG = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
 
 
-def test_the_nuke_script_keeps_the_primaries_of_the_file(tmp_path: Path):
-    groups = _groups(tmp_path, lacks=0.5, header={"chromaticities": ACESCG})
+@pytest.mark.parametrize("names", [NASTY, ALIKE])
+def test_the_nuke_script_keeps_the_primaries_of_the_file(tmp_path: Path, names: list[str]):
+    groups = _groups(tmp_path, lacks=0.5, names=names, header={"chromaticities": ACESCG})
     lighting = _lighting(groups)
-    result = Nuke().run(nuke_script(groups, lighting))
+    write_exports(tmp_path, groups, lighting)
+    result = Nuke().run(nuke_script(groups, lighting, tmp_path))
     expected = _sum(groups, lighting) @ np.linalg.inv(to_rec709(ACESCG)).T
     np.testing.assert_allclose(result[..., :3], expected, rtol=FLOAT32, atol=FLOAT32)
 
@@ -232,7 +358,7 @@ def test_the_nuke_script_reads_a_folder(tmp_path: Path):
     assert groups.has_rest
     lighting = _lighting(groups)
     nuke = Nuke()
-    result = nuke.run(nuke_script(groups, lighting))
+    result = nuke.run(nuke_script(groups, lighting, tmp_path))
     assert len(nuke.read) == 3
     np.testing.assert_allclose(result[..., :3], _sum(groups, lighting), rtol=FLOAT32, atol=FLOAT32)
 
@@ -241,7 +367,7 @@ def test_the_nuke_script_reads_a_folder(tmp_path: Path):
     ("layer", "is_part", "called"),
     [
         ("ViewLayer.Combined_Key Area", False, "ViewLayer_Combined_Key_Area"),
-        ("2shot.3Combined_é", False, "shot_Combined__"),
+        ("2shot.3Combined_é", False, "shot_Combined___"),
         ("Ci", False, "rgba"),
         ("", False, "rgba"),
         ("LightSelect_a", True, "LightSelect_a"),

@@ -1,0 +1,125 @@
+"""Which files of a folder may hold light groups: not hidden ones, not paintings, not results.
+
+A painting and what lightpaint has made often lie beside a render. Either would be one more light,
+and one that meets the painting best. A file is left out only for what is certain, and never
+without a word.
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from lightpaint.basis.file import FORMAT_KEY
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.estimate import HALF_DIFFERENCE
+from lightpaint.images.exr import OWN, read_channels, read_headers
+from lightpaint.images.exr_layers import KRITA_LAYERS
+from lightpaint.images.kinds import head_of, kind_of
+
+#: Files that a folder of light groups may have: more are the frames of a film.
+MAX_FILES = 1000
+
+#: Files that are named in a sentence.
+MOST_NAMED = 10
+
+
+def is_light_groups(path: Path) -> bool:
+    """Whether `path` is a folder with an EXR, or an EXR that is no basis of lightpaint's own."""
+    path = Path(path)
+    if path.is_dir():
+        return bool(_named_exr(_visible(path)))
+    try:
+        return is_exr(path) and not is_own_basis(path)
+    except ImageError:
+        return False
+
+
+def is_exr(path: Path) -> bool:
+    """Whether `path` is an OpenEXR file by how it begins, whatever its name. May raise ImageError.
+
+    What is no file is none.
+    """
+    return path.is_file() and kind_of(head_of(path, 16)) == "exr"
+
+
+def is_own_basis(path: Path) -> bool:
+    """Whether an EXR is a basis of lightpaint's own. Raises ImageError if it cannot be read."""
+    return any(FORMAT_KEY in header for header in read_headers(path)[0])
+
+
+def files_in(folder: Path, leave_out: Iterable[str | Path] = ()) -> tuple[list[Path], list[str]]:
+    """The files of a folder that may hold light groups, by name, and a sentence on the others.
+
+    leave_out: files that are none, like the painting. Raises BasisError if none is left, if there
+    are too many, and if the folder cannot be looked into.
+    """
+    visible = _visible(folder)
+    files = _named_exr(visible)
+    if len(files) > MAX_FILES:
+        raise BasisError(
+            f"{folder} holds {len(files)} EXR files, more than {MAX_FILES}: is it a sequence of "
+            "frames? give a folder with the light groups of one"
+        )
+    others = [Path(file) for file in leave_out]
+    why = {file: _why_no_light(file, others) for file in files}
+    left = [file for file in files if not why[file]]
+    why |= {file: "not named .exr" for file in visible if file not in why and _is_readable(file)}
+    told = _spoken({file: reason for file, reason in why.items() if reason})
+    if not left:
+        none = f"{folder} holds no .exr file" if not told else f"{folder} holds no light: {told}"
+        raise BasisError(f"{none}; give the EXR with the light groups, or a folder of them")
+    return left, [f"left out of the lights: {told}"] if told else []
+
+
+def _visible(folder: Path) -> list[Path]:
+    """Files that somebody has put there: systems keep notes of their own in hidden ones."""
+    try:
+        return sorted(f for f in folder.iterdir() if not f.name.startswith(".") and f.is_file())
+    except OSError as error:
+        raise BasisError(f"cannot read {folder}: {error.strerror or error}") from None
+
+
+def _named_exr(files: Iterable[Path]) -> list[Path]:
+    return [file for file in files if file.suffix.lower() == ".exr"]
+
+
+def _is_readable(file: Path) -> bool:
+    """Whether a file of another name is an EXR."""
+    try:
+        return is_exr(file)
+    except ImageError:
+        return False
+
+
+def _why_no_light(file: Path, others: Sequence[Path]) -> str:
+    """Why a file is no render of a light, in few words; "" where nothing says so."""
+    if any(_is_same(file, other) for other in others):
+        return "painting or mask"
+    try:
+        headers, _ = read_headers(file)
+        channels = read_channels(file)
+    except ImageError:
+        return ""  # It is refused when it is read, with what is wrong.
+    if any(key.startswith(OWN) for header in headers for key in header):
+        return "made by lightpaint"
+    if any(name.startswith(f"{HALF_DIFFERENCE}.") for name in channels):
+        return "made by lightpaint"
+    if any(KRITA_LAYERS in header for header in headers):
+        return "painted in Krita"
+    return "a painting, with weights W" if "W" in channels else ""
+
+
+def _is_same(file: Path, other: Path) -> bool:
+    try:
+        return file.samefile(other)
+    except OSError:
+        return False
+
+
+def _spoken(why: dict[Path, str]) -> str:
+    """`a.exr, b.exr (made by lightpaint); c.exr (painting or mask)`"""
+    told = []
+    for reason in dict.fromkeys(why.values()):
+        names = [file.name for file, its in why.items() if its == reason]
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        told.append(f"{', '.join(names[:MOST_NAMED])}{more} ({reason})")
+    return "; ".join(told)

@@ -1,0 +1,111 @@
+"""What each layer is: a light, the whole picture, or neither. Names propose, the sum decides."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpaint.basis.lightgroups.beauty import (
+    LayerSum,
+    beauty_among,
+    beauty_by_sum,
+    stranger_among,
+)
+from lightpaint.basis.lightgroups.conventions import is_known
+from lightpaint.basis.lightgroups.layers import RenderLayer
+from lightpaint.basis.lightgroups.naming import FILES, Choice, choose_files, choose_layers
+
+
+@dataclass(frozen=True)
+class Roles:
+    """The lights by name, and the picture that they add up to; None if there is none.
+
+    renderer: whose names these are. view: the view layer, if there are such.
+    """
+
+    renderer: str
+    view: str
+    lights: Mapping[str, RenderLayer]
+    beauty: RenderLayer | None
+    remarks: tuple[str, ...]
+
+
+def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Roles:
+    """Tell the layers of the file or folder at `path` apart. Raises BasisError where names do not.
+
+    pattern: as of `choose_layers`.
+    """
+    layers = {layer.name: layer for layer in read}
+    choice = _choose(path, layers, pattern)
+    lights = {name: layers[layer] for name, layer in choice.lights.items()}
+    beauty = layers[choice.beauty] if choice.beauty is not None else None
+    if beauty is None:
+        used = {id(layer) for layer in lights.values()}
+        others = [layer for layer in layers.values() if id(layer) not in used]
+        beauty = beauty_by_sum(others, list(lights.values()))
+    remarks = list(choice.remarks)
+    if choice.renderer == FILES:
+        beauty, told = _parted(lights, beauty)
+        remarks += told
+    for name, layer in choice.whole.items():
+        if beauty is None or beauty is layers[layer]:
+            beauty = layers[layer]
+        elif _is_light(layers[layer], list(lights.values()), beauty):
+            lights[name] = layers[layer]
+        else:
+            remarks.append(f"{layer}: taken for the sum of all lights, and left out")
+    in_order = {n: x for layer in read for n, x in lights.items() if x is layer}
+    for name, layer in choice.beside.items():
+        # Whether a renderer counts these among its groups depends on version and settings.
+        if beauty is None or _helps(layers[layer], list(in_order.values()), beauty):
+            in_order[name] = layers[layer]
+    return Roles(choice.renderer, choice.view, in_order, beauty, tuple(remarks))
+
+
+def _parted(
+    lights: dict[str, RenderLayer], beauty: RenderLayer | None
+) -> tuple[RenderLayer | None, list[str]]:
+    """Takes out of `lights`, files of any name, what is none; the picture, and what is to be said.
+
+    One may be the picture under a name of its own; and one that the others have no need of to add
+    up to it is no light, whatever it shows.
+    """
+    if beauty is None and len(lights) > 2:
+        beauty = beauty_among(list(lights.values()))
+        _drop(lights, beauty)
+    found = stranger_among(list(lights.values()), beauty)
+    if found is None:
+        return beauty, []
+    stranger, whole = found
+    _drop(lights, stranger)
+    _drop(lights, whole)
+    told = f"without it the others add up to {whole.file.name}"
+    return whole, [f"left out of the lights: {stranger.file.name} ({told})"]
+
+
+def _drop(lights: dict[str, RenderLayer], layer: RenderLayer | None) -> None:
+    for name in [name for name, its in lights.items() if its is layer]:
+        del lights[name]
+
+
+def _is_light(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
+    """Whether a layer whose name says that it is all lights is one of them after all."""
+    alone = LayerSum.of([layer])
+    return LayerSum.of(lights).and_also(layer).lacks(beauty) < alone.lacks(beauty)
+
+
+def _helps(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
+    """Whether the lights, if there are any, come closer to the beauty with that layer."""
+    if not lights:
+        return True
+    added = LayerSum.of(lights)
+    return added.and_also(layer).lacks(beauty) < added.lacks(beauty)
+
+
+def _choose(path: Path, layers: dict[str, RenderLayer], pattern: str | None) -> Choice:
+    by_file: dict[Path, int] = {}
+    for layer in layers.values():
+        by_file[layer.file] = by_file.get(layer.file, 0) + 1
+    if pattern is None and len(by_file) == len(layers) > 1 and not any(map(is_known, layers)):
+        return choose_files(layers)
+    others = {name: layer.others for name, layer in layers.items()}
+    return choose_layers(others, pattern=pattern, where=str(path))
