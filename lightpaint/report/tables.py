@@ -14,6 +14,7 @@ from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, row
+from lightpaint.report.sentences import partly_reached
 from lightpaint.report.verdict import (
     codes_missed,
     linear_residual,
@@ -91,6 +92,8 @@ def render_table(
             told.append(("Kept as they are", ", ".join(light.members)))
     if q.unreached:
         told.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
+    for channels in partly_reached(solution.lighting):
+        told.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
         told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
     return facts(told)
