@@ -180,4 +180,6 @@ def _finished(
         suggestions=suggestions,
     )
     write_report(look, view.folder, command=settings.command)
+    for remark in look.remarks:
+        listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look

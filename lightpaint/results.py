@@ -22,6 +22,7 @@ from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
+from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
@@ -98,6 +99,11 @@ class Look:
     def diagnosis(self) -> Diagnosis:
         """Why the painting is not met."""
         return self.analysis.diagnosis
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a person should know of emitters in view: painted pixels that do not count."""
+        return emitters_in_view(self.target, self.solution, self.predicted)
 
     @property
     def lighting(self) -> Lighting:

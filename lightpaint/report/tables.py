@@ -11,6 +11,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.painting import left_out
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, row
@@ -78,13 +79,14 @@ def render_table(
     height, width = basis.size
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
+    out = int(left_out(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
     adjusted = int((~basis.is_fixed).sum())
     told = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),
-        ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
+        ("Emitters seen directly", f"in {seen} pixels{_seen_note(out)}"),
     ]
     told += _fitted(solution, predicted)
     for light in basis.lights:
@@ -162,5 +164,5 @@ def _lights_off(solution: Solution) -> int:
     return sum(not any(light.emission) for light in solution.lighting.lights)
 
 
-def _seen_note(target: Target, seen: int) -> str:
-    return ", which do not count" if seen and target.everything else ""
+def _seen_note(out: int) -> str:
+    return f", of which {out} were painted and do not count" if out else ""
