@@ -144,7 +144,7 @@ def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -
     write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
 
 
-def write_report(look: Look, folder: Path, *, command: str) -> None:
+def write_report(folder: Path, look: Look, *, command: str) -> None:
     """Write the pictures people look at: comparison.png and report.html."""
     verified = look.verification.verified.image if look.verification else None
     sheet = comparison_image(

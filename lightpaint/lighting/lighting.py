@@ -241,7 +241,7 @@ def _weights(basis: Basis, given: Mapping[str, Any] | npt.ArrayLike) -> Doubles:
 
 def _numbers(given: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
     """Weights in an array of one of these shapes. Raises LightingError for anything else."""
-    expected = " or ".join(f"({', '.join(map(str, s))})" if s else "one number" for s in shapes)
+    expected = " or ".join(str(shape) if shape else "one number" for shape in shapes)
     try:
         weights = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
