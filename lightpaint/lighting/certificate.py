@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.software import Software
 from lightpaint.screen import shortly
 
 
@@ -31,6 +32,7 @@ class Certificate:
         display: The view transform through which the objective is seen; "" where it is of linear
             light.
         rounds: Linear problems solved one after the other, the last of which is the certified one.
+        software: What it was computed with, where that is known.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -51,6 +53,7 @@ class Certificate:
     objective_error: RGB | None = None
     display: str = ""
     rounds: int = 1
+    software: Software | None = None
 
     __repr__ = shortly
 

@@ -22,6 +22,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import descend
+from lightpaint.lighting.software import Software
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 
@@ -193,6 +194,7 @@ def _solution(
         converged=optimum.converged,
         unreached=tuple(n for n, ok in zip(names, reached, strict=True) if not ok.any()),
         display="" if transform is None else transform.spoken,
+        software=Software.here(),
     ).of(problem.objective(weights), problem.norm2)
     labels = problem.reduction.labels
     asked = [(label, False) for label in labels]

@@ -3,7 +3,6 @@
 Names of lights, targets and scenes come from other people's files and are escaped here.
 """
 
-import importlib.metadata
 import platform
 
 import numpy as np
@@ -12,6 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.painting import left_out
+from lightpaint.lighting.software import Software, version
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, row
@@ -152,11 +152,9 @@ def versions(basis: Basis) -> str:
     parts = [f"lightpaint {__version__}"]
     if basis.origin.lightpaint != __version__:
         parts[0] += f" (basis by {basis.origin.lightpaint})"
-    for name in ("mitsuba", "drjit", "numpy"):
-        try:
-            parts.append(f"{name} {importlib.metadata.version(name)}")
-        except importlib.metadata.PackageNotFoundError:
-            continue  # a saved basis needs no renderer
+    parts += [f"{name} {its}" for name in ("mitsuba", "drjit", "numpy") if (its := version(name))]
+    software = Software.here()
+    parts.append(f"{software.blas} {software.kernel}".strip())
     return " · ".join([*parts, f"Python {platform.python_version()}"])
 
 
