@@ -22,6 +22,7 @@ from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
+from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
@@ -100,6 +101,11 @@ class Look:
         return self.analysis.diagnosis
 
     @property
+    def remarks(self) -> list[str]:
+        """What a person should know of emitters in view: painted pixels that do not count."""
+        return emitters_in_view(self.target, self.solution, self.predicted)
+
+    @property
     def lighting(self) -> Lighting:
         """The lighting that comes closest to the target."""
         return self.solution.lighting
@@ -138,7 +144,7 @@ def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -
     write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
 
 
-def write_report(look: Look, folder: Path, *, command: str) -> None:
+def write_report(folder: Path, look: Look, *, command: str) -> None:
     """Write the pictures people look at: comparison.png and report.html."""
     verified = look.verification.verified.image if look.verification else None
     sheet = comparison_image(

@@ -142,7 +142,7 @@ def check_needed(given: Iterable[str], basis: Any) -> None:
     if isinstance(basis, LightGroups | GroupsFile):
         raise BasisError(
             f"{', '.join(idle)} cannot be used with {basis.path}: its light groups are rendered "
-            "already, and say nothing of samples, noise or units; leave it out"
+            "already, and say nothing of samples, noise, units or emitters in view; leave it out"
         )
     raise BasisError(
         f"{', '.join(idle)} cannot change a saved basis: leave "

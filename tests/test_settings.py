@@ -12,6 +12,7 @@ from lightpaint import LightpaintError, Settings, ViewTransform
 WRONG = {
     "unpainted": (-0.1, math.nan, math.inf, "1", None, True),
     "method": ("Gauss-Seidel", "newton", None, ["polished"]),
+    "emitters": ("Count", None, True),
     "resize": ("yes", 1, None, 0),
     "space": ("Display", None, 1),
     "transform": ("srgb", ("agx", 1.0)),
@@ -31,6 +32,7 @@ WRONG = {
 RIGHT = {
     "unpainted": (0, 0.5, np.float64(2)),
     "method": ("polished", "gauss-seidel"),
+    "emitters": ("auto", "count", "skip"),
     "resize": (True, False),
     "space": ("linear", "display"),
     "transform": (None, ViewTransform("agx", 1.0)),

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.markup import escape
 
 from lightpaint.cli import terminal
@@ -13,9 +12,10 @@ from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.sentences import (
     how_sure,
-    relative_errors,
-    spoken_error,
+    partly_reached,
+    spoken_errors,
     spoken_percent,
+    unreached_channels,
     what_is_missed,
 )
 from lightpaint.report.suggestion import spoken_position, spoken_suggestions
@@ -121,6 +121,8 @@ def show_look(look: Look, folder: Path) -> None:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
     _say_unreached(look)
+    for channels in partly_reached(look.lighting):
+        terminal.say(channels)
     for ambiguity in look.analysis.ambiguities:
         terminal.say(ambiguity.sentence)
     if not certificate.converged:
@@ -153,18 +155,19 @@ def _show_solved(look: Look) -> None:
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
     asked = ["asked (* holds it)"] if held else []
     table = terminal.table(*headings, *amounts, *asked)
-    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
+    errors = spoken_errors(look.uncertainty, len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else terminal.numbers(light.emission)
-        if light.name in look.solution.certificate.unreached and any(light.emission):
-            solved += " (kept)"
+        if not all(light.reached) and any(light.emission):
+            kept = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
+            solved += f" ({kept})"
         seen = look.lighting.photometry(light)
         table.add_row(
             escape(light.name),
             light.plugin,
             "" if light.is_fixed else terminal.numbers(now.emission),
             "kept" if light.is_fixed else solved,
-            spoken_error(light, float(errors[k])),
+            errors[k],
             "" if light.is_fixed else light.unit,
             f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else seen.color,

@@ -8,7 +8,9 @@ from typing import Any
 
 from lightpaint.errors import LightingError
 from lightpaint.files import one_line, read_text, write_text
-from lightpaint.lighting.lighting import Certificate, Lighting, LightSetting
+from lightpaint.lighting.certificate import Certificate
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.records import fields_of, read_record, strict_json
 from lightpaint.version import __version__
 
@@ -50,7 +52,9 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
         },
     }
     if (q := lighting.certificate) is not None:
-        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", "display", "rounds")
+        data["solve"] = fields_of(
+            q, "curve", "bounds", "objective_error", "display", "rounds", "software"
+        )
     write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
@@ -100,8 +104,12 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
 def _ties(light: LightSetting) -> dict[str, Any]:
     """What the file says of a light only where it does not go without saying."""
     ties: dict[str, Any] = {}
+    if light.reached != ALL_REACHED:
+        ties["reached"] = light.reached
     if light.standard_error is not None:
         ties["standard_error"] = light.standard_error
+    if light.interval is not None:
+        ties["interval"] = light.interval
     if light.is_fixed:
         ties["is_fixed"] = True
     if light.members != (light.name,):

@@ -124,7 +124,7 @@ class Problem:
         fit = fit or Fit()
         asked = constraints_of(whole.asked).and_then(constraints or Constraints())
         fitted = [
-            what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
+            what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen, fit.emitters)
             for its, one in zip(targets, parts, strict=True)
         ]
         views = Views(parts, tuple(fitted))
@@ -248,7 +248,7 @@ class Problem:
         """
         painting = self.painting
         if painting is None:
-            painting = Painting(self.basis, self.views, unpainted=self.fit.unpainted)
+            painting = Painting(self.basis, self.views, fit=self.fit)
         elif painting.strokes != self.strokes:
             raise ValueError("this problem was painted on already: go on from what that returned")
         painting.paint(view, region, image, importance, at_least)

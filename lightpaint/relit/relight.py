@@ -16,7 +16,7 @@ from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.relit.emission_xml import Changes, write_emission
+from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
 from lightpaint.scene.emission import Scaling
 from lightpaint.scene.emitters import Emitter
@@ -215,6 +215,6 @@ def _edit(
         changes = Changes(xml, xml.element_at(offset))
         if weight is not None:
             changes.set("float", "sampling_weight", f"{weight:g}")
-        images |= write_emission(changes, scene, emitter, rgb, stem=stem)
+        images |= set_emission(changes, scene, emitter, rgb, stem=stem)
         changes.finish()
     return xml.edited(), images

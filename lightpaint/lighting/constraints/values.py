@@ -156,10 +156,7 @@ def _duv(asked: Mapping[str, Any], where: str) -> float:
 
 
 def strength_of(value: Any, where: str) -> float:
-    """That of a pull, from a number or from a table of `current`."""
-    if isinstance(value, Mapping):
-        check_keys(value, ("current",), where)
-        value, where = value.get("current", 0.0), f"{where}.current"
+    """That of a pull."""
     if not (_is_number(value) and 0 <= value < math.inf):
         raise ConstraintError(f"{where} is {value!r}: expected a strength >= 0, like 0.1")
     return float(value)

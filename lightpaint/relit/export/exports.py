@@ -13,7 +13,8 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
 from lightpaint.images.exr import Part, rgb_channels, write_parts
-from lightpaint.lighting.lighting import Lighting, LightSetting
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import LightSetting
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 
 #: Everything that `write_exports` may write.
@@ -73,7 +74,9 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
     """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["light", "layer", "red", "green", "blue", "luminance", "stops", "kept"])
+    table.writerow(
+        ["light", "layer", "red", "green", "blue", "luminance", "stops", "kept", "unreached"]
+    )
     layers = {
         light.name: layer.name
         for light, layer in zip(groups.basis.lights, groups.layers, strict=False)
@@ -86,7 +89,9 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
         kept = "yes" if light.is_fixed else "no"
-        table.writerow([light.name, layers.get(light.name, ""), *numbers, stops, kept])
+        # Channels of which nothing told: their multiplier is what it was.
+        untold = "".join(c for c, told in zip("RGB", light.reached, strict=True) if not told)
+        table.writerow([light.name, layers.get(light.name, ""), *numbers, stops, kept, untold])
     return text.getvalue()
 
 
