@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.screen import visible
 
 #: What the name of a folder begins with in which earlier results wait.
 ASIDE = ".earlier."
@@ -110,8 +111,7 @@ def read_text(path: Path, what: str, error: type[LightpaintError], *, limit: int
 
 def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
     """What others say, as it may stand in an error: one line of no more than `limit`."""
-    text = " ".join(text[: 4 * limit].split())
-    text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    text = visible(" ".join(text[: 4 * limit].split()))
     return text if len(text) <= limit else f"{text[:limit]} …"
 
 

@@ -27,6 +27,7 @@ from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
@@ -126,7 +127,7 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     """
     names = [scene.sensor_names[scene.sensor] for scene in scenes]
     if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+        raise SceneError(f"a view is painted twice: {some_names(names)}; give each sensor once")
     for name in names:
         if Path(name).name != name or name in ("..", ""):
             raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")

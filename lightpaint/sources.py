@@ -18,6 +18,7 @@ from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints, Tie
 from lightpaint.records import strict_json
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.target.read import Paint, read_target
 from lightpaint.target.target import Target
@@ -184,7 +185,7 @@ def from_json(text: str) -> dict[str, Any]:
         if (form := data.pop("format")) != FORMAT:
             raise ValueError(f"its format is {form!r}, not {FORMAT!r}")
         if unknown := set(data) - set(FIELDS):
-            raise ValueError(f"it has the keys {', '.join(sorted(unknown))}")
+            raise ValueError(f"it has the keys {some_names(sorted(unknown))}")
         settings, constraints = data["settings"], data["constraints"]
         transform = settings["transform"] and ViewTransform(**settings["transform"])
         return {

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
 from lightpaint.scene.lights_file import Asked
-from lightpaint.screen import Listed, Shown, some_of
+from lightpaint.screen import Listed, Shown, some_names, some_of
 from lightpaint.version import __version__
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -143,7 +143,7 @@ class Basis(Shown):
         if self.emitters_seen.shape != self.size:
             raise BasisError("the mask of seen emitters has another size than the images")
         if len(set(self.names)) != n:
-            raise BasisError(f"light names repeat: {', '.join(self.names)}")
+            raise BasisError(f"light names repeat: {some_names(self.names)}")
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 
@@ -161,7 +161,7 @@ class Basis(Shown):
     def image(self, name: str) -> Floats:
         """The image of the light called `name`, (h, w, 3). Raises BasisError if there is none."""
         if name not in self.names:
-            raise BasisError(f"no light {name!r} in the basis: it has {', '.join(self.names)}")
+            raise BasisError(f"no light {name!r} in the basis: it has {some_names(self.names)}")
         return np.asarray(self.images[self.names.index(name)])
 
     def asking(self, asked: Asked) -> "Basis":

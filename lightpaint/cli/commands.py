@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
-
 from lightpaint.basis import cache as bases
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import tables, terminal
@@ -40,7 +38,8 @@ def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int
         listed = [tables.described(light, cd_per_unit) for light in loaded.lights]
         scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
         data = {"scene": str(loaded.path), **scale, "lights": listed}
-        terminal.write(json.dumps(data, indent=2))
+        # All but ASCII is escaped by it, and of that one character is not seen.
+        terminal.write_lines(json.dumps(data, indent=2).replace("\x7f", "\\u007f"))
         return 0
     tables.show_lights(loaded, cd_per_unit)
     return 0
@@ -105,7 +104,8 @@ def solve(*, jobs: Sequence[Job]) -> int:
         obtained = [look.basis for look in looks]
         for view, look in zip(job.views, looks, strict=True):
             if job.by_sensor:
-                terminal.write(f"\n{look.basis.origin.sensor}:")
+                terminal.write("")
+                terminal.write(f"{look.basis.origin.sensor}:")
             tables.show_look(look, view.folder)
             if look.suggestions is not None:
                 tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
@@ -162,7 +162,7 @@ def cache(*, action: str) -> int:
             height, width = entry.image_size
             about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
             about += [str(known.spp), str(known.seed)]
-        table.add_row(*map(escape, about), f"{entry.size / 1e6:.0f}", escape(entry.path.name))
+        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
     terminal.print_table(table)
     terminal.write(f"kept in {bases.folder()}")
     return 0

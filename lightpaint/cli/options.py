@@ -19,6 +19,7 @@ from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 
@@ -223,7 +224,7 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
     if len(names) == 1:
         return [output or Path(names[0])]
     if len(set(names)) < len(names):
-        raise OutputError(f"results would overwrite each other: {', '.join(names)}")
+        raise OutputError(f"results would overwrite each other: {some_names(names)}")
     return [(output or Path()) / name for name in names]
 
 

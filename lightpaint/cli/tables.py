@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.markup import escape
 
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
@@ -25,6 +24,7 @@ from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
@@ -40,8 +40,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
             whole = _photometry(light, cd_per_unit)
-            table.add_row(
-                escape(light.name),
+            table.row(
+                light.name,
                 light.plugin,
                 what,
                 unit,
@@ -52,8 +52,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             )
         for member in light.members:
             its = _photometry(member, cd_per_unit)
-            table.add_row(
-                escape(member.name if single else f"  {member.name}"),
+            table.row(
+                member.name if single else f"  {member.name}",
                 member.plugin,
                 terminal.numbers(member.emission),
                 member.kind.unit if member.kind is not None else MULTIPLE,
@@ -122,7 +122,7 @@ def show_look(look: Look, folder: Path) -> None:
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
     if certificate.unreached:
         terminal.say(
-            f"no painted pixel sees {', '.join(certificate.unreached)}: kept as it is; "
+            f"no painted pixel sees {some_names(certificate.unreached)}: kept as it is; "
             "paint where it shines, or pass --unpainted"
         )
     for ambiguity in look.analysis.ambiguities:
@@ -150,8 +150,8 @@ def _show_solved(look: Look) -> None:
         if light.name in look.solution.certificate.unreached and any(light.emission):
             solved += " (kept)"
         seen = look.lighting.photometry(light)
-        table.add_row(
-            escape(light.name),
+        table.row(
+            light.name,
             light.plugin,
             "" if light.is_fixed else terminal.numbers(now.emission),
             "kept" if light.is_fixed else solved,
@@ -160,7 +160,7 @@ def _show_solved(look: Look) -> None:
             f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else seen.color,
             *seen.amounts[: len(amounts)],
-            *([escape(light.constraint) + "*" * light.is_active] if held else []),
+            *([light.constraint + "*" * light.is_active] if held else []),
         )
     terminal.print_table(table)
 
@@ -186,7 +186,7 @@ def show_suggestions(
     table = terminal.table(*headings, *amounts)
     for light in suggestions:
         seen = light.photometry(cd_per_unit)
-        table.add_row(
+        table.row(
             light.name,
             spoken_position(light),
             terminal.numbers(light.emission),
@@ -199,4 +199,4 @@ def show_suggestions(
     terminal.print_table(table)
     terminal.write("to be pasted into <scene>, and solved again:")
     for light in suggestions:
-        terminal.write(light.xml)
+        terminal.write_lines(light.xml)

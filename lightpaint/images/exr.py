@@ -19,6 +19,7 @@ from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import first_line, replacing
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.silence import silenced
+from lightpaint.screen import some_names
 
 #: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
 #: is refused before any is decoded. Pictures compress to less only where they are empty.
@@ -78,7 +79,7 @@ class Part:
         if missing:
             raise ImageError(
                 f"no channel {', '.join(missing)} in part {self.name!r}, "
-                f"which has {', '.join(self.channels)}"
+                f"which has {some_names(self.channels)}"
             )
         return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32, copy=False)
 

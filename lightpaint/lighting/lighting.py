@@ -13,7 +13,7 @@ from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.errors import LightingError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.bound import Bound
-from lightpaint.screen import Shown, shortly, some_of
+from lightpaint.screen import Shown, shortly, some_names, some_of
 
 
 @dataclass(frozen=True)
@@ -167,10 +167,10 @@ class Lighting(Shown):
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]
         if len(set(names)) != len(names):
-            raise LightingError(f"light names repeat: {', '.join(names)}")
+            raise LightingError(f"light names repeat: {some_names(names)}")
         members = [name for light in self.lights for name in light.members]
         if len(set(members)) != len(members):
-            raise LightingError(f"an emitter is in two lights: {', '.join(sorted(members))}")
+            raise LightingError(f"an emitter is in two lights: {some_names(sorted(members))}")
         scale = self.cd_per_unit
         if scale is not None and not 0 < scale < math.inf:
             raise LightingError(f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0")
@@ -205,7 +205,8 @@ class Lighting(Shown):
         Raises LightingError if there is no such light.
         """
         if name not in self.emission:
-            raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
+            has = some_names(self.emission)
+            raise LightingError(f"no light {name!r} in the lighting: it has {has}")
         lights = tuple(
             replace(
                 light,
@@ -266,14 +267,14 @@ class Lighting(Shown):
             unknown = sorted(set(given) - set(basis.names))
             raise LightingError(
                 "lighting and basis name different lights: "
-                f"missing {', '.join(missing) or 'none'}; unknown {', '.join(unknown) or 'none'}"
+                f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
             )
         for light in basis.lights:
             if set(light.members) != set(self.members[light.name]):
                 raise LightingError(
                     f"light {light.name!r} is not the same in both: of "
-                    f"{', '.join(self.members[light.name])} in the lighting, of "
-                    f"{', '.join(light.members)} in the basis"
+                    f"{some_names(self.members[light.name])} in the lighting, of "
+                    f"{some_names(light.members)} in the basis"
                 )
         return np.array([given[name] for name in basis.names], dtype=np.float64)
 

@@ -21,6 +21,7 @@ from lightpaint.relit.xml_edit import XmlFile, tag
 from lightpaint.scene.emission import Scaling
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 
 
 def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
@@ -94,8 +95,8 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     if given != there:
         raise LightingError(
             f"the lighting does not fit {scene.path}: it lacks "
-            f"{', '.join(sorted(there - given)) or 'no light'} and names "
-            f"{', '.join(sorted(given - there)) or 'none'} that the scene does not have"
+            f"{some_names(sorted(there - given)) or 'no light'} and names "
+            f"{some_names(sorted(given - there)) or 'none'} that the scene does not have"
         )
     tied = scene.with_lights(lighting.members, lighting.fixed)
     for setting in lighting.lights:

@@ -25,7 +25,7 @@ from lightpaint.scene.lights import Light, free_names, light_named, lights_of, s
 from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import Integrator, ParsedScene, mitsuba_errors
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import Listed, Shown, some_of
+from lightpaint.screen import Listed, Shown, some_names, some_of
 
 _Made = TypeVar("_Made")
 
@@ -111,8 +111,8 @@ class Scene(Shown):
         if set(given) != there:
             raise SceneError(
                 f"{self.path} has other emitters than are asked for: it lacks "
-                f"{', '.join(sorted(set(given) - there)) or 'none'} and also has "
-                f"{', '.join(sorted(there - set(given))) or 'none'}"
+                f"{some_names(sorted(set(given) - there)) or 'none'} and also has "
+                f"{some_names(sorted(there - set(given))) or 'none'}"
             )
         if len(given) > len(there) or not all(members.values()):
             raise SceneError(

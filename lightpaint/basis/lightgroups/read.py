@@ -27,7 +27,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import read_headers
-from lightpaint.screen import shortly
+from lightpaint.screen import shortly, some_names
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
@@ -183,7 +183,7 @@ def _light_groups(
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
     rest, missing, exceeding, told = _what_is_missing(lights, beauty, holes)
-    remarks = [f"light groups as of {choice.renderer}: {', '.join(names)}", *choice.remarks, told]
+    remarks = [f"light groups as of {choice.renderer}: {some_names(names)}", *choice.remarks, told]
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are of its channels in linear "
