@@ -17,6 +17,9 @@ ASIDE = ".earlier."
 #: Longest text that is read whole, in bytes.
 MAX_TEXT = 2**26
 
+#: Longest name of a file, in bytes, on most systems; and what is put behind or before it here.
+LONGEST_NAME = 255 - 32
+
 #: Characters of what others say that an error repeats.
 MAX_QUOTED = 400
 
@@ -107,6 +110,13 @@ def read_text(path: Path, what: str, error: type[LightpaintError], *, limit: int
         raise error(
             f"{path} is not text in UTF-8: {reason.reason} at byte {reason.start}"
         ) from None
+
+
+def is_name(text: str) -> bool:
+    """Whether a file or a folder may be called `text`: one that is seen, and in no other folder."""
+    if text in ("", ".", "..") or "/" in text or os.sep in text or visible(text) != text:
+        return False
+    return len(os.fsencode(text)) <= LONGEST_NAME
 
 
 def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:

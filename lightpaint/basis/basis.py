@@ -1,6 +1,5 @@
 """The basis: one image per light at unit emission."""
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,6 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
+from lightpaint.expected import BRIGHTEST, is_amount
 from lightpaint.scene.lights_file import Asked
 from lightpaint.screen import Listed, Shown, some_names, some_of
 from lightpaint.version import __version__
@@ -53,15 +53,15 @@ class BasisLight:
             object.__setattr__(self, "members", (self.name,))
         if self.is_fixed and self.emission != (1, 1, 1):
             raise BasisError(f"light {self.name!r} is kept, and its emission is not 1")
-        if not all(math.isfinite(v) and v >= 0 for v in self.emission):
+        if not all(map(is_amount, self.emission)):
             raise BasisError(
-                f"light {self.name!r} has the emission {list(self.emission)}: "
-                "need three numbers >= 0"
+                f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}"
             )
-        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
             raise BasisError(
-                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: "
-                "need three numbers >= 0"
+                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: need "
+                f"three numbers from 0 to {BRIGHTEST:g}"
             )
 
     def __repr__(self) -> str:

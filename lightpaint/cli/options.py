@@ -16,6 +16,7 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.read import is_light_groups
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
+from lightpaint.files import is_name, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -218,11 +219,12 @@ def constraints_of(options: Namespace) -> Constraints:
 
 def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
     """One result folder per name: DIR itself for a single one, DIR/<name> for several."""
+    if output is not None and len(names) == 1:
+        return [output]
     for name in names:
-        if Path(name).name != name or name == "..":
-            raise OutputError(f"{name!r} is no name for a folder: choose one with -o")
-    if len(names) == 1:
-        return [output or Path(names[0])]
+        if not is_name(name):
+            how = "choose one with -o" if len(names) == 1 else "take it alone, with -o"
+            raise OutputError(f"{one_line(repr(name))} is no name for a folder: {how}")
     if len(set(names)) < len(names):
         raise OutputError(f"results would overwrite each other: {some_names(names)}")
     return [(output or Path()) / name for name in names]

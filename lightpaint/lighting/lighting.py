@@ -11,6 +11,7 @@ from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.basis import Basis, BasisLight, mix
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.errors import LightingError
+from lightpaint.expected import BRIGHTEST, is_amount
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.bound import Bound
 from lightpaint.screen import Shown, shortly, some_names, some_of
@@ -50,19 +51,20 @@ class LightSetting:
         if self.standard_error is not None and not self.is_fixed:
             given["standard error"] = self.standard_error
         for what, rgb in given.items():
-            if not all(math.isfinite(v) and v >= 0 for v in rgb):
+            if not all(map(is_amount, rgb)):
                 raise LightingError(
-                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
+                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers from 0 "
+                    f"to {BRIGHTEST:g}"
                 )
             if self.is_fixed and rgb != (1, 1, 1):
                 raise LightingError(
                     f"light {self.name!r} is kept as it is, so its {what} must be 1 1 1, "
                     f"not {list(rgb)}"
                 )
-        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
             raise LightingError(
-                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: "
-                "need three numbers >= 0"
+                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}"
             )
 
 
@@ -172,8 +174,11 @@ class Lighting(Shown):
         if len(set(members)) != len(members):
             raise LightingError(f"an emitter is in two lights: {some_names(sorted(members))}")
         scale = self.cd_per_unit
-        if scale is not None and not 0 < scale < math.inf:
-            raise LightingError(f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0")
+        if scale is not None and not 0 < scale <= BRIGHTEST:
+            raise LightingError(
+                f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0, at most "
+                f"{BRIGHTEST:g}"
+            )
 
     @property
     def members(self) -> Mapping[str, tuple[str, ...]]:
