@@ -86,6 +86,7 @@ class Part:
 
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
     """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
+    head_of(path, 16)  # OpenEXR itself would wait for ever at what never answers
     with silenced():
         headers = [header for _, header in _declared(path)]
         return [_texts(header) for header in headers], _windows(headers[0])[0]
