@@ -96,7 +96,7 @@ def file_length(
             f"{path} is {status.st_size} bytes long: no {what} has more than {limit}, so it is not "
             "read"
         )
-    if status.st_size == 0 and not may_be_empty:
+    if status.st_size == 0 and (_is_made_up(status) or not may_be_empty):
         raise error(f"{path} is empty, or only made up when it is read: expected {article} {what}")
     try:
         if status.st_size:
@@ -104,6 +104,11 @@ def file_length(
     except OSError as reason:
         raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     return status.st_size
+
+
+def _is_made_up(status: os.stat_result) -> bool:
+    """Whether it is a file only to look at, as under /proc."""
+    return os.path.ismount("/proc") and status.st_dev == os.stat("/proc").st_dev
 
 
 def _beginning(path: Path) -> bytes:

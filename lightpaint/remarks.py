@@ -16,6 +16,8 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     remarks = []
     if scene.lights_file is not None:
         remarks.append(f"lights and groups as in {scene.lights_file}")
+    if scene.instead is not None:
+        remarks.append(f"rendered by {scene.instead}, not by the scene's own integrator")
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
         remarks.append(f"left as it is: {some_names(obstacles, '; ')}")
     # Python gets the same as a warning.

@@ -40,6 +40,7 @@ class SceneFile:
         groups: Emitters that are one light, by its name.
         lights_file: TOML to read instead of the one beside the scene.
         use_lights_file: False leaves that one alone.
+        integrator: To render with instead of the scene's own.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -54,6 +55,7 @@ class SceneFile:
     groups: Mapping[str, Sequence[str]] | None = None
     lights_file: str | None = None
     use_lights_file: bool = True
+    integrator: str | None = None
 
     @cached_property
     def content(self) -> Scene:

@@ -78,6 +78,7 @@ class Origin:
     halves: samples per pixel of each of the two halves; passes: how many passes made them.
     each_light: where an interrupt left the lights of separate renders unequal, samples of half
     A and B and passes of A and B of each; `halves` and `passes` are then what all have at least.
+    integrator: what was put in the place of the scene's own; "" where it rendered with that.
     """
 
     scene: str
@@ -89,6 +90,7 @@ class Origin:
     passes: tuple[int, int]
     lightpaint: str = __version__
     each_light: tuple[tuple[int, int, int, int], ...] = ()
+    integrator: str = ""
 
     def __post_init__(self) -> None:
         if max(max(own) for own in (self.halves, self.passes, *self.each_light)) > MAX_SAMPLES:

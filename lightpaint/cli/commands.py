@@ -11,7 +11,7 @@ from lightpaint.cli import tables, terminal
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.errors import OutputError
+from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
@@ -24,6 +24,7 @@ from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile
 from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
@@ -150,22 +151,40 @@ def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) 
     return 0 if agree else 1
 
 
-def cache(*, action: str) -> int:
-    """`lightpaint cache [clear]`"""
-    if action == "clear":
-        terminal.write(f"{bases.clear()} deleted from {bases.folder()}")
+def cache(*, action: str, names: Sequence[str]) -> int:
+    """`lightpaint cache [list | drop NAME... | clear]`"""
+    if action != "drop" and names:
+        raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
+    if action == "list":
+        kept = bases.entries()
+        tables.show_kept(kept)
+        size = sum(entry.size for entry in kept) / 1e6
+        terminal.write(
+            f"kept in {bases.folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB"
+        )
         return 0
-    table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
-    for entry in reversed(bases.entries()):
-        known, about = entry.origin, ["?"] * 6
-        if known is not None and entry.image_size is not None:
-            height, width = entry.image_size
-            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
-            about += [str(known.spp), str(known.seed)]
-        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
-    terminal.print_table(table)
-    terminal.write(f"kept in {bases.folder()}")
+    dropped = bases.entries() if action == "clear" else _kept_by_names(names)
+    freed = bases.drop(dropped)
+    if action == "drop":
+        tables.show_kept(dropped)
+    terminal.write(f"{len(dropped)} deleted from {bases.folder()}: {freed / 1e6:.1f} MB are free")
     return 0
+
+
+def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
+    """The bases that are meant, each once. Raises BasisError for a name of none."""
+    if not names:
+        raise BasisError(
+            "cache drop needs the name of a scene or of a file, as cache list shows it"
+        )
+    found: dict[Path, bases.Entry] = {}
+    for name in names:
+        if not (its := bases.named(name)):
+            scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
+            there = some_names(sorted(scenes)) or "none"
+            raise BasisError(f"no basis of {name!r} is kept in {bases.folder()}: it has {there}")
+        found |= {entry.path: entry for entry in its}
+    return list(found.values())
 
 
 def doctor(*, variant: str | None) -> int:

@@ -25,7 +25,7 @@ from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 
 #: Options that say how a scene is loaded, by the names that Python has for them.
-LOADING = ("sensor", "parameters", "variant", "lights", "groups")
+LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
 
 
 def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             folders = list(map(Path, options.folders))
             return {"folders": folders, "variant": options.variant, "settings": settings}
         case "cache":
-            return {"action": options.action}
+            return {"action": options.action, "names": options.names}
         case _:
             return {"variant": options.variant}
 
@@ -89,6 +89,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
             "use_lights_file": options.use_lights_file,
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **how}
+    loading["integrator"] = options.integrator
     return SceneFile(path, parameters=dict(options.parameters), **loading)
 
 

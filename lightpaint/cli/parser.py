@@ -107,9 +107,15 @@ def _cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "action",
         nargs="?",
-        choices=("list", "clear"),
+        choices=("list", "drop", "clear"),
         default="list",
-        help="what to do (default: %(default)s)",
+        help="list them, drop those of NAME, or clear all (default: %(default)s)",
+    )
+    parser.add_argument(
+        "names",
+        metavar="NAME",
+        nargs="*",
+        help="scene, or file, of the bases to drop, as list shows them; may be a pattern, 'hall*'",
     )
 
 

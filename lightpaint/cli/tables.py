@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.basis.cache import Entry
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
@@ -162,6 +163,19 @@ def _show_solved(look: Look) -> None:
             *seen.amounts[: len(amounts)],
             *([light.constraint + "*" * light.is_active] if held else []),
         )
+    terminal.print_table(table)
+
+
+def show_kept(entries: Sequence[Entry]) -> None:
+    """Print a row for each basis in the cache, the last used first."""
+    table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
+    for entry in reversed(entries):
+        known, about = entry.origin, ["?"] * 6
+        if known is not None and entry.image_size is not None:
+            height, width = entry.image_size
+            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
+            about += [str(known.spp), str(known.seed)]
+        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
     terminal.print_table(table)
 
 

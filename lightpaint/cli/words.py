@@ -6,6 +6,7 @@ import re
 OPTIONS = {
     "cd_per_unit": "--unit",
     "groups": "--group",
+    "integrator": "--integrator",
     "layer": "--layer",
     "lights": "--lights",
     "mask": "--mask",
