@@ -86,7 +86,8 @@ class ParsedScene:
         if instead is None:
             return None, ()
         nodes = [self.state.nodes[k] for k in integrator_nodes(self.state)]
-        places = tuple((int(node.file_index), int(node.offset)) for node in nodes)
+        # The parser's offset is just behind the `<`.
+        places = tuple((int(node.file_index), int(node.offset) - 1) for node in nodes)
         return replace_integrator(self.state, instead), places
 
     def _nodes_of(self, kind: Any) -> list[int]:
@@ -255,6 +256,6 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
         hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
         if "integrator plugin" in text:
-            hint = f"; that is of the integrator that was asked for, {instead}"
+            hint = f"; that is the integrator that was asked for, {instead}"
             hint = hint if instead else '; integrator="path" renders it with another'
         raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error
