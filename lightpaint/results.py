@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import ImageError, OutputError, SceneError
-from lightpaint.files import one_line, write_bytes, write_text
+from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.analysis.analyse import Analysis
@@ -28,6 +28,7 @@ from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
@@ -132,10 +133,12 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     """
     names = [scene.sensor_names[scene.sensor] for scene in scenes]
     if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+        raise SceneError(f"a view is painted twice: {some_names(names)}; give each sensor once")
     for name in names:
-        if Path(name).name != name or name in ("..", ""):
-            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+        if not is_name(name):
+            raise SceneError(
+                f"the sensor id {one_line(repr(name))} cannot name a folder: choose another id"
+            )
     return names
 
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
-
+from lightpaint.basis.cache import Entry
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
@@ -25,6 +24,7 @@ from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
@@ -40,8 +40,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
             whole = _photometry(light, cd_per_unit)
-            table.add_row(
-                escape(light.name),
+            table.row(
+                light.name,
                 light.plugin,
                 what,
                 unit,
@@ -52,8 +52,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             )
         for member in light.members:
             its = _photometry(member, cd_per_unit)
-            table.add_row(
-                escape(member.name if single else f"  {member.name}"),
+            table.row(
+                member.name if single else f"  {member.name}",
                 member.plugin,
                 terminal.numbers(member.emission),
                 member.kind.unit if member.kind is not None else MULTIPLE,
@@ -139,10 +139,10 @@ def _say_unreached(look: Look) -> None:
     unreached = look.solution.certificate.unreached
     dark = [name for name in unreached if not look.basis.image(name).any()]
     if dark:
-        terminal.say(f"the picture holds nothing of {', '.join(dark)}: kept as it is")
+        terminal.say(f"the picture holds nothing of {some_names(dark)}: kept as it is")
     if seen := [name for name in unreached if name not in dark]:
         terminal.say(
-            f"no painted pixel sees {', '.join(seen)}: kept as it is; "
+            f"no painted pixel sees {some_names(seen)}: kept as it is; "
             "paint where it shines, or pass --unpainted"
         )
 
@@ -162,8 +162,8 @@ def _show_solved(look: Look) -> None:
             kept = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
             solved += f" ({kept})"
         seen = look.lighting.photometry(light)
-        table.add_row(
-            escape(light.name),
+        table.row(
+            light.name,
             light.plugin,
             "" if light.is_fixed else terminal.numbers(now.emission),
             "kept" if light.is_fixed else solved,
@@ -172,8 +172,21 @@ def _show_solved(look: Look) -> None:
             f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else seen.color,
             *seen.amounts[: len(amounts)],
-            *([escape(light.constraint) + "*" * light.is_active] if held else []),
+            *([light.constraint + "*" * light.is_active] if held else []),
         )
+    terminal.print_table(table)
+
+
+def show_kept(entries: Sequence[Entry]) -> None:
+    """Print a row for each basis in the cache, the last used first."""
+    table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
+    for entry in reversed(entries):
+        known, about = entry.origin, ["?"] * 6
+        if known is not None and entry.image_size is not None:
+            height, width = entry.image_size
+            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
+            about += [str(known.spp), str(known.seed)]
+        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
     terminal.print_table(table)
 
 
@@ -198,7 +211,7 @@ def show_suggestions(
     table = terminal.table(*headings, *amounts)
     for light in suggestions:
         seen = light.photometry(cd_per_unit)
-        table.add_row(
+        table.row(
             light.name,
             spoken_position(light),
             terminal.numbers(light.emission),
@@ -211,4 +224,4 @@ def show_suggestions(
     terminal.print_table(table)
     terminal.write("to be pasted into <scene>, and solved again:")
     for light in suggestions:
-        terminal.write(light.xml)
+        terminal.write_lines(light.xml)

@@ -7,6 +7,7 @@ OPTIONS = {
     "cd_per_unit": "--unit",
     "emitters": "--emitters",
     "groups": "--group",
+    "integrator": "--integrator",
     "layer": "--layer",
     "lights": "--lights",
     "mask": "--mask",

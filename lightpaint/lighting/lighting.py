@@ -1,6 +1,5 @@
 """The answer: named lights with their emissions."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,10 +12,11 @@ from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis, BasisLight, mix
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.errors import LightingError, UnknownLightError
+from lightpaint.expected import BRIGHTEST
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
-from lightpaint.screen import Shown, some_of
+from lightpaint.screen import Shown, some_names, some_of
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,16 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]
         if len(set(names)) != len(names):
-            raise LightingError(f"light names repeat: {', '.join(names)}")
+            raise LightingError(f"light names repeat: {some_names(names)}")
         members = [name for light in self.lights for name in light.members]
         if len(set(members)) != len(members):
-            raise LightingError(f"an emitter is in two lights: {', '.join(sorted(members))}")
+            raise LightingError(f"an emitter is in two lights: {some_names(sorted(members))}")
         scale = self.cd_per_unit
-        if scale is not None and not 0 < scale < math.inf:
-            raise LightingError(f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0")
+        if scale is not None and not 0 < scale <= BRIGHTEST:
+            raise LightingError(
+                f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0, at most "
+                f"{BRIGHTEST:g}"
+            )
 
     def __getitem__(self, name: str) -> LightSetting:
         """The light of that name. Raises UnknownLightError, a KeyError, if there is none."""
@@ -180,14 +183,14 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             unknown = sorted(set(given) - set(basis.names))
             raise LightingError(
                 "lighting and basis name different lights: "
-                f"missing {', '.join(missing) or 'none'}; unknown {', '.join(unknown) or 'none'}"
+                f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
             )
         for light in basis.lights:
             if set(light.members) != set(self.members[light.name]):
                 raise LightingError(
                     f"light {light.name!r} is not the same in both: of "
-                    f"{', '.join(self.members[light.name])} in the lighting, of "
-                    f"{', '.join(light.members)} in the basis"
+                    f"{some_names(self.members[light.name])} in the lighting, of "
+                    f"{some_names(light.members)} in the basis"
                 )
         return np.array([given[name] for name in basis.names], dtype=np.float64)
 

@@ -1,10 +1,10 @@
 """One light of an answer: its emission, what was asked of it, and how sure it is."""
 
-import math
 from dataclasses import dataclass
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import LightingError
+from lightpaint.expected import BRIGHTEST, is_amount
 
 #: A number of each channel, None where nothing tells; an interval of each.
 Errors = tuple[float | None, float | None, float | None]
@@ -53,19 +53,20 @@ class LightSetting:
         self._check_errors()
         given = {"emission": self.emission, "weight": self.weight}
         for what, rgb in given.items():
-            if not all(math.isfinite(v) and v >= 0 for v in rgb):
+            if not all(map(is_amount, rgb)):
                 raise LightingError(
-                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
+                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers from 0 "
+                    f"to {BRIGHTEST:g}"
                 )
             if self.is_fixed and rgb != (1, 1, 1):
                 raise LightingError(
                     f"light {self.name!r} is kept as it is, so its {what} must be 1 1 1, "
                     f"not {list(rgb)}"
                 )
-        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
             raise LightingError(
-                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: "
-                "need three numbers >= 0"
+                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}"
             )
 
     @property
@@ -75,14 +76,14 @@ class LightSetting:
 
     def _check_errors(self) -> None:
         errors = () if self.is_fixed else self.standard_error or ()
-        if not all(e is None or (math.isfinite(e) and e >= 0) for e in errors):
+        if not all(e is None or is_amount(e) for e in errors):
             raise LightingError(
                 f"light {self.name!r} has the standard error {list(errors)}: need three numbers "
-                ">= 0, or null where nothing tells"
+                f"from 0 to {BRIGHTEST:g}, or null where nothing tells"
             )
         for ends in filter(None, self.interval or ()):
-            if not 0 <= ends[0] <= ends[1] < math.inf:
+            if not 0 <= ends[0] <= ends[1] <= BRIGHTEST:
                 raise LightingError(
                     f"light {self.name!r} has the interval {list(ends)}: need two numbers, "
-                    "0 <= lower <= upper"
+                    f"0 <= lower <= upper <= {BRIGHTEST:g}"
                 )

@@ -12,7 +12,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.verdict import energy_shares
-from lightpaint.screen import some_of
+from lightpaint.screen import some_names, some_of
 
 CHANNELS = ("red", "green", "blue")
 
@@ -155,7 +155,7 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
 def spoken_bound(bound: Bound, share: float) -> str:
     """What holds a light, and which share of the miss that is."""
     is_one = len(bound.lights) == 1
-    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {', '.join(bound.lights)} are"
+    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {some_names(bound.lights)} are"
     if bound.kind == "zero":
         return (
             f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "

@@ -86,6 +86,7 @@ def render_table(
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),
+        ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(out)}"),
     ]
     told += _fitted(solution, predicted)
@@ -98,7 +99,7 @@ def render_table(
         told.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
         told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
-    return facts(told)
+    return facts([(what, value) for what, value in told if value])
 
 
 def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:

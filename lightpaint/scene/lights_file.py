@@ -98,7 +98,7 @@ def read_lights_file(path: Path) -> LightsFile:
 
 def read_keys(path: Path) -> dict[str, Any]:
     """All keys of a lights file, none of them unknown. Raises SceneError."""
-    text = read_text(path, "lights file", SceneError, limit=MAX_BYTES)
+    text = read_text(path, "lights file", SceneError, limit=MAX_BYTES, may_be_empty=True)
     dots = [line.count(".") for line in text.splitlines()]
     if sum(n * n for n in dots) > MAX_DOTS:
         line = dots.index(max(dots)) + 1
