@@ -52,12 +52,12 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.uncertainty import correct_noise as correct_noise
     from lightpaint.lighting.analysis.uncertainty import error_bars as error_bars
+    from lightpaint.lighting.certificate import Certificate as Certificate
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
     from lightpaint.lighting.constraints.file import read_constraints as read_constraints
     from lightpaint.lighting.file import read_lighting as read_lighting
     from lightpaint.lighting.file import write_lighting as write_lighting
     from lightpaint.lighting.fit import Fit as Fit
-    from lightpaint.lighting.lighting import Certificate as Certificate
     from lightpaint.lighting.lighting import Lighting as Lighting
     from lightpaint.lighting.lighting import combine as combine
     from lightpaint.lighting.problem import Problem as Problem
@@ -86,7 +86,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Analysis": "lighting.analysis.analyse",
     "Basis": "basis.basis",
-    "Certificate": "lighting.lighting",
+    "Certificate": "lighting.certificate",
     "Constraints": "lighting.constraints.constraints",
     "Demo": "demo",
     "Diagnosis": "lighting.analysis.diagnosis",

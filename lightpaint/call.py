@@ -47,6 +47,7 @@ def paint_with_light(
     parameters: Mapping[str, object] | None = None,
     lights: Iterable[str] | None = None,
     groups: Mapping[str, Iterable[str]] | None = None,
+    integrator: str | None = None,
     progress: Progress = silent,
     **settings: Any,
 ) -> Look | list[Look]:
@@ -61,10 +62,11 @@ def paint_with_light(
             For several views a list, which is emptied, so that no pixel is held twice.
         constraints: What is asked of the lights; it goes before what the scene's lights file asks.
         mask: As `read_target` takes it, where `target` is a path.
-        sensor: As of `load_scene`, as are the next three: index or id, where `scene` is a path.
+        sensor: As of `load_scene`, as are the next four: index or id, where `scene` is a path.
         parameters: Values of `$name` parameters.
         lights: Names or patterns of those to adjust.
         groups: Emitters that are one light, by its name.
+        integrator: To render with instead of the scene's own, like `path`.
         progress: Hears how far the work has come and, if it is a `Listener`, remarks.
         **settings: Any of `Settings`, by name, like spp=64.
 
@@ -86,6 +88,7 @@ def paint_with_light(
         "parameters": {key: str(value) for key, value in (parameters or {}).items()},
         "lights": None if lights is None else tuple(lights),
         "groups": {name: tuple(members) for name, members in (groups or {}).items()},
+        "integrator": integrator,
     }
     bases = basis if isinstance(basis, list) else None
     if bases is not None:

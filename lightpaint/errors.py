@@ -10,7 +10,8 @@
     ├── TargetError      a painting or mask that cannot be solved for
     │   └── SizeError    … because its size differs from the basis
     ├── ConstraintError  what is asked of a light, and cannot be understood or had
-    ├── LightingError    a lighting.json
+    ├── LightingError    a lighting.json, or weights that are none
+    │   └── UnknownLightError … or a name that none of its lights has; a KeyError as well
     └── OutputError      a place that cannot be written
 
 Each message is one line: what came, what was expected, and what to do. The command
@@ -68,6 +69,13 @@ class ConstraintError(LightpaintError):
 
 class LightingError(LightpaintError):
     """A lighting file that is damaged or names other lights than the scene has."""
+
+
+class UnknownLightError(LightingError, KeyError):
+    """A name that no light has."""
+
+    # A KeyError would quote the line as if it were the key.
+    __str__ = Exception.__str__
 
 
 class OutputError(LightpaintError):

@@ -12,6 +12,15 @@ from lightpaint.errors import LightpaintError
 Check = tuple[Callable[[Any], bool], str]
 
 
+#: More than any light emits, and little enough for sums and products in float32.
+BRIGHTEST = 1e30
+
+
+def is_amount(value: float) -> bool:
+    """Whether that much light, or of what makes it, can be computed with."""
+    return 0 <= value <= BRIGHTEST
+
+
 def check_fields(given: Any, expected: Mapping[str, Check]) -> None:
     """Raise LightpaintError for the first field of a dataclass that is not what is expected.
 
@@ -34,14 +43,14 @@ def whole(least: int, most: float = math.inf) -> Check:
 
 
 def number(about: str, *, may_be_zero: bool = False) -> Check:
-    """A finite number > 0, or >= 0. about: what it is."""
+    """A number > 0, or >= 0, that can be computed with. about: what it is."""
 
     def fits(value: Any) -> bool:
         if not isinstance(value, Real) or _is_bool(value):
             return False
-        return 0 < float(value) < math.inf or (may_be_zero and value == 0)
+        return 0 < float(value) <= BRIGHTEST or (may_be_zero and value == 0)
 
-    return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}"
+    return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
 
 
 def one_of(words: Any) -> Check:

@@ -1,20 +1,33 @@
 """Writing files so that a reader never sees half of one; reading only what is a file."""
 
+import errno
 import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator
+import threading
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, BinaryIO, TypeVar, cast
 
 from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.screen import visible
 
 #: What the name of a folder begins with in which earlier results wait.
 ASIDE = ".earlier."
 
-#: Longest text that is read whole, in bytes.
-MAX_TEXT = 2**26
+#: Longest text that is read whole, in bytes; and how much of it at a time.
+MAX_TEXT, PIECE = 2**26, 2**22
+
+#: Seconds in which a file has to answer, which also a drive that has to wake up does.
+PATIENCE_S = 30.0
+
+_Made = TypeVar("_Made")
+
+#: Longest name of a file, in bytes, on most systems; and what is put behind or before it here.
+LONGEST_NAME = 255 - 32
 
 #: Characters of what others say that an error repeats.
 MAX_QUOTED = 400
@@ -53,16 +66,22 @@ def write_text(path: Path, text: str) -> None:
 
 
 def file_length(
-    path: Path, what: str, error: type[LightpaintError], *, limit: int = MAX_TEXT
+    path: Path,
+    what: str,
+    error: type[LightpaintError],
+    *,
+    limit: int = MAX_TEXT,
+    may_be_empty: bool = False,
 ) -> int:
-    """Length in bytes of what is at `path`; raises `error` unless it is a file, and no longer.
+    """Length in bytes of what is at `path`; raises `error` unless it is a file that can be read.
 
     Reading a device, a pipe or a socket might never end, so that this is asked before any of it
-    is read. what: the kind of file that is expected.
+    is read. So might what a kernel makes up under /proc, which says that it is empty; and what is
+    on a drive that is away does not begin. what: the kind of file that is expected.
     """
     article = "an" if what[0] in "aeiou" else "a"
     try:
-        status = Path(path).stat()
+        status = _in_time(Path(path).stat)
     except (FileNotFoundError, NotADirectoryError):
         raise error(f"no such {what}: {path}") from None
     except (OSError, ValueError) as reason:  # a name too long, or with a NUL in it
@@ -77,41 +96,101 @@ def file_length(
             f"{path} is {status.st_size} bytes long: no {what} has more than {limit}, so it is not "
             "read"
         )
+    if status.st_size == 0 and (_is_made_up(status) or not may_be_empty):
+        raise error(f"{path} is empty, or only made up when it is read: expected {article} {what}")
+    try:
+        if status.st_size:
+            _in_time(lambda: _beginning(path))
+    except OSError as reason:
+        raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     return status.st_size
 
 
+def _is_made_up(status: os.stat_result) -> bool:
+    """Whether it is a file only to look at, as under /proc."""
+    return os.path.ismount("/proc") and status.st_dev == os.stat("/proc").st_dev
+
+
+def _beginning(path: Path) -> bytes:
+    with _opened(path) as file:
+        return file.read(1)
+
+
+def _opened(path: Path) -> BinaryIO:
+    # Should it have become a pipe meanwhile, nobody waits for who writes to it.
+    return open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+
+
+def _in_time(work: Callable[[], _Made]) -> _Made:
+    """What `work` returns or raises; TimeoutError if the system does not let it end in time.
+
+    It goes on in a thread of its own, which no one waits for at the end of the process.
+    """
+    answers: SimpleQueue[tuple[_Made | None, BaseException | None]] = SimpleQueue()
+
+    def answer() -> None:
+        try:
+            answers.put((work(), None))
+        except BaseException as error:
+            answers.put((None, error))
+
+    threading.Thread(target=answer, daemon=True).start()
+    try:
+        made, failure = answers.get(timeout=PATIENCE_S)
+    except Empty:
+        reason = f"no answer within {PATIENCE_S:g} s; is it on a drive that is away?"
+        raise TimeoutError(errno.ETIMEDOUT, reason) from None
+    if failure is not None:
+        raise failure
+    return cast(_Made, made)
+
+
 def read_bytes(
-    path: Path, what: str, error: type[LightpaintError], *, limit: int = MAX_TEXT
+    path: Path,
+    what: str,
+    error: type[LightpaintError],
+    *,
+    limit: int = MAX_TEXT,
+    may_be_empty: bool = False,
 ) -> bytes:
     """The content of the file at `path`. Raises `error`, in one line, for all that prevents it."""
-    file_length(path, what, error, limit=limit)
+    if file_length(path, what, error, limit=limit, may_be_empty=may_be_empty) == 0:
+        return b""  # and is not asked for more, which might never come
+    data = bytearray()
     try:
-        with Path(path).open("rb") as file:
-            data = file.read(limit + 1)
+        with _opened(path) as file:
+            while len(data) <= limit and (piece := _in_time(lambda: file.read(PIECE))):
+                data += piece
     except OSError as reason:
         raise error(f"cannot read {path}: {reason.strerror or reason}") from None
-    if len(data) > limit:  # as of what a kernel makes up, and says is empty
+    if len(data) > limit:  # as of what is still being written
         raise error(f"{path} has no end: no {what} has more than {limit} bytes")
-    return data
+    return bytes(data)
 
 
-def read_text(path: Path, what: str, error: type[LightpaintError], *, limit: int = MAX_TEXT) -> str:
+def read_text(path: Path, what: str, error: type[LightpaintError], **how: Any) -> str:
     """The text of the UTF-8 file at `path`, without a byte-order mark.
 
-    Raises `error`, in one line, for all that prevents it.
+    how: as of `read_bytes`. Raises `error`, in one line, for all that prevents it.
     """
     try:
-        return read_bytes(path, what, error, limit=limit).decode("utf-8-sig")
+        return read_bytes(path, what, error, **how).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
         raise error(
             f"{path} is not text in UTF-8: {reason.reason} at byte {reason.start}"
         ) from None
 
 
+def is_name(text: str) -> bool:
+    """Whether a file or a folder may be called `text`: one that is seen, and in no other folder."""
+    if text in ("", ".", "..") or "/" in text or os.sep in text or visible(text) != text:
+        return False
+    return len(os.fsencode(text)) <= LONGEST_NAME
+
+
 def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
     """What others say, as it may stand in an error: one line of no more than `limit`."""
-    text = " ".join(text[: 4 * limit].split())
-    text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    text = visible(" ".join(text[: 4 * limit].split()))
     return text if len(text) <= limit else f"{text[:limit]} …"
 
 

@@ -43,7 +43,7 @@ from lightpaint.target.target import Target
 
 #: Settings that only change what is rendered, and those that light groups know nothing of.
 RENDERED = ("spp", "time_s", "quality", "resolution", "refine", "suggest")
-NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit")
+NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
 @dataclass(frozen=True)

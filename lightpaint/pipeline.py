@@ -179,5 +179,7 @@ def _finished(
         analysis=analysis,
         suggestions=suggestions,
     )
-    write_report(look, view.folder, command=settings.command)
+    write_report(view.folder, look, command=settings.command)
+    for remark in look.remarks:
+        listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look

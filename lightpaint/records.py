@@ -7,6 +7,8 @@ from dataclasses import MISSING, asdict, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
+from lightpaint.screen import some_names
+
 #: Longest text that is read, in characters.
 MAX_CHARACTERS = 2**20
 
@@ -41,7 +43,7 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     # JSON itself would silently keep the last of two of one name.
     found = dict(pairs)
     if len(found) < len(pairs):
-        raise ValueError(f"a name stands twice among {', '.join(key for key, _ in pairs)}")
+        raise ValueError(f"a name stands twice among {some_names(key for key, _ in pairs)}")
     return found
 
 

@@ -3,6 +3,7 @@
 from lightpaint.basis.render.render import memory_needed, why_not_one_pass
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
@@ -15,8 +16,10 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     remarks = []
     if scene.lights_file is not None:
         remarks.append(f"lights and groups as in {scene.lights_file}")
+    if scene.instead is not None:
+        remarks.append(f"rendered by {scene.instead}, not by the scene's own integrator")
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
-        remarks.append(f"left as it is: {'; '.join(obstacles)}")
+        remarks.append(f"left as it is: {some_names(obstacles, '; ')}")
     # Python gets the same as a warning.
     if note := use_variant().note:
         remarks.append(note)

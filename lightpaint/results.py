@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import ImageError, OutputError, SceneError
-from lightpaint.files import one_line, write_bytes, write_text
+from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.analysis.analyse import Analysis
@@ -22,11 +22,13 @@ from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
+from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
@@ -100,6 +102,11 @@ class Look:
         return self.analysis.diagnosis
 
     @property
+    def remarks(self) -> list[str]:
+        """What a person should know of emitters in view: painted pixels that do not count."""
+        return emitters_in_view(self.target, self.solution, self.predicted)
+
+    @property
     def lighting(self) -> Lighting:
         """The lighting that comes closest to the target."""
         return self.solution.lighting
@@ -126,10 +133,12 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     """
     names = [scene.sensor_names[scene.sensor] for scene in scenes]
     if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {', '.join(names)}; give each sensor once")
+        raise SceneError(f"a view is painted twice: {some_names(names)}; give each sensor once")
     for name in names:
-        if Path(name).name != name or name in ("..", ""):
-            raise SceneError(f"the sensor id {name!r} cannot name a folder: choose another id")
+        if not is_name(name):
+            raise SceneError(
+                f"the sensor id {one_line(repr(name))} cannot name a folder: choose another id"
+            )
     return names
 
 
@@ -138,7 +147,7 @@ def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -
     write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
 
 
-def write_report(look: Look, folder: Path, *, command: str) -> None:
+def write_report(folder: Path, look: Look, *, command: str) -> None:
     """Write the pictures people look at: comparison.png and report.html."""
     verified = look.verification.verified.image if look.verification else None
     sheet = comparison_image(

@@ -1,14 +1,36 @@
-"""What is shown of something long: a repr of no more than one screen, a page in a notebook."""
+"""What is shown of something long or strange: reprs of one screen, lists cut, notebooks' pages."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
-#: Characters that are shown of a list, at most.
-ROOM = 800
+#: Characters that are shown of a list, at most; and of one in a message.
+ROOM, ROOM_IN_MESSAGE = 800, 300
+
+#: What does not show itself: it steers a terminal, ends the line, or turns the order of what
+#: follows. (What only joins letters, as in Persian names or in emoji, is left alone.)
+_UNSEEN = re.compile(
+    "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f"
+    "\ufeff\ufff9-\ufffb\U000e0000-\U000e007f\ud800-\udfff]"
+)
 
 _Item = TypeVar("_Item")
+
+
+def visible(text: str) -> str:
+    r"""`text` in one line, with what does not show itself as Python writes it, like `\x1b`."""
+    return _UNSEEN.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def some_names(names: Iterable[str], joint: str = ", ") -> str:
+    """Names as they stand in a message: as many as fit, and how many more there are."""
+    return some_of([_shortened(visible(name)) for name in names], joint, ROOM_IN_MESSAGE)
+
+
+def _shortened(name: str) -> str:
+    return name if len(name) <= ROOM_IN_MESSAGE // 2 else f"{name[: ROOM_IN_MESSAGE // 2]}…"
 
 
 def some_of(texts: Sequence[str], joint: str = ", ", room: int = ROOM) -> str:

@@ -28,6 +28,7 @@ class Settings(Fit):
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
         transform: The display meant by `space`; None for that of the painting or, where it holds
             light, sRGB at an exposure that shows something.
+        emitters: Whether pixels in which the camera sees an emitter count, as of `Fit`.
         resize: Whether a target of another size is resampled.
         spp: Samples per pixel of the basis and of the verification.
         time_s: Instead of spp, seconds in which the basis is rendered, of all views together.

@@ -18,6 +18,7 @@ from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints, Tie
 from lightpaint.records import strict_json
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.target.read import Paint, read_target
 from lightpaint.target.target import Target
@@ -39,6 +40,7 @@ class SceneFile:
         groups: Emitters that are one light, by its name.
         lights_file: TOML to read instead of the one beside the scene.
         use_lights_file: False leaves that one alone.
+        integrator: To render with instead of the scene's own.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -53,6 +55,7 @@ class SceneFile:
     groups: Mapping[str, Sequence[str]] | None = None
     lights_file: str | None = None
     use_lights_file: bool = True
+    integrator: str | None = None
 
     @cached_property
     def content(self) -> Scene:
@@ -142,7 +145,7 @@ def check_needed(given: Iterable[str], basis: Any) -> None:
     if isinstance(basis, LightGroups | GroupsFile):
         raise BasisError(
             f"{', '.join(idle)} cannot be used with {basis.path}: its light groups are rendered "
-            "already, and say nothing of samples, noise or units; leave it out"
+            "already, and say nothing of samples, noise, units or emitters in view; leave it out"
         )
     raise BasisError(
         f"{', '.join(idle)} cannot change a saved basis: leave "
@@ -185,7 +188,7 @@ def from_json(text: str) -> dict[str, Any]:
         if (form := data.pop("format")) != FORMAT:
             raise ValueError(f"its format is {form!r}, not {FORMAT!r}")
         if unknown := set(data) - set(FIELDS):
-            raise ValueError(f"it has the keys {', '.join(sorted(unknown))}")
+            raise ValueError(f"it has the keys {some_names(sorted(unknown))}")
         settings, constraints = data["settings"], data["constraints"]
         transform = settings["transform"] and ViewTransform(**settings["transform"])
         return {

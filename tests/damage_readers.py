@@ -128,7 +128,8 @@ def contents_of_json(data: Any) -> Any:
                 *(light["emission"], light["weight"], light.get("members", [name])),
                 *(light.get("is_fixed", False), light.get("unit_flux"), constraint),
                 light.get("is_active", False) if constraint else False,
-                light.get("standard_error"),
+                *(light.get(k) for k in ("standard_error", "interval")),
+                light.get("reached", [True] * 3),
             )
         )
     solve = data.get("solve")

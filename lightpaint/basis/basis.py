@@ -1,6 +1,5 @@
 """The basis: one image per light at unit emission."""
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,8 +10,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
+from lightpaint.expected import BRIGHTEST, is_amount
 from lightpaint.scene.lights_file import Asked
-from lightpaint.screen import Listed, Shown, some_of
+from lightpaint.screen import Listed, Shown, some_names, some_of
 from lightpaint.version import __version__
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -53,15 +53,15 @@ class BasisLight:
             object.__setattr__(self, "members", (self.name,))
         if self.is_fixed and self.emission != (1, 1, 1):
             raise BasisError(f"light {self.name!r} is kept, and its emission is not 1")
-        if not all(math.isfinite(v) and v >= 0 for v in self.emission):
+        if not all(map(is_amount, self.emission)):
             raise BasisError(
-                f"light {self.name!r} has the emission {list(self.emission)}: "
-                "need three numbers >= 0"
+                f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}"
             )
-        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
+        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
             raise BasisError(
-                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: "
-                "need three numbers >= 0"
+                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: need "
+                f"three numbers from 0 to {BRIGHTEST:g}"
             )
 
     def __repr__(self) -> str:
@@ -78,6 +78,7 @@ class Origin:
     halves: samples per pixel of each of the two halves; passes: how many passes made them.
     each_light: where an interrupt left the lights of separate renders unequal, samples of half
     A and B and passes of A and B of each; `halves` and `passes` are then what all have at least.
+    integrator: what was put in the place of the scene's own; "" where it rendered with that.
     """
 
     scene: str
@@ -89,6 +90,7 @@ class Origin:
     passes: tuple[int, int]
     lightpaint: str = __version__
     each_light: tuple[tuple[int, int, int, int], ...] = ()
+    integrator: str = ""
 
     def __post_init__(self) -> None:
         if max(max(own) for own in (self.halves, self.passes, *self.each_light)) > MAX_SAMPLES:
@@ -143,7 +145,7 @@ class Basis(Shown):
         if self.emitters_seen.shape != self.size:
             raise BasisError("the mask of seen emitters has another size than the images")
         if len(set(self.names)) != n:
-            raise BasisError(f"light names repeat: {', '.join(self.names)}")
+            raise BasisError(f"light names repeat: {some_names(self.names)}")
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 
@@ -161,7 +163,7 @@ class Basis(Shown):
     def image(self, name: str) -> Floats:
         """The image of the light called `name`, (h, w, 3). Raises BasisError if there is none."""
         if name not in self.names:
-            raise BasisError(f"no light {name!r} in the basis: it has {', '.join(self.names)}")
+            raise BasisError(f"no light {name!r} in the basis: it has {some_names(self.names)}")
         return np.asarray(self.images[self.names.index(name)])
 
     def asking(self, asked: Asked) -> "Basis":

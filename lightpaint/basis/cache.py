@@ -9,8 +9,10 @@ import hashlib
 import os
 import shutil
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from platformdirs import user_cache_path
@@ -107,12 +109,32 @@ def entries() -> list[Entry]:
     return [_entry(path) for path in files]
 
 
-def clear() -> int:
-    """Delete all that is kept. Returns how many bases that were."""
-    kept = entries()
+def named(pattern: str) -> list[Entry]:
+    """What is kept of a scene, or in a file, of that name; `*` stands for anything.
+
+    A scene goes by the name of its file, with or without its ending.
+    """
+    return [entry for entry in entries() if any(fnmatchcase(x, pattern) for x in _names(entry))]
+
+
+def drop(kept: Iterable[Entry]) -> int:
+    """Delete these. Returns how many bytes that freed."""
+    freed = 0
     for entry in kept:
-        entry.path.unlink(missing_ok=True)
-    return len(kept)
+        try:
+            entry.path.unlink(missing_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
+        freed += entry.size
+    return freed
+
+
+def _names(entry: Entry) -> set[str]:
+    file = entry.path.name
+    names = {file, file.removesuffix(SUFFIX)}
+    if entry.origin is not None:
+        names |= {entry.origin.scene, Path(entry.origin.scene).stem}
+    return names
 
 
 def _path(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Path:

@@ -59,8 +59,8 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         learned = dict(zip(("received", "asked"), basis.learned, strict=True))
         # A table and no picture; the format wants one display window for all parts.
         parts.append(Part(free_name(LEARNED, basis.names), learned, display=basis.size))
-    # Without `each_light` as in files from before there was any.
-    of_origin = json.dumps(fields_of(basis.origin, "each_light"), ensure_ascii=False)
+    # Without `each_light` and `integrator` as in files from before there was any.
+    of_origin = json.dumps(fields_of(basis.origin, "each_light", "integrator"), ensure_ascii=False)
     checksums = Checksums(
         sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
     )

@@ -8,9 +8,11 @@ a disagreement; 2: something the user can mend, said in one line; 130: interrupt
 import io
 import os
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
 
+from lightpaint.cli import lines
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
 from lightpaint.errors import LightpaintError
@@ -39,9 +41,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         warnings.simplefilter("ignore", SlowBackendWarning)
         return int(getattr(commands, options.command)(**values_of(options, given)))
     except LightpaintError as error:
-        print(f"lightpaint {options.command}: {spoken(str(error))}", file=sys.stderr)
+        lines.err(f"lightpaint {options.command}: {spoken(str(error))}")
         return 2
     except KeyboardInterrupt as interrupt:
         how_to_go_on = f": {interrupt}" if str(interrupt) else ""
-        print(f"lightpaint {options.command}: interrupted{how_to_go_on}", file=sys.stderr)
+        lines.err(f"lightpaint {options.command}: interrupted{how_to_go_on}")
         return 130
+    except Exception:
+        # A mistake of lightpaint's own, told whole; its text may repeat what a file says.
+        for line in traceback.format_exc().splitlines():
+            lines.err(line)
+        return 1

@@ -3,6 +3,8 @@
 import argparse
 from typing import Any
 
+from lightpaint.expected import BRIGHTEST
+
 
 def key_value(text: str) -> tuple[str, str]:
     """A parameter of the scene, `key=value`."""
@@ -121,7 +123,10 @@ class at_least:  # noqa: N801 (used as a function)
 
 
 class number:  # noqa: N801 (used as a function)
-    """A finite number > 0, or >= 0. about: what it is a number of, with a space before."""
+    """A number > 0, or >= 0, of no more than can be computed with.
+
+    about: what it is a number of, with a space before.
+    """
 
     def __init__(self, about: str = "", *, may_be_zero: bool = False) -> None:
         self.about, self.may_be_zero = about, may_be_zero
@@ -131,7 +136,9 @@ class number:  # noqa: N801 (used as a function)
             value = float(text)
         except ValueError:
             value = -1.0
-        if not (0 < value < float("inf") or (self.may_be_zero and value == 0)):
+        if not (0 < value <= BRIGHTEST or (self.may_be_zero and value == 0)):
             bound = ">= 0" if self.may_be_zero else "> 0"
+            if value > BRIGHTEST:
+                bound = f"<= {BRIGHTEST:g}"
             raise argparse.ArgumentTypeError(f"{text!r} is not a number{self.about} {bound}")
         return value

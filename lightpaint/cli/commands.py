@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
-
 from lightpaint.basis import cache as bases
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import tables, terminal
@@ -16,7 +14,7 @@ from lightpaint.cli.doctor import examine
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
-from lightpaint.errors import OutputError
+from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
@@ -29,6 +27,7 @@ from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
 from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
@@ -43,7 +42,8 @@ def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int
         listed = [tables.described(light, cd_per_unit) for light in loaded.lights]
         scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
         data = {"scene": str(loaded.path), **scale, "lights": listed}
-        terminal.write(json.dumps(data, indent=2))
+        # All but ASCII is escaped by it, and of that one character is not seen.
+        terminal.write_lines(json.dumps(data, indent=2).replace("\x7f", "\\u007f"))
         return 0
     tables.show_lights(loaded, cd_per_unit)
     return 0
@@ -125,7 +125,8 @@ def solve(*, jobs: Sequence[Job]) -> int:
         obtained = [look.basis for look in looks]
         for view, look in zip(job.views, looks, strict=True):
             if job.by_sensor:
-                terminal.write(f"\n{look.basis.origin.sensor}:")
+                terminal.write("")
+                terminal.write(f"{look.basis.origin.sensor}:")
             tables.show_look(look, view.folder)
             if look.suggestions is not None:
                 tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
@@ -170,22 +171,40 @@ def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) 
     return 0 if agree else 1
 
 
-def cache(*, action: str) -> int:
-    """`lightpaint cache [clear]`"""
-    if action == "clear":
-        terminal.write(f"{bases.clear()} deleted from {bases.folder()}")
+def cache(*, action: str, names: Sequence[str]) -> int:
+    """`lightpaint cache [list | drop NAME... | clear]`"""
+    if action != "drop" and names:
+        raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
+    if action == "list":
+        kept = bases.entries()
+        tables.show_kept(kept)
+        size = sum(entry.size for entry in kept) / 1e6
+        terminal.write(
+            f"kept in {bases.folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB"
+        )
         return 0
-    table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
-    for entry in reversed(bases.entries()):
-        known, about = entry.origin, ["?"] * 6
-        if known is not None and entry.image_size is not None:
-            height, width = entry.image_size
-            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
-            about += [str(known.spp), str(known.seed)]
-        table.add_row(*map(escape, about), f"{entry.size / 1e6:.0f}", escape(entry.path.name))
-    terminal.print_table(table)
-    terminal.write(f"kept in {bases.folder()}")
+    dropped = bases.entries() if action == "clear" else _kept_by_names(names)
+    freed = bases.drop(dropped)
+    if action == "drop":
+        tables.show_kept(dropped)
+    terminal.write(f"{len(dropped)} deleted from {bases.folder()}: {freed / 1e6:.1f} MB are free")
     return 0
+
+
+def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
+    """The bases that are meant, each once. Raises BasisError for a name of none."""
+    if not names:
+        raise BasisError(
+            "cache drop needs the name of a scene or of a file, as cache list shows it"
+        )
+    found: dict[Path, bases.Entry] = {}
+    for name in names:
+        if not (its := bases.named(name)):
+            scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
+            there = some_names(sorted(scenes)) or "none"
+            raise BasisError(f"no basis of {name!r} is kept in {bases.folder()}: it has {there}")
+        found |= {entry.path: entry for entry in its}
+    return list(found.values())
 
 
 def doctor(*, variant: str | None) -> int:

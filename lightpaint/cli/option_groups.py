@@ -25,6 +25,13 @@ def add_view(parser: argparse.ArgumentParser) -> None:
         metavar="key=value",
         help="set a $parameter of the scene; may be repeated",
     )
+    parser.add_argument(
+        "--integrator",
+        metavar="PLUGIN",
+        help="integrator to render with instead of the scene's own, which Mitsuba may lack: path, "
+        "direct, or with options path:max_depth=8; what the scene says of max_depth, rr_depth "
+        "and hide_emitters stays (default: the scene's)",
+    )
     add_variant(parser)
 
 

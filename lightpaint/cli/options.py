@@ -16,14 +16,16 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
+from lightpaint.files import is_name, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 
 #: Options that say how a scene is loaded, by the names that Python has for them.
-LOADING = ("sensor", "parameters", "variant", "lights", "groups")
+LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
 
 
 def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
@@ -61,7 +63,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             folders = list(map(Path, options.folders))
             return {"folders": folders, "variant": options.variant, "settings": settings}
         case "cache":
-            return {"action": options.action}
+            return {"action": options.action, "names": options.names}
         case _:
             return {"variant": options.variant}
 
@@ -90,6 +92,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
             "use_lights_file": options.use_lights_file,
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **how}
+    loading["integrator"] = options.integrator
     return SceneFile(path, parameters=dict(options.parameters), **loading)
 
 
@@ -227,13 +230,14 @@ def constraints_of(options: Namespace) -> Constraints:
 
 def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
     """One result folder per name: DIR itself for a single one, DIR/<name> for several."""
+    if output is not None and len(names) == 1:
+        return [output]
     for name in names:
-        if Path(name).name != name or name == "..":
-            raise OutputError(f"{name!r} is no name for a folder: choose one with -o")
-    if len(names) == 1:
-        return [output or Path(names[0])]
+        if not is_name(name):
+            how = "choose one with -o" if len(names) == 1 else "take it alone, with -o"
+            raise OutputError(f"{one_line(repr(name))} is no name for a folder: {how}")
     if len(set(names)) < len(names):
-        raise OutputError(f"results would overwrite each other: {', '.join(names)}")
+        raise OutputError(f"results would overwrite each other: {some_names(names)}")
     return [(output or Path()) / name for name in names]
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Callable
-from typing import NoReturn
 
 from lightpaint.cli.option_groups import (
     add_budget,
@@ -18,25 +17,21 @@ from lightpaint.cli.option_groups import (
     add_view,
     add_view_transform,
 )
+from lightpaint.cli.order import CommandParser, Parser
 from lightpaint.cli.solve_options import add_constraints, add_method, add_paintings
 from lightpaint.version import __version__
 
 
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
-
-
 def command_parser() -> argparse.ArgumentParser:
     """The parser of all commands."""
-    parser = _Parser(
+    parser = Parser(
         prog="lightpaint",
         description="Paint how a scene should look; get the lighting that comes closest.",
     )
     parser.add_argument("--version", action="version", version=f"lightpaint {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(
+        dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
+    )
     for name, (about, add_options) in _COMMANDS.items():
         add_options(
             commands.add_parser(name, help=about, description=about[0].upper() + about[1:] + ".")
@@ -119,9 +114,15 @@ def _cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "action",
         nargs="?",
-        choices=("list", "clear"),
+        choices=("list", "drop", "clear"),
         default="list",
-        help="what to do (default: %(default)s)",
+        help="list them, drop those of NAME, or clear all (default: %(default)s)",
+    )
+    parser.add_argument(
+        "names",
+        metavar="NAME",
+        nargs="*",
+        help="scene, or file, of the bases to drop, as list shows them; may be a pattern, 'hall*'",
     )
 
 

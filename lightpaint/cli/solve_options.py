@@ -91,6 +91,14 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         help="instead of --hold: weight of each pixel that is not painted (default: %(default)s)",
     )
     parser.add_argument(
+        "--emitters",
+        choices=("auto", "count", "skip"),
+        default="auto",
+        help="whether painted pixels in which the camera sees an emitter count; auto: where alpha, "
+        "mask or template say that they were painted; count: always, which holds the emitters "
+        "themselves to how bright they were painted; skip: never (default: %(default)s)",
+    )
+    parser.add_argument(
         "--resize", action="store_true", help="resample a target of another size (default: refuse)"
     )
     parser.add_argument(

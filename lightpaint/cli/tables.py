@@ -4,18 +4,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from rich.markup import escape
-
+from lightpaint.basis.cache import Entry
 from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.sentences import (
     how_sure,
-    relative_errors,
-    spoken_error,
+    partly_reached,
+    spoken_errors,
     spoken_percent,
+    unreached_channels,
     what_is_missed,
 )
 from lightpaint.report.suggestion import spoken_position, spoken_suggestions
@@ -25,6 +24,7 @@ from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
@@ -40,8 +40,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
             whole = _photometry(light, cd_per_unit)
-            table.add_row(
-                escape(light.name),
+            table.row(
+                light.name,
                 light.plugin,
                 what,
                 unit,
@@ -52,8 +52,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             )
         for member in light.members:
             its = _photometry(member, cd_per_unit)
-            table.add_row(
-                escape(member.name if single else f"  {member.name}"),
+            table.row(
+                member.name if single else f"  {member.name}",
                 member.plugin,
                 terminal.numbers(member.emission),
                 member.kind.unit if member.kind is not None else MULTIPLE,
@@ -121,6 +121,8 @@ def show_look(look: Look, folder: Path) -> None:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
     _say_unreached(look)
+    for channels in partly_reached(look.lighting):
+        terminal.say(channels)
     for ambiguity in look.analysis.ambiguities:
         terminal.say(ambiguity.sentence)
     if not certificate.converged:
@@ -137,10 +139,10 @@ def _say_unreached(look: Look) -> None:
     unreached = look.solution.certificate.unreached
     dark = [name for name in unreached if not look.basis.image(name).any()]
     if dark:
-        terminal.say(f"the picture holds nothing of {', '.join(dark)}: kept as it is")
+        terminal.say(f"the picture holds nothing of {some_names(dark)}: kept as it is")
     if seen := [name for name in unreached if name not in dark]:
         terminal.say(
-            f"no painted pixel sees {', '.join(seen)}: kept as it is; "
+            f"no painted pixel sees {some_names(seen)}: kept as it is; "
             "paint where it shines, or pass --unpainted"
         )
 
@@ -153,24 +155,38 @@ def _show_solved(look: Look) -> None:
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
     asked = ["asked (* holds it)"] if held else []
     table = terminal.table(*headings, *amounts, *asked)
-    errors = relative_errors(look.uncertainty) if look.uncertainty else np.zeros(len(shares))
+    errors = spoken_errors(look.uncertainty, len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         solved = "off" if not any(light.emission) else terminal.numbers(light.emission)
-        if light.name in look.solution.certificate.unreached and any(light.emission):
-            solved += " (kept)"
+        if not all(light.reached) and any(light.emission):
+            kept = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
+            solved += f" ({kept})"
         seen = look.lighting.photometry(light)
-        table.add_row(
-            escape(light.name),
+        table.row(
+            light.name,
             light.plugin,
             "" if light.is_fixed else terminal.numbers(now.emission),
             "kept" if light.is_fixed else solved,
-            spoken_error(light, float(errors[k])),
+            errors[k],
             "" if light.is_fixed else light.unit,
             f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else seen.color,
             *seen.amounts[: len(amounts)],
-            *([escape(light.constraint) + "*" * light.is_active] if held else []),
+            *([light.constraint + "*" * light.is_active] if held else []),
         )
+    terminal.print_table(table)
+
+
+def show_kept(entries: Sequence[Entry]) -> None:
+    """Print a row for each basis in the cache, the last used first."""
+    table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
+    for entry in reversed(entries):
+        known, about = entry.origin, ["?"] * 6
+        if known is not None and entry.image_size is not None:
+            height, width = entry.image_size
+            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
+            about += [str(known.spp), str(known.seed)]
+        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
     terminal.print_table(table)
 
 
@@ -195,7 +211,7 @@ def show_suggestions(
     table = terminal.table(*headings, *amounts)
     for light in suggestions:
         seen = light.photometry(cd_per_unit)
-        table.add_row(
+        table.row(
             light.name,
             spoken_position(light),
             terminal.numbers(light.emission),
@@ -208,4 +224,4 @@ def show_suggestions(
     terminal.print_table(table)
     terminal.write("to be pasted into <scene>, and solved again:")
     for light in suggestions:
-        terminal.write(light.xml)
+        terminal.write_lines(light.xml)

@@ -1,7 +1,6 @@
 """How the command line speaks: tables to stdout, progress and remarks to stderr."""
 
 import io
-import os
 import sys
 
 from rich.console import Console
@@ -14,9 +13,11 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 from rich.table import Table
+from rich.text import Text
 
+from lightpaint.cli import lines
 from lightpaint.cli.words import spoken
-from lightpaint.errors import OutputError
+from lightpaint.screen import visible
 
 
 def numbers(rgb: tuple[float, float, float]) -> str:
@@ -24,37 +25,44 @@ def numbers(rgb: tuple[float, float, float]) -> str:
     return " ".join(f"{v:.3g}" for v in rgb)
 
 
-def table(*columns: str) -> Table:
+class Rows(Table):
+    """A table whose cells are text as it stands, without markup."""
+
+    def row(self, *cells: str) -> None:
+        """Add a row."""
+        self.add_row(*(Text(visible(cell)) for cell in cells))
+
+
+def table(*columns: str) -> Rows:
     """An empty table with these headings."""
-    made = Table(box=None, pad_edge=False, header_style="bold")
+    made = Rows(box=None, pad_edge=False, header_style="bold")
     for column in columns:
         made.add_column(column, no_wrap=True)
     return made
 
 
-def print_table(made: Table) -> None:
+def print_table(made: Rows) -> None:
     """Print to stdout. Piped output has no width: nothing in it is cut."""
     width = None if sys.stdout.isatty() else 1000
     page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
     page.print(made)
-    text = page.file.getvalue()  # type: ignore[attr-defined]
-    write("\n".join(line.rstrip() for line in text.splitlines()))
+    write_lines(page.file.getvalue())  # type: ignore[attr-defined]
 
 
 def write(text: str) -> None:
-    """A line of results, to stdout. Work goes on if whoever read them has left (`| head`)."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise OutputError(f"cannot write to standard output: {error.strerror}") from error
+    """A line of results, to stdout."""
+    lines.out(text)
+
+
+def write_lines(text: str) -> None:
+    """Several lines of results, to stdout."""
+    for line in text.rstrip().split("\n"):
+        lines.out(line.rstrip())
 
 
 def say(text: str) -> None:
     """A remark, to stderr."""
-    print(f"lightpaint: {spoken(text)}", file=sys.stderr)
+    lines.err(f"lightpaint: {spoken(text)}")
 
 
 class Listener:
@@ -72,7 +80,7 @@ class Listener:
     def __enter__(self) -> "Listener":
         if sys.stderr.isatty():
             columns = (
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 MofNCompleteColumn(),
                 TimeElapsedColumn(),
@@ -90,11 +98,11 @@ class Listener:
         """Show that `done` of `total` pieces of the work `label` are finished."""
         if self._bars is None:
             if done == 0:
-                print(f"{label}: {total} {unit}", file=sys.stderr, flush=True)
+                lines.err(f"{label}: {total} {unit}")
             return
         if label not in self._tasks:
             what = label if unit == "passes" else f"{label} ({unit})"
-            self._tasks[label] = self._bars.add_task(what, total=total)
+            self._tasks[label] = self._bars.add_task(visible(what), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
 
     def say(self, text: str) -> None:
@@ -105,4 +113,4 @@ class Listener:
         if self._bars is None:
             say(text)
             return
-        self._bars.console.out(f"lightpaint: {spoken(text)}", highlight=False)
+        self._bars.console.out(lines.cut(f"lightpaint: {spoken(text)}"), highlight=False)

@@ -6,8 +6,10 @@ import re
 OPTIONS = {
     "cd_per_unit": "--unit",
     "colors": "--colors",
+    "emitters": "--emitters",
     "groups": "--group",
     "hold": "--hold",
+    "integrator": "--integrator",
     "layer": "--layer",
     "lights": "--lights",
     "literal": "--literal",

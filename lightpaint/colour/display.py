@@ -9,6 +9,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 
+#: Beyond this many stops an exposure is a slip of the pen.
+MAX_STOPS = 64.0
+
 
 def choose_exposure(image: Floats) -> float:
     """Exposure in stops at which to show a linear image.
@@ -19,7 +22,7 @@ def choose_exposure(image: Floats) -> float:
     bright = float(np.percentile(image.max(axis=-1), 99))
     if bright <= 0 or 0.125 <= bright <= 8:
         return 0.0
-    return float(np.round(-np.log2(bright), 1))
+    return float(np.clip(np.round(-np.log2(bright), 1), -MAX_STOPS, MAX_STOPS))
 
 
 def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:

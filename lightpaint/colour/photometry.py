@@ -10,7 +10,7 @@ and a flux of Φ watts is u Y(Φ) lm. Without u there are numbers in proportion,
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,10 @@ class Photometry:
         """`#ffaa66 2856 K`, as far as there is one; "" if there is none."""
         kelvin = "" if self.kelvin is None else f"{self.kelvin:.0f} K"
         return " ".join(filter(None, (self.hex, kelvin)))
+
+    def without_colour(self) -> "Photometry":
+        """The same of a light whose colour nobody knows."""
+        return replace(self, hex=None, kelvin=None, duv=None)
 
     @property
     def amounts(self) -> tuple[str, str]:

@@ -21,10 +21,8 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.curves import BUILT_IN, Curve
+from lightpaint.colour.display import MAX_STOPS
 from lightpaint.errors import ViewError
-
-#: Beyond this many stops an exposure is a slip of the pen.
-MAX_STOPS = 64.0
 
 
 class Encoding(Protocol):

@@ -13,6 +13,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.errors import ViewError
 from lightpaint.files import first_line
+from lightpaint.screen import some_names
 
 #: Linear Rec.709 as OpenColorIO's built-in configurations call it, and as others do.
 LINEAR_REC709 = (
@@ -131,11 +132,11 @@ def _named(display_and_view: str, config: Any) -> tuple[str, str]:
             if view in views:
                 return display, view
             raise ViewError(
-                f"display {display!r} has no view {view!r}: it has {', '.join(views) or 'none'}"
+                f"display {display!r} has no view {view!r}: it has {some_names(views) or 'none'}"
             )
     raise ViewError(
         f"no view ocio:{display_and_view}: expected ocio:DISPLAY/VIEW, with a display of "
-        f"{', '.join(displays) or 'which the configuration has none'}"
+        f"{some_names(displays) or 'which the configuration has none'}"
     )
 
 

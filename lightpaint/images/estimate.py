@@ -10,7 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
-from lightpaint.screen import shortly
+from lightpaint.screen import shortly, some_names
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"
@@ -91,7 +91,7 @@ def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
     parts = read_parts(path)
     if len(parts) > 1:
         raise ImageError(
-            f"{path} has {len(parts)} parts ({', '.join(p.name for p in parts)}) instead of one: "
+            f"{path} has {len(parts)} parts ({some_names(p.name for p in parts)}) instead of one: "
             "give an image that lightpaint rendered"
         )
     [part] = parts

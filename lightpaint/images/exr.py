@@ -20,6 +20,7 @@ from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import first_line, replacing
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.silence import silenced
+from lightpaint.screen import some_names
 from lightpaint.version import __version__
 
 #: How the names of lightpaint's own text attributes begin, and the one that every file of its has.
@@ -84,13 +85,14 @@ class Part:
         if missing:
             raise ImageError(
                 f"no channel {', '.join(missing)} in part {self.name!r}, "
-                f"which has {', '.join(self.channels)}"
+                f"which has {some_names(self.channels)}"
             )
         return np.stack([self.channels[n] for n in names], axis=-1).astype(np.float32, copy=False)
 
 
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
     """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
+    head_of(path, 16)  # OpenEXR itself would wait for ever at what never answers
     with silenced():
         headers = [header for _, header in _declared(path)]
         return [_texts(header) for header in headers], _windows(headers[0])[0]

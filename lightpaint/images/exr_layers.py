@@ -18,6 +18,7 @@ from lightpaint.colour.primaries import (
 )
 from lightpaint.errors import ImageError
 from lightpaint.images.exr import Part
+from lightpaint.screen import some_names
 
 #: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
 KRITA_LAYERS = "krita_layers_info"
@@ -94,7 +95,7 @@ def linear_rgb(part: Part, layer: str = "") -> Floats:
     if luminance is None:
         raise ImageError(
             f"no channel {', '.join(_joined(layer, c) for c in 'RGB')} or {_joined(layer, 'Y')} "
-            f"in part {part.name!r}, which has {', '.join(part.channels)}"
+            f"in part {part.name!r}, which has {some_names(part.channels)}"
         )
     luminance = luminance.astype(np.float32, copy=False)
     chroma = [part.channels.get(_joined(layer, name)) for name in ("RY", "BY")]
@@ -126,7 +127,7 @@ def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
     if not layers:
         channels = dict.fromkeys(name for part in parts for name in part.channels)
         raise ImageError(
-            f"is not an RGB image: no channels R, G, B or Y; it has {', '.join(channels)}"
+            f"is not an RGB image: no channels R, G, B or Y; it has {some_names(channels)}"
         )
     if wanted is None:
         if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
@@ -152,7 +153,7 @@ def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
 
 
 def _names(layers: Sequence[Layer]) -> str:
-    return ", ".join(layer.name or "one without a name" for layer in layers)
+    return some_names(layer.name or "one without a name" for layer in layers)
 
 
 def _layer_name(part: Part, prefix: str, *, several: bool) -> str:

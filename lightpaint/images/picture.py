@@ -16,6 +16,7 @@ from lightpaint.images.exr import Part, read_parts
 from lightpaint.images.exr_layers import ALPHA_NAMES, Layer, choose_layer
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.layered import LAYERED, layered_kind, read_merged
+from lightpaint.screen import some_names
 
 Mask = npt.NDArray[np.bool_]
 
@@ -104,14 +105,14 @@ def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
         parts = read_parts(path)
         if len(parts) > 1:
             raise ImageError(
-                f"has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of them "
+                f"has {len(parts)} parts ({some_names(p.name for p in parts)}), and which of them "
                 "is the mask cannot be told: export a single image"
             )
         part = parts[0].in_display_window()
         for name in ("Y", "W", "A", "R"):
             if name in part.channels:
                 return part.channels[name].astype(np.float32)
-        raise ImageError(f"has none of the channels Y, W, A, R: it has {', '.join(part.channels)}")
+        raise ImageError(f"has none of the channels Y, W, A, R: it has {some_names(part.channels)}")
     except ImageError as error:
         raise ImageError(f"mask {_naming(path, error)}") from error
     except OSError as error:

@@ -8,7 +8,9 @@ from typing import Any
 
 from lightpaint.errors import LightingError
 from lightpaint.files import one_line, read_text, write_text
-from lightpaint.lighting.lighting import Certificate, Lighting, LightSetting
+from lightpaint.lighting.certificate import Certificate
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.records import fields_of, read_record, strict_json
 from lightpaint.version import __version__
 
@@ -18,7 +20,7 @@ FORMAT = "lightpaint-lighting 1"
 READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
 
 #: Fields of a certificate that say how the lighting was found, where it is not the paper's way.
-FIT = ("display", "rounds", "hold", "colors", "noise_removed")
+FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software")
 
 
 def write_lighting(path: str | Path, lighting: Lighting) -> None:
@@ -103,8 +105,12 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
 def _ties(light: LightSetting) -> dict[str, Any]:
     """What the file says of a light only where it does not go without saying."""
     ties: dict[str, Any] = {}
+    if light.reached != ALL_REACHED:
+        ties["reached"] = light.reached
     if light.standard_error is not None:
         ties["standard_error"] = light.standard_error
+    if light.interval is not None:
+        ties["interval"] = light.interval
     if light.is_fixed:
         ties["is_fixed"] = True
     if light.members != (light.name,):

@@ -23,6 +23,10 @@ HOLD = 0.3
 
 F = TypeVar("F", bound="Fit")
 
+#: Whether pixels count in which the camera sees an emitter: where somebody said what was painted
+#: (by alpha, mask or template), wherever they are painted, or never.
+Emitters = Literal["auto", "count", "skip"]
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -46,6 +50,9 @@ class Fit:
             converged.
         transform: The view transform through which the two are compared in `display`; None for that
             of the painting or, where it holds light, sRGB at an exposure that shows something.
+        emitters: Whether pixels in which the camera sees an emitter count: `auto`, where somebody
+            said what was painted; `count`, always, which holds the emitters themselves to how
+            bright they are painted; `skip`, never.
 
     Raises:
         LightpaintError: For a value that means nothing.
@@ -62,6 +69,7 @@ class Fit:
     literal: bool = False
     method: Method = "polished"
     transform: ViewTransform | None = None
+    emitters: Emitters = "auto"
 
     expected: ClassVar[Mapping[str, Check]] = {
         "space": one_of(Space),
@@ -71,6 +79,7 @@ class Fit:
         "literal": SWITCH,
         "method": one_of(Method),
         "transform": a(ViewTransform, "a ViewTransform, like ViewTransform('agx', 1.0)"),
+        "emitters": one_of(Emitters),
     }
 
     def __post_init__(self) -> None:

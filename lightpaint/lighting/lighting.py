@@ -1,147 +1,27 @@
 """The answer: named lights with their emissions."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from lightpaint.arrays import RGB, Doubles, as_rgb
+from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis, BasisLight, mix
 from lightpaint.colour.photometry import Photometry, photometry
-from lightpaint.errors import LightingError
+from lightpaint.errors import LightingError, UnknownLightError
+from lightpaint.expected import BRIGHTEST
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.bound import Bound
-from lightpaint.screen import Shown, shortly, some_of
+from lightpaint.lighting.certificate import Certificate
+from lightpaint.lighting.setting import ALL_REACHED, LightSetting
+from lightpaint.screen import Shown, some_names, some_of
 
 
 @dataclass(frozen=True)
-class LightSetting:
-    """One light of a lighting.
-
-    emission: linear RGB in `unit`, the parameter's own unit in Mitsuba.
-    weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
-    is_fixed: whether it is what stays as it is in the scene, with weight 1.
-    members: names of the emitters it consists of; itself if none are given.
-    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
-    constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
-    whether that held it back from what the painting asks for.
-    standard_error: of the emission, from the noise it was solved with, where that is known.
-    """
-
-    name: str
-    plugin: str
-    parameter: str
-    unit: str
-    emission: RGB
-    weight: RGB
-    is_fixed: bool = False
-    members: tuple[str, ...] = ()
-    unit_flux: RGB | None = None
-    constraint: str = ""
-    is_active: bool = False
-    standard_error: RGB | None = None
-
-    def __post_init__(self) -> None:
-        if not self.members:
-            object.__setattr__(self, "members", (self.name,))
-        given = {"emission": self.emission, "weight": self.weight}
-        if self.standard_error is not None and not self.is_fixed:
-            given["standard error"] = self.standard_error
-        for what, rgb in given.items():
-            if not all(math.isfinite(v) and v >= 0 for v in rgb):
-                raise LightingError(
-                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers >= 0"
-                )
-            if self.is_fixed and rgb != (1, 1, 1):
-                raise LightingError(
-                    f"light {self.name!r} is kept as it is, so its {what} must be 1 1 1, "
-                    f"not {list(rgb)}"
-                )
-        if self.unit_flux and not all(math.isfinite(v) and v >= 0 for v in self.unit_flux):
-            raise LightingError(
-                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: "
-                "need three numbers >= 0"
-            )
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """How good a solve is, per colour channel (R, G, B).
-
-    Attributes:
-        kkt_residual: Optimality measure of the solver (see solver.kkt_residual).
-        objective: ‖Ψ − Σ w_i Φ_i‖² under the importance.
-        relative_objective: Over ‖Ψ‖².
-        sweeps: Gauss–Seidel sweeps per channel; 0 where Newton steps did it.
-        converged: Whether the KKT residual came below the tolerance.
-        unreached: Lights that no weighted pixel sees, which keep what the solve started from, or
-            what is nearest to it under their constraints: their present emission, if no start was
-            given.
-        curve: Where only some lights may be on, numbers of lights and the relative residual, √(Σ_c
-            E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
-        bounds: What holds single lights, where a diagnosis has looked, the largest gain first.
-        objective_error: Standard error of `objective`, from the noise it was solved with, where
-            that is known.
-        display: The view transform through which the objective is seen; "" where it is of linear
-            light.
-        rounds: Linear problems solved one after the other, the last of which is the certified one.
-        hold: Weight of all that was not painted, against the current look, beside that of what was.
-        colors: How free lamps were to change their colour: `free`, `gentle` or `white`.
-        noise_removed: Share of the noise that was taken out of the equations.
-
-    Examples:
-        >>> solution = lp.solve(basis, target)
-        >>> solution.certificate.converged
-        True
-        >>> print(solution.certificate)
-        closest there is (KKT residual ...); misses ... of the painting (RMS, worst channel)
-    """
-
-    kkt_residual: RGB
-    objective: RGB
-    relative_objective: RGB
-    sweeps: tuple[int, int, int]
-    converged: bool
-    unreached: tuple[str, ...] = ()
-    curve: tuple[tuple[int, float], ...] = ()
-    bounds: tuple[Bound, ...] = ()
-    objective_error: RGB | None = None
-    display: str = ""
-    rounds: int = 1
-    hold: float = 0.0
-    colors: str = "free"
-    noise_removed: float = 0.0
-
-    __repr__ = shortly
-
-    def __str__(self) -> str:
-        told = "closest there is"
-        if self.curve or self.rounds > 1:
-            told = "closest with the lights chosen" if self.curve else "no small change is closer"
-        told = told if self.converged else "stopped before it converged"
-        missed = math.sqrt(max(self.relative_objective))
-        where = f", as {self.display} shows it" if self.display else ""
-        return (
-            f"{told} (KKT residual {max(self.kkt_residual):.1g}); misses {missed:.2g} of the "
-            f"painting{where} (RMS, worst channel)"
-        )
-
-    def of(self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None) -> "Certificate":
-        """With what is missed, (3,), beside what a black picture would miss, (3,)."""
-        norm = np.where(norm2 > 0, norm2, 1)
-        return replace(
-            self,
-            objective=as_rgb(objective),
-            relative_objective=as_rgb(objective / norm),
-            objective_error=error,
-        )
-
-
-@dataclass(frozen=True)
-class Lighting(Shown):
-    """Emissions for named lights.
+class Lighting(Shown, Mapping[str, LightSetting]):
+    """Emissions for named lights: a mapping of their names to their settings, in their order.
 
     Attributes:
         lights: Each with its emission, in the order of the basis.
@@ -152,8 +32,10 @@ class Lighting(Shown):
 
     Examples:
         >>> lighting = lp.read_lighting("lighting.json")
-        >>> lighting.emission["panel"]
+        >>> lighting["panel"].emission
         (2.0, 1.5, 1.0)
+        >>> "window" in lighting, len(lighting), list(lighting)
+        (False, 2, ['panel', 'bulb'])
         >>> lighting.with_emission("panel", (1, 1, 1)).emission["panel"]
         (1, 1, 1)
     """
@@ -173,13 +55,34 @@ class Lighting(Shown):
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]
         if len(set(names)) != len(names):
-            raise LightingError(f"light names repeat: {', '.join(names)}")
+            raise LightingError(f"light names repeat: {some_names(names)}")
         members = [name for light in self.lights for name in light.members]
         if len(set(members)) != len(members):
-            raise LightingError(f"an emitter is in two lights: {', '.join(sorted(members))}")
+            raise LightingError(f"an emitter is in two lights: {some_names(sorted(members))}")
         scale = self.cd_per_unit
-        if scale is not None and not 0 < scale < math.inf:
-            raise LightingError(f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0")
+        if scale is not None and not 0 < scale <= BRIGHTEST:
+            raise LightingError(
+                f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0, at most "
+                f"{BRIGHTEST:g}"
+            )
+
+    def __getitem__(self, name: str) -> LightSetting:
+        """The light of that name. Raises UnknownLightError, a KeyError, if there is none."""
+        if name not in self._by_name:
+            raise UnknownLightError(
+                f"no light {name!r} in the lighting: it has {some_of([*self], room=400)}"
+            )
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self.lights)
+
+    @cached_property
+    def _by_name(self) -> dict[str, LightSetting]:
+        return {light.name: light for light in self.lights}
 
     @property
     def members(self) -> Mapping[str, tuple[str, ...]]:
@@ -197,21 +100,24 @@ class Lighting(Shown):
         return {light.name: light.emission for light in self.lights}
 
     def photometry(self, light: LightSetting) -> Photometry:
-        """Colour, temperature and flux of one of its lights."""
-        return photometry(
+        """Colour, temperature and flux of one of its lights.
+
+        One that reaches something in some channels only has no colour: nobody knows it.
+        """
+        seen = photometry(
             light.emission,
             unit=light.unit,
             unit_flux=light.unit_flux,
             cd_per_unit=self.cd_per_unit,
         )
+        return seen.without_colour() if light.is_partly_reached else seen
 
     def with_emission(self, name: str, emission: RGB) -> "Lighting":
         """This lighting with another RGB emission for one light, and no claim to be optimal.
 
-        Raises LightingError if there is no such light.
+        Raises UnknownLightError if there is no such light.
         """
-        if name not in self.emission:
-            raise LightingError(f"no light {name!r} in the lighting: it has {[*self.emission]}")
+        changed = self[name]
         lights = tuple(
             replace(
                 light,
@@ -219,9 +125,11 @@ class Lighting(Shown):
                 weight=emission,
                 constraint="",
                 is_active=False,
+                reached=ALL_REACHED,
                 standard_error=None,
+                interval=None,
             )
-            if light.name == name
+            if light is changed
             else light
             for light in self.lights
         )
@@ -242,16 +150,19 @@ class Lighting(Shown):
         weights: Doubles,
         *,
         asked: Sequence[tuple[str, bool]] | None = None,
+        reached: Bools | None = None,
         **about: Any,
     ) -> "Lighting":
         """From weights (n, 3) in the order of `basis`.
 
-        asked: of each light its `constraint` and whether that `is_active`.
+        asked: of each light its `constraint` and whether that `is_active`. reached: (n, 3).
         """
+        lights, count = basis.lights, len(basis.lights)
+        told = np.ones((count, 3), dtype=bool) if reached is None else reached
         settings = tuple(
-            _setting(light, as_rgb(weight), constraint, is_active)
-            for light, weight, (constraint, is_active) in zip(
-                basis.lights, weights, asked or [("", False)] * len(basis.lights), strict=True
+            _setting(light, as_rgb(weight), one, (bool(its[0]), bool(its[1]), bool(its[2])))
+            for light, weight, one, its in zip(
+                lights, weights, asked or [("", False)] * count, told, strict=True
             )
         )
         return cls(settings, scene_identity=basis.origin.scene_identity, **about)
@@ -272,38 +183,84 @@ class Lighting(Shown):
             unknown = sorted(set(given) - set(basis.names))
             raise LightingError(
                 "lighting and basis name different lights: "
-                f"missing {', '.join(missing) or 'none'}; unknown {', '.join(unknown) or 'none'}"
+                f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
             )
         for light in basis.lights:
             if set(light.members) != set(self.members[light.name]):
                 raise LightingError(
                     f"light {light.name!r} is not the same in both: of "
-                    f"{', '.join(self.members[light.name])} in the lighting, of "
-                    f"{', '.join(light.members)} in the basis"
+                    f"{some_names(self.members[light.name])} in the lighting, of "
+                    f"{some_names(light.members)} in the basis"
                 )
         return np.array([given[name] for name in basis.names], dtype=np.float64)
 
 
-def combine(basis: Basis, lighting: Lighting) -> Estimate:
+def combine(
+    basis: Basis, lighting: Lighting | Mapping[str, float | Sequence[float]] | npt.ArrayLike
+) -> Estimate:
     """The predicted image Σ w_i Φ_i, with the noise that the basis gives it.
 
     Args:
         basis: Of n lights.
-        lighting: Of the same lights.
+        lighting: Of the same lights; or weights >= 0 of some of them by name, a number or RGB each,
+            the others being off; or (n,) or (n, 3) weights in the order of the basis. What is kept
+            has the weight 1.
 
     Raises:
-        LightingError: If the two do not name the same lights.
+        LightingError: If the two do not name the same lights, or for what are no such weights.
 
     Examples:
         >>> solution = lp.solve(basis, target)
         >>> np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 1e-4
         True
+        >>> twice = lp.combine(basis, {"bulb": 2}).image
+        >>> np.abs(twice - 2 * basis.image("bulb")).max() < 1e-6
+        True
     """
-    weights = lighting.weights_for(basis)
+    given = lighting
+    weights = given.weights_for(basis) if isinstance(given, Lighting) else _weights(basis, given)
     return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
 
 
-def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -> LightSetting:
+def _weights(basis: Basis, given: Mapping[str, Any] | npt.ArrayLike) -> Doubles:
+    """(n, 3), from weights by name, or of all lights in their order."""
+    n, names = len(basis.lights), basis.names
+    weights = np.where(basis.is_fixed[:, None], np.ones(3), np.zeros(3))
+    if isinstance(given, Mapping):
+        if unknown := [str(name) for name in given if name not in names]:
+            raise UnknownLightError(
+                f"no light {some_of(unknown, room=400)} in the basis: it has "
+                f"{some_of(names, room=400)}"
+            )
+        for name, weight in given.items():
+            weights[names.index(name)] = _numbers(weight, f"light {name!r}", ((), (3,)))
+    else:
+        whole = _numbers(given, f"a lighting of {n} lights", ((n,), (n, 3)))
+        weights = np.broadcast_to(whole.reshape(n, -1), (n, 3)).copy()
+    for k in np.flatnonzero(basis.is_fixed & (weights != 1).any(axis=1)):
+        raise LightingError(f"light {names[k]!r} is kept as it is: its weight is 1")
+    return weights
+
+
+def _numbers(given: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
+    """Weights in an array of one of these shapes. Raises LightingError for anything else."""
+    expected = " or ".join(str(shape) if shape else "one number" for shape in shapes)
+    try:
+        weights = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise LightingError(
+            f"{what}: weights of the type {type(given).__name__}: expected {expected}"
+        ) from None
+    if weights.shape not in shapes:
+        raise LightingError(f"{what}: weights of the shape {weights.shape}: expected {expected}")
+    if (wrong := weights[~(np.isfinite(weights) & (weights >= 0))]).size:
+        raise LightingError(f"{what}: a weight of {wrong[0]:g}: expected finite numbers >= 0")
+    return weights
+
+
+def _setting(
+    light: BasisLight, weight: RGB, asked: tuple[str, bool], reached: tuple[bool, bool, bool]
+) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
         light.name,
@@ -315,6 +272,7 @@ def _setting(light: BasisLight, weight: RGB, constraint: str, is_active: bool) -
         is_fixed=light.is_fixed,
         members=light.members,
         unit_flux=light.unit_flux,
-        constraint=constraint,
-        is_active=is_active,
+        constraint=asked[0],
+        is_active=asked[1],
+        reached=reached,
     )

@@ -11,7 +11,7 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
-from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.fit import Emitters, Fit
 from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.tiles import TiledEquations
@@ -42,20 +42,26 @@ def at_its_word(
     return Squares(mixed, total, np.where(total > 0, 1 - a / counted, 0))
 
 
-def what_counts(target: Target, seen: Bools) -> Target:
-    """`target` whose importance says it all.
+def left_out(target: Target, seen: Bools, emitters: Emitters) -> Bools:
+    """(h, w), what is painted and counts nothing, since an emitter is `seen` there, (h, w).
 
-    Pixels in which an emitter is seen directly count nothing unless somebody painted them:
-    at unit emission they would outshine everything the light falls on. Raises TargetError if
-    nothing is left.
+    Unless somebody painted them: at unit emission they would outshine everything the light falls
+    on.
     """
-    if not target.everything:
-        return target
-    importance = np.where(seen, np.float32(0), target.importance)
+    skips = target.everything if emitters == "auto" else emitters == "skip"
+    return np.asarray(seen & (target.importance > 0) & skips)
+
+
+def what_counts(target: Target, seen: Bools, emitters: Emitters = "auto") -> Target:
+    """`target` whose importance says it all. seen, emitters: as of `left_out`.
+
+    Raises TargetError if nothing is left.
+    """
+    importance = np.where(left_out(target, seen, emitters), np.float32(0), target.importance)
     if not importance.any():
         raise TargetError(
-            f"target {target.name}: the camera sees an emitter in every pixel, so none "
-            "counts; give a mask of those that should"
+            f"target {target.name}: the camera sees an emitter in every painted pixel, so none "
+            'counts; paint others too, or pass emitters="count"'
         )
     return replace(target, importance=importance, everything=False)
 
@@ -148,7 +154,7 @@ class Painting:
     Updated in place: the arrays of `word` and of the targets are its own.
     """
 
-    def __init__(self, whole: Basis, views: Views, fit: Fit) -> None:
+    def __init__(self, whole: Basis, views: Views, *, fit: Fit) -> None:
         self.strokes = 0
         self.fit = fit
         self.whole = whole
@@ -219,6 +225,8 @@ class Painting:
             self.views.part(self.light, k)[region] = target.image[region]
         if importance is not None:
             target.importance[region] = importance
+            if self.fit.emitters == "skip":
+                target.importance[region][basis.emitters_seen[region]] = 0
         part = at_its_word(
             target.image[region],
             target.importance[region],

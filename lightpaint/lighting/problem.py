@@ -126,12 +126,13 @@ class Problem:
             )
         whole, parts = joint_basis(bases)
         asked = constraints_of(whole.asked).and_then(constraints or Constraints())
+        fit = fit or Fit()
         fitted = [
-            what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen)
+            what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen, fit.emitters)
             for its, one in zip(targets, parts, strict=True)
         ]
         views = Views(parts, tuple(fitted))
-        fit = meant_by(fit or Fit(), fitted)
+        fit = meant_by(fit, fitted)
         if fit.colors == "white":
             asked = white_where_free(asked, whole.lights)
         word = joint_squares(views, unpainted=weight_of_rest(views, fit))
@@ -269,7 +270,7 @@ class Problem:
         """
         painting = self.painting
         if painting is None:
-            painting = Painting(self.basis, self.views, self.fit)
+            painting = Painting(self.basis, self.views, fit=self.fit)
         elif painting.strokes != self.strokes:
             raise ValueError("this problem was painted on already: go on from what that returned")
         painting.paint(view, region, image, importance, at_least)

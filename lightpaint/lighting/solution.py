@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.fit import Space
-from lightpaint.lighting.lighting import Certificate, Lighting
+from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import Reweighting
@@ -50,6 +51,11 @@ class Solution(Shown):
     def weights(self) -> Doubles:
         """(n, 3), in the order of the basis."""
         return np.array([light.weight for light in self.lighting.lights], dtype=np.float64)
+
+    @property
+    def reached(self) -> Bools:
+        """(n, 3), in which channels a light reaches anything that counts."""
+        return np.array([light.reached for light in self.lighting.lights], dtype=bool)
 
     @property
     def basis(self) -> Basis:

@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
+from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import (
     ReducedOptimum,
@@ -17,10 +18,11 @@ from lightpaint.lighting.constraints.reduced_problem import (
 from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.constraints.sparse import best_knobs
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.lighting import Certificate, Lighting
+from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import descend
+from lightpaint.lighting.software import Software
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.traces import without_traces
 from lightpaint.target.target import Target
@@ -86,16 +88,18 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
         return _linear(problem, begin)
     # The painting is first taken at its word, which also tells what lights reach.
     first = _linear(replace(problem, constraints=_of_all(problem.constraints)), begin)
-    solution = _descended(first.problem, first.weights)
+    reached = first.reached
+    solution = _descended(first.problem, first.weights, reached)
     if problem.constraints.sparse is not None:
         # The lights are chosen where all of them would lead.
         chosen = _linear(
             replace(solution.problem, constraints=problem.constraints), solution.weights
         )
         held = replace(problem, reduction=chosen.problem.reduction)
-        solution = replace(_descended(held, chosen.weights), tried=chosen.tried)
+        reached = chosen.reached
+        solution = replace(_descended(held, chosen.weights, reached), tried=chosen.tried)
         first = chosen
-    return solution.told(unreached=first.certificate.unreached, curve=first.certificate.curve)
+    return solution.told(curve=first.certificate.curve)
 
 
 def again(solution: Solution, problem: Problem) -> Solution:
@@ -107,10 +111,10 @@ def again(solution: Solution, problem: Problem) -> Solution:
     if problem.is_linear:
         return _linear(replace(problem, reduction=problem.full), solution.weights)
     assert solution.reweighting is not None
-    step = _one(problem, solution.weights)
+    step = _one(problem, solution.weights, solution.reached)
     before, reweighting = solution.certificate, solution.reweighting
     converged = step.certificate.converged and reweighting.converged
-    kept = {name: getattr(before, name) for name in ("unreached", "curve", "rounds")}
+    kept = {name: getattr(before, name) for name in ("curve", "rounds")}
     told = step.told(converged=converged, **kept)
     return replace(told, tried=solution.tried, reweighting=reweighting)
 
@@ -136,15 +140,18 @@ def _linear(problem: Problem, start: Doubles) -> Solution:
     return solution.told(curve=tuple(told))
 
 
-def _one(problem: Problem, start: Doubles) -> Solution:
-    """The solution of the squares as the reduction has the lights."""
+def _one(problem: Problem, start: Doubles, reached: Bools | None = None) -> Solution:
+    """The solution of the squares as the reduction has the lights. reached: as of `_solution`."""
     equations = problem.pulled(problem.solved)
     optimum = solve_reduced(equations, problem.reduction, start, method=problem.fit.method)
-    return _solution(problem, optimum, optimum.weights, equations)
+    return _solution(problem, optimum, optimum.weights, equations, reached)
 
 
-def _descended(problem: Problem, start: Doubles) -> Solution:
-    """From weights (n, 3) within what is asked to the least of the loss."""
+def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
+    """From weights (n, 3) within what is asked to the least of the loss.
+
+    reached: as of `_solution`.
+    """
 
     def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
         asked = problem.pulled(equations)
@@ -159,16 +166,26 @@ def _descended(problem: Problem, start: Doubles) -> Solution:
     )
     solved = replace(problem, squares=found.squares, equations=found.equations)
     optimum = best_of(found.equations, found.reweighting.at)
-    solution = _solution(solved, optimum, found.weights, problem.pulled(found.equations))
+    equations = problem.pulled(found.equations)
+    solution = _solution(solved, optimum, found.weights, equations, reached)
     converged = optimum.converged and found.reweighting.converged
     told = solution.told(converged=converged, rounds=1 + found.reweighting.rounds)
     return replace(told, reweighting=found.reweighting)
 
 
 def _solution(
-    problem: Problem, optimum: ReducedOptimum, weights: Doubles, equations: NormalEquations
+    problem: Problem,
+    optimum: ReducedOptimum,
+    weights: Doubles,
+    equations: NormalEquations,
+    reached: Bools | None = None,
 ) -> Solution:
-    """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull."""
+    """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull.
+
+    reached: (n, 3), what lights reach where that is known from before: in the last linear problem
+    of a loss it may be less.
+    """
+    reached = optimum.reached if reached is None else reached
     transform, names = problem.loss.transform, problem.basis.names
     labels = problem.reduction.labels
     is_asked = np.array([bool(label) for label in labels], dtype=bool)
@@ -179,19 +196,19 @@ def _solution(
         relative_objective=(0, 0, 0),
         sweeps=optimum.sweeps,
         converged=optimum.converged,
-        unreached=tuple(n for n, ok in zip(names, optimum.reached, strict=True) if not ok),
+        unreached=tuple(n for n, ok in zip(names, reached, strict=True) if not ok.any()),
         display="" if transform is None else transform.spoken,
         hold=problem.fit.hold or 0.0,
         colors=problem.fit.colors or "free",
         noise_removed=problem.noise_removed,
+        software=Software.here(),
     ).of(problem.objective(weights), problem.norm2)
     asked = [(label, False) for label in labels]
     if any(labels):
         held = _held_back(equations, problem.basis, optimum.weights)
         asked = [(label, bool(label) and bool(h)) for label, h in zip(labels, held, strict=True)]
-    lighting = Lighting.of_weights(
-        problem.basis, weights, asked=asked, target=problem.name, certificate=certificate
-    )
+    about: dict[str, Any] = {"target": problem.name, "certificate": certificate}
+    lighting = Lighting.of_weights(problem.basis, weights, asked=asked, reached=reached, **about)
     return Solution(problem, lighting)
 
 

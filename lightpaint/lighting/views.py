@@ -16,6 +16,7 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import Estimate
+from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
 #: Pixels in a row of the long picture. The last row is filled with pixels that count nothing.
@@ -107,7 +108,7 @@ def check_same_lights(a: Basis, b: Basis) -> None:
     if a.names != b.names:
         raise BasisError(
             f"the bases of {a.origin.sensor} and {b.origin.sensor} have different lights, "
-            f"{', '.join(a.names)} and {', '.join(b.names)}: make both of one scene"
+            f"{some_names(a.names)} and {some_names(b.names)}: make both of one scene"
         )
     for one, other in zip(a.lights, b.lights, strict=True):
         for what in ("unit", "members", "is_fixed", "is_scalar", "emission"):
@@ -127,4 +128,4 @@ def _spoken(what: str, value: Any) -> str:
         return "one weight for all channels" if value else "a weight for each channel"
     if what == "emission":
         return "the emission " + " ".join(f"{v:g}" for v in value)
-    return f"the {what} {value if isinstance(value, str) else ', '.join(value)}"
+    return f"the {what} {value if isinstance(value, str) else some_names(value)}"

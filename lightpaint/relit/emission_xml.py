@@ -76,7 +76,7 @@ class Changes:
             self.xml.insert_first(self.element, self._missing)
 
 
-def write_emission(
+def set_emission(
     changes: Changes, scene: Scene, emitter: Emitter, rgb: RGB, *, stem: str
 ) -> dict[str, Floats]:
     """Set the emission of `emitter` to `rgb`, in the unit of its kind.

@@ -16,11 +16,12 @@ from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.relit.emission_xml import Changes, write_emission
+from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
 from lightpaint.scene.emission import Scaling
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.screen import some_names
 
 
 def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
@@ -94,8 +95,8 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     if given != there:
         raise LightingError(
             f"the lighting does not fit {scene.path}: it lacks "
-            f"{', '.join(sorted(there - given)) or 'no light'} and names "
-            f"{', '.join(sorted(given - there)) or 'none'} that the scene does not have"
+            f"{some_names(sorted(there - given)) or 'no light'} and names "
+            f"{some_names(sorted(given - there)) or 'none'} that the scene does not have"
         )
     tied = scene.with_lights(lighting.members, lighting.fixed)
     for setting in lighting.lights:
@@ -117,10 +118,14 @@ def _settings(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitt
 
 @dataclass
 class _Edits:
-    """What changes in one file: the settings of the emitters in it, by byte offset."""
+    """What changes in one file: the settings of the emitters in it, by byte offset.
+
+    integrators: what is put in the place of elements, by byte offset; at None, what is added.
+    """
 
     original: Path
     settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
+    integrators: dict[int | None, str] = field(default_factory=dict)
 
 
 def relit_files(
@@ -150,6 +155,7 @@ def relit_files(
         if emitter.offset in here:
             raise _included_twice(file, here[emitter.offset][0], emitter)
 
+    _edit_integrators(scene, edits)
     written: dict[Path, bytes | Floats] = {}
     for edit in edits.values():
         is_root = edit.original == root
@@ -165,6 +171,18 @@ def relit_files(
             f"{taken[0]} belongs to the scene itself: write the relit scene to another folder"
         )
     return written
+
+
+def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
+    """Have the integrator that the scene was loaded with written in the place of its own."""
+    if scene.instead is None:
+        return
+    text = scene.instead.xml
+    for file, offset in scene.replaced_integrators:
+        edits.setdefault(file.resolve(), _Edits(file)).integrators[offset] = text
+        text = ""  # one is enough
+    if text:
+        edits[scene.files[0].resolve()].integrators[None] = text
 
 
 def _included_twice(file: Path, one: Emitter, other: Emitter) -> SceneError:
@@ -191,8 +209,8 @@ def _place_of_include(file: Path, root: Path) -> Path:
         return file.resolve().relative_to(root.resolve().parent)
     except ValueError:
         raise SceneError(
-            f"{file} holds lights but lies outside the folder of {root}, so an edited copy of it "
-            "would not be found: move it below that folder"
+            f"{file} has to be edited, but it lies outside the folder of {root}, where an edited "
+            "copy would not be found: move it below that folder"
         ) from None
 
 
@@ -209,12 +227,16 @@ def _edit(
         origin = os.path.relpath(edit.original.resolve().parent, folder.resolve())
         lines = [tag("path", value=Path(origin).as_posix())]
         lines += [tag("default", name=k, value=v) for k, v in defaults.items()]
+        lines += [text for at, text in edit.integrators.items() if at is None]
         xml.insert_first(xml.root, lines)
+    for at, text in edit.integrators.items():
+        if at is not None:
+            xml.replace(xml.element_at(at), text)
     images: dict[str, Floats] = {}
     for offset, (emitter, rgb, weight) in edit.settings.items():
         changes = Changes(xml, xml.element_at(offset))
         if weight is not None:
             changes.set("float", "sampling_weight", f"{weight:g}")
-        images |= write_emission(changes, scene, emitter, rgb, stem=stem)
+        images |= set_emission(changes, scene, emitter, rgb, stem=stem)
         changes.finish()
     return xml.edited(), images

@@ -68,7 +68,7 @@ class XmlFile:
             return self._elements[offset]
         except KeyError:
             raise SceneError(
-                f"cannot find the light at byte {offset} of {self._path}: has it changed?"
+                f"cannot find the element at byte {offset} of {self._path}: has it changed?"
             ) from None
 
     def place_of(self, element: Element) -> str:

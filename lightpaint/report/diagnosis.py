@@ -16,8 +16,10 @@ from lightpaint.report.figures import Picture, figure, signed_scale
 from lightpaint.report.html import row, share_cell, table
 from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
+    brightness,
     how_sure,
     relative_errors,
+    spoken_errors,
     spoken_hold,
     spoken_percent,
     what_is_missed,
@@ -36,17 +38,17 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     if uncertainty is None:
         return ""
     shares = energy_shares(basis, solution.lighting)
-    errors = relative_errors(uncertainty)
-    low, high = (luminance(end) for end in uncertainty.interval)
+    errors, spoken = relative_errors(uncertainty), spoken_errors(uncertainty, len(shares))
+    solved, low, high = brightness(uncertainty)
     effect = np.where(np.isfinite(errors), errors, 0) * shares
     # Those that are off and may be on come behind, by how bright they may be.
     order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
     rows = [
         row(
             escape(basis.names[k]),
-            f"{float(luminance(uncertainty.weights[k])):.3g}",
+            f"{solved[k]:.3g}",
             f"{low[k]:.3g} … {high[k]:.3g}",
-            f"± {spoken_percent(float(errors[k]))}" if np.isfinite(errors[k]) else "–",
+            spoken[k] if np.isfinite(errors[k]) else "–",
             f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
         )
         for k in order[:ROWS]

@@ -3,6 +3,7 @@
 Names of lights come from other people's files and are escaped here.
 """
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -13,26 +14,25 @@ from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.photometry import Photometry
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.lighting import LightSetting
+from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import share_cell
-from lightpaint.report.sentences import relative_errors, spoken_error
+from lightpaint.report.sentences import spoken_errors, unreached_channels
 from lightpaint.report.verdict import energy_shares
 
 
 def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:
     """One row per light, in document order."""
-    errors = None if uncertainty is None else relative_errors(uncertainty)
     shares = energy_shares(basis, solution.lighting)
+    errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in solution.lighting.lights}
-    unreached, rows = solution.certificate.unreached, []
+    rows = []
     for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
         share = shares[k]
         picture, stops = thumbnail(image, basis.emitters_seen)
         name, setting = escape(light.name), settings[light.name]
-        error = "" if errors is None else spoken_error(setting, float(errors[k]))
-        error = f"<small>{error}</small>" if error else ""
+        error = f"<small>{errors[k]}</small>" if errors[k] else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
             f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
@@ -41,7 +41,7 @@ def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
             f'<th scope="row">{name}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
             f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
-            f"<td>{change(light, setting, unreached)}{error}{_asked(setting)}</td>"
+            f"<td>{change(light, setting)}{error}{_asked(setting)}</td>"
             f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
         )
     return "".join(rows)
@@ -59,22 +59,28 @@ def _emission_cells(light: BasisLight, setting: LightSetting, seen: Photometry) 
     if light.is_fixed:
         return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td><td></td>'
     return (
-        f'<td class="colour">{_swatch(setting.emission, seen)}</td>'
+        f'<td class="colour">{_swatch(setting, seen)}</td>'
         f'<td class="rgb">{_rgb(light.emission)}</td>'
-        f'<td class="rgb">{_rgb(setting.emission)}</td>'
+        f'<td class="rgb">{_rgb(setting.emission, setting.reached)}</td>'
         f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
         f'<td class="rgb">{_amounts(seen)}</td>'
     )
 
 
-def change(light: BasisLight, setting: LightSetting, unreached: tuple[str, ...]) -> str:
-    """In words or as a ratio of luminance, what happens to a light."""
-    before = float(luminance(np.array(light.emission)))
-    after = float(luminance(np.array(setting.emission)))
+def change(light: BasisLight, setting: LightSetting) -> str:
+    """In words or as a ratio of luminance, what happens to a light where it reaches anything."""
     if light.is_fixed:
         return "kept as it is"
-    if light.name in unreached:
+    if not any(setting.reached):
         return "unchanged: reaches nothing painted"
+    kept = f"<small>{unreached_channels(setting)} kept: reaches nothing painted</small>"
+    return _changed(light, setting) + (kept if setting.is_partly_reached else "")
+
+
+def _changed(light: BasisLight, setting: LightSetting) -> str:
+    its = np.array(setting.reached)
+    before = float(luminance(np.where(its, light.emission, 0)))
+    after = float(luminance(np.where(its, setting.emission, 0)))
     if after == 0:
         return "off" if before > 0 else "stays off"
     if before == 0:
@@ -94,8 +100,11 @@ def hex_color(emission: RGB) -> str | None:
     return rgb_to_hex(np.array(emission)) if any(emission) else None
 
 
-def _swatch(emission: RGB, seen: Photometry) -> str:
+def _swatch(setting: LightSetting, seen: Photometry) -> str:
     """The colour of a light; of one whose own is not known, that of its factor."""
+    if setting.is_partly_reached:
+        return '<span class="swatch none"></span><small>not known</small>'
+    emission = setting.emission
     color = seen.hex or hex_color(emission)
     if color is None or not any(emission):
         return '<span class="swatch none"></span><small>off</small>'
@@ -114,5 +123,9 @@ def _amounts(seen: Photometry) -> str:
     return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
 
 
-def _rgb(emission: RGB) -> str:
-    return "<br>".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
+def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
+    """A line for each channel, in brackets where nothing tells it."""
+    if not any(emission):
+        return "off"
+    told = zip(emission, reached, strict=True)
+    return "<br>".join(f"{v:.4g}" if tells else f"({v:.4g})" for v, tells in told)

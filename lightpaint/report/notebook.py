@@ -78,6 +78,8 @@ def lighting_html(lighting: Lighting) -> str:
         seen = lighting.photometry(light)
         asked = "kept" if light.is_fixed else light.constraint
         colour, output = _swatch(light.emission, seen), " ".join(seen.amounts)
+        if light.is_partly_reached:
+            colour = _Html("")
         return light.name, colour, _rgb(light.emission), light.unit, output, asked
 
     told = "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
@@ -93,9 +95,9 @@ def solution_html(solution: Solution) -> str:
     def row(k: int) -> Sequence[str]:
         light, setting = basis.lights[k], lighting.lights[k]
         # What a page of the report stacks stands in a line here.
-        told = change(light, setting, solution.certificate.unreached)
-        told = told.replace("<small>", " ").replace("</small>", "")
+        told = change(light, setting).replace("<small>", " ").replace("</small>", "")
         colour = _swatch(setting.emission, lighting.photometry(setting))
+        colour = _Html("") if setting.is_partly_reached else colour
         now, new = _rgb(light.emission), _rgb(setting.emission)
         return light.name, colour, now, new, told, setting.constraint
 

@@ -21,6 +21,7 @@ from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
+from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import amounts_heading, lights_table
 from lightpaint.report.pictures import target_picture, transform_of
@@ -63,7 +64,7 @@ def report_page(
         target=escape(target.name),
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
         verdict=escape(verdict(solution, predicted, verification)),
-        banner=_banner(verification),
+        banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
         wipe=wipe(looks),
         exposure=_exposure(transform, predicted.image),
         maps=maps(
@@ -130,6 +131,10 @@ def _banner(verification: Verification | None) -> str:
         "both explains. See the map of the verification below for where; check that basis and "
         "scene belong together, and render both with more samples.</p></div>"
     )
+
+
+def _notes(remarks: list[str]) -> str:
+    return "".join(f'<p class="note">{escape(remark)}.</p>' for remark in remarks)
 
 
 def _exposure(transform: ViewTransform, predicted: Floats) -> str:

@@ -6,11 +6,15 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place
-from lightpaint.lighting.analysis.uncertainty import SIDES, Uncertainty
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.lighting import LightSetting
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.verdict import energy_shares
+from lightpaint.screen import some_names, some_of
+
+CHANNELS = ("red", "green", "blue")
 
 #: Shares of the miss, or of a light, that are too small to speak of.
 SMALL = 0.05
@@ -22,26 +26,65 @@ SMALLER = 0.01
 SEEN = 0.06
 
 
+def brightness(uncertainty: Uncertainty) -> tuple[Doubles, Doubles, Doubles]:
+    """Luminance of each light as solved, and the ends of its 95 % interval, (n,) each.
+
+    Of the channels of which something is known.
+    """
+    # One path carries all channels, so that their errors go together.
+    known = np.isfinite(uncertainty.scatter)
+    ends = (uncertainty.weights, *uncertainty.interval)
+    solved, low, high = (np.where(known, end, 0) @ LUMINANCE for end in ends)
+    return solved, low, high
+
+
 def relative_errors(uncertainty: Uncertainty) -> Doubles:
-    """Half the 95 % interval of each light's luminance over its luminance, (n,).
+    """How far the 95 % interval of each light's luminance goes, over its luminance, (n,).
 
     Not finite where the light is off and may be on; 0 where it has no error.
     """
-    # One path carries all channels, so that their errors go together.
-    side = SIDES * uncertainty.standard_error @ LUMINANCE
-    size = luminance(uncertainty.weights)
+    solved, low, high = brightness(uncertainty)
+    side = np.maximum(solved - low, high - solved)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(side > 0, side / size, 0.0)
+        return np.where(side > 0, side / solved, 0.0)
 
 
-def spoken_error(light: LightSetting, error: float) -> str:
-    """`± 4 %` of a light; empty if nothing is known of it."""
-    if light.is_fixed or light.standard_error is None:
+def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
+    """`± 4 %` of each light; empty if nothing is known of it.
+
+    On one side only, `0 … +4 %`, of what is at a limit; `0 … 0.9`, in its unit, of what is off.
+    """
+    if uncertainty is None:
+        return [""] * count
+    return [_spoken_error(*ends) for ends in zip(*brightness(uncertainty), strict=True)]
+
+
+def _spoken_error(solved: float, low: float, high: float) -> str:
+    if low >= high:
         return ""
-    if not np.isfinite(error):
-        at_most = SIDES * luminance(np.array(light.standard_error))
-        return f"≤ {at_most:.2g}"
-    return f"± {spoken_percent(error)}" if error else ""
+    if solved == 0:
+        return f"0 … {high:.2g}"
+    below, above = (spoken_percent(float(side / solved)) for side in (solved - low, high - solved))
+    if below == above:
+        return f"± {below}"
+    return f"{f'−{below}' if low < solved else '0'} … {f'+{above}' if high > solved else '0'}"
+
+
+def partly_reached(lighting: Lighting) -> list[str]:
+    """A clause for the lights of which some channels reach nothing painted."""
+    by_channels: dict[str, list[str]] = {}
+    for light in lighting.lights:
+        if light.is_partly_reached:
+            by_channels.setdefault(unreached_channels(light), []).append(light.name)
+    return [
+        f"no painted pixel shows the {channels} of {some_of(names, room=200)}: kept as it is"
+        for channels, names in by_channels.items()
+    ]
+
+
+def unreached_channels(light: LightSetting) -> str:
+    """`green and blue`: the channels of a light that reach nothing that counts."""
+    return " and ".join(c for c, told in zip(CHANNELS, light.reached, strict=True) if not told)
 
 
 def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
@@ -67,7 +110,7 @@ def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
 
     Scatter falls with the root of the samples, bias with their number.
     """
-    scatter, bias = (np.square(x[k]).sum() for x in (uncertainty.scatter, uncertainty.bias))
+    scatter, bias = (np.nansum(np.square(x[k])) for x in (uncertainty.scatter, uncertainty.bias))
     # scatter / m + bias / m² = (scatter + bias) / 4
     total = scatter + bias
     times = 2 * (scatter + np.sqrt(scatter**2 + total * bias)) / total if total > 0 else 1.0
@@ -112,7 +155,7 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
 def spoken_bound(bound: Bound, share: float) -> str:
     """What holds a light, and which share of the miss that is."""
     is_one = len(bound.lights) == 1
-    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {', '.join(bound.lights)} are"
+    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {some_names(bound.lights)} are"
     if bound.kind == "zero":
         return (
             f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
@@ -139,8 +182,7 @@ def spoken_hold(bound: Bound) -> str:
         return bound.held_by
     if len(bound.multiplier) != 3:
         return "off"
-    names = ("red", "green", "blue")
-    felt = zip(names, bound.multiplier, strict=True)
+    felt = zip(CHANNELS, bound.multiplier, strict=True)
     held = [n for n, m in felt if m > 0.01 * max(bound.multiplier)]
     return "off" if len(held) == 3 else f"off in {' and '.join(held)}"
 

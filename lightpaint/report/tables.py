@@ -3,7 +3,6 @@
 Names of lights, targets and scenes come from other people's files and are escaped here.
 """
 
-import importlib.metadata
 import platform
 
 import numpy as np
@@ -11,9 +10,12 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.painting import left_out
+from lightpaint.lighting.software import Software, version
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, row
+from lightpaint.report.sentences import partly_reached
 from lightpaint.report.verdict import (
     codes_missed,
     linear_residual,
@@ -77,13 +79,15 @@ def render_table(
     height, width = basis.size
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
+    out = int(left_out(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
     adjusted = int((~basis.is_fixed).sum())
     told = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),
-        ("Emitters seen directly", f"in {seen} pixels{_seen_note(target, seen)}"),
+        ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
+        ("Emitters seen directly", f"in {seen} pixels{_seen_note(out)}"),
     ]
     told += _fitted(solution, predicted)
     for light in basis.lights:
@@ -91,9 +95,11 @@ def render_table(
             told.append(("Kept as they are", ", ".join(light.members)))
     if q.unreached:
         told.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
+    for channels in partly_reached(solution.lighting):
+        told.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
         told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
-    return facts(told)
+    return facts([(what, value) for what, value in told if value])
 
 
 def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
@@ -147,11 +153,9 @@ def versions(basis: Basis) -> str:
     parts = [f"lightpaint {__version__}"]
     if basis.origin.lightpaint != __version__:
         parts[0] += f" (basis by {basis.origin.lightpaint})"
-    for name in ("mitsuba", "drjit", "numpy"):
-        try:
-            parts.append(f"{name} {importlib.metadata.version(name)}")
-        except importlib.metadata.PackageNotFoundError:
-            continue  # a saved basis needs no renderer
+    parts += [f"{name} {its}" for name in ("mitsuba", "drjit", "numpy") if (its := version(name))]
+    software = Software.here()
+    parts.append(f"{software.blas} {software.kernel}".strip())
     return " · ".join([*parts, f"Python {platform.python_version()}"])
 
 
@@ -159,5 +163,5 @@ def _lights_off(solution: Solution) -> int:
     return sum(not any(light.emission) for light in solution.lighting.lights)
 
 
-def _seen_note(target: Target, seen: int) -> str:
-    return ", which do not count" if seen and target.everything else ""
+def _seen_note(out: int) -> str:
+    return f", of which {out} were painted and do not count" if out else ""

@@ -10,6 +10,7 @@ from fnmatch import fnmatchcase
 from lightpaint.errors import SceneError
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import Light, check_adjustable, keep, tie
+from lightpaint.screen import some_names
 
 #: Name of the fixed light, with underscores added should another have it.
 REST = "rest"
@@ -40,7 +41,7 @@ def choose_lights(
         chosen = _chosen(_listed(lights, "lights"), by_light, group_of, emitters, scene)
         by_light = {name: members for name, members in by_light.items() if name in chosen}
     if not by_light:
-        listed = "; ".join(f"{e.name!r} {e.obstacle}" for e in emitters)
+        listed = some_names((f"{e.name!r} {e.obstacle}" for e in emitters), "; ")
         raise SceneError(f"{scene} has no light that can be solved for: {listed}")
     return _with_rest([tie(name, members) for name, members in by_light.items()], emitters)
 
@@ -119,7 +120,7 @@ def _matching(pattern: str, names: Sequence[str], where: str, scene: str) -> set
         close = difflib.get_close_matches(pattern, names, n=1)
         hint = f"did you mean {close[0]!r}? It" if close else "it"
         raise SceneError(
-            f"{where}: {scene} has no light {pattern!r}; {hint} has {', '.join(names)}"
+            f"{where}: {scene} has no light {pattern!r}; {hint} has {some_names(names)}"
         )
     return found
 

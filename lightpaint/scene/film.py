@@ -13,6 +13,7 @@ from typing import Any
 
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import whole_factor
+from lightpaint.screen import some_names
 
 #: Pixels of a film and its samples per pixel beyond which each is a mistake.
 MAX_PIXELS = 2**28
@@ -155,6 +156,6 @@ def sensor_index(wanted: int | str | None, names: Sequence[str], path: Path) -> 
     except ValueError:
         index = -1
     if not 0 <= index < len(names):
-        listed = ", ".join(f"{k} ({name})" for k, name in enumerate(names))
+        listed = some_names(f"{k} ({name})" for k, name in enumerate(names))
         raise SceneError(f"{path} has no sensor {wanted!r}: it has {listed}")
     return index

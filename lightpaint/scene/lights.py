@@ -8,6 +8,7 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.scene.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 from lightpaint.scene.emitters import Emitter
+from lightpaint.screen import some_names
 
 #: What emission scales in a light that is a multiple of what the scene has.
 WHOLE_EMISSION = "emission"
@@ -60,7 +61,7 @@ class Light:
         """Place and size in words; for several emitters, which."""
         if len(self.members) == 1:
             return self.members[0].form
-        return f"{len(self.members)} emitters: {', '.join(self.member_names)}"
+        return f"{len(self.members)} emitters: {some_names(self.member_names)}"
 
     @property
     def unit_flux(self) -> RGB | None:
@@ -99,7 +100,7 @@ def tie(name: str, members: Sequence[Emitter]) -> Light:
         assert first.kind is not None
         return Light(name, tuple(members), first.kind.parameter, first.kind.unit, first.emission)
     if not any(any(member.emission) for member in members):
-        listed = ", ".join(f"{m.name} ({m.plugin})" for m in members)
+        listed = some_names(f"{m.name} ({m.plugin})" for m in members)
         raise SceneError(
             f"group {name!r} has only black lights of different kinds, {listed}, so nothing "
             "says how bright they are relative to each other: give one of them a colour"
@@ -146,7 +147,7 @@ def light_named(name: str, lights: Sequence[Light], *, scene: str) -> Light:
     for light in lights:
         if light.name == name:
             return light
-    raise SceneError(f"{scene} has no light {name!r}: it has {', '.join(x.name for x in lights)}")
+    raise SceneError(f"{scene} has no light {name!r}: it has {some_names(x.name for x in lights)}")
 
 
 def settings_for(

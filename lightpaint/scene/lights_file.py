@@ -15,7 +15,9 @@ from lightpaint.files import one_line, read_text
 
 SUFFIX = ".lights.toml"
 #: What asks for something in the solve.
-CONSTRAINTS = ("light", "tie", "prefer", "sparse")
+CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
+#: What files called `prefer_current` before, as `prefer = { current = 0.01 }`.
+OLDER = ("prefer",)
 KNOWN = ("lights", "groups", *CONSTRAINTS)
 
 #: Longest lights file that is read, in bytes.
@@ -38,7 +40,7 @@ class Asked:
     @classmethod
     def of(cls, path: Path, data: Mapping[str, Any]) -> "Asked":
         """Of all keys of the lights file at `path`."""
-        return cls({key: data[key] for key in CONSTRAINTS if key in data}, str(path))
+        return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def read_lights_file(path: Path) -> LightsFile:
 
 def read_keys(path: Path) -> dict[str, Any]:
     """All keys of a lights file, none of them unknown. Raises SceneError."""
-    text = read_text(path, "lights file", SceneError, limit=MAX_BYTES)
+    text = read_text(path, "lights file", SceneError, limit=MAX_BYTES, may_be_empty=True)
     dots = [line.count(".") for line in text.splitlines()]
     if sum(n * n for n in dots) > MAX_DOTS:
         line = dots.index(max(dots)) + 1
@@ -107,7 +109,7 @@ def read_keys(path: Path) -> dict[str, Any]:
         end = f"at line {text.rstrip().count(chr(10)) + 1}, the end"
         reason = one_line(str(error).replace("at end of document", end))
         raise SceneError(f"{path} is not TOML: {reason}") from None
-    if unknown := [key for key in data if key not in KNOWN]:
+    if unknown := [key for key in data if key not in (*KNOWN, *OLDER)]:
         raise SceneError(
             f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN)}"
         )

@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,30 +20,29 @@ from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.xml import check_nodes, check_xml
 from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
 from lightpaint.scene.film import Film
+from lightpaint.scene.integrator import (
+    Integrator,
+    IntegratorChoice,
+    integrator_nodes,
+    read_integrator,
+    replace_integrator,
+)
 
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000
 
 
-@dataclass(frozen=True)
-class Integrator:
-    """The part of the scene's integrator that decides which light paths there are.
-
-    plugin: of the integrator that renders light, inside those that wrap it (`aov`, `moment`).
-    samples: what `direct` draws per surface point of emitters and of the BSDF.
-    """
-
-    plugin: str
-    max_depth: int
-    rr_depth: int
-    hide_emitters: bool
-    samples: tuple[int, int] = (1, 1)
-
-
 class ParsedScene:
     """The nodes of a scene XML, by Mitsuba's own parser."""
 
-    def __init__(self, path: Path, parameters: Mapping[str, str], variant: str) -> None:
+    def __init__(
+        self,
+        path: Path,
+        parameters: Mapping[str, str],
+        variant: str,
+        instead: IntegratorChoice | None = None,
+    ) -> None:
+        """instead: an integrator in the place of the scene's own."""
         import mitsuba as mi
 
         self.path = path
@@ -67,6 +65,7 @@ class ParsedScene:
         if self.state.nodes[0].props.plugin_name() != "scene":
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
         self.files = tuple(Path(str(f)) for f in self.state.files)
+        self.instead, self.replaced = self._replace_integrator(instead)
         kinds = mi.ObjectType
         self.emitter_nodes = self._nodes_of(kinds.Emitter)
         self.sensor_nodes = self._children_of(0, kinds.Sensor)
@@ -79,6 +78,17 @@ class ParsedScene:
             for child in self._children_of(shape, kinds.Emitter)
         }
         self.names = self._name_lights()
+
+    def _replace_integrator(
+        self, instead: IntegratorChoice | None
+    ) -> tuple[IntegratorChoice | None, tuple[tuple[int, int], ...]]:
+        """The one that is put in, and where what it replaces stands: index of file, byte offset."""
+        if instead is None:
+            return None, ()
+        nodes = [self.state.nodes[k] for k in integrator_nodes(self.state)]
+        # The parser's offset is just behind the `<`.
+        places = tuple((int(node.file_index), int(node.offset) - 1) for node in nodes)
+        return replace_integrator(self.state, instead), places
 
     def _nodes_of(self, kind: Any) -> list[int]:
         return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
@@ -135,7 +145,7 @@ class ParsedScene:
                 ):
                     del props[key]
             props["film"] = film.load()
-        with self._resolving(), mitsuba_errors(self.path):
+        with self._resolving(), mitsuba_errors(self.path, self.instead):
             return mi.parser.instantiate(self.config, state)
 
     def lit_by_points(
@@ -176,30 +186,8 @@ class ParsedScene:
         return path, bool(props.get("raw", False))
 
     def integrator(self) -> Integrator:
-        import mitsuba as mi
-
-        nodes = self._children_of(0, mi.ObjectType.Integrator)
-        if not nodes:
-            # Mitsuba's own choice for a scene that names none.
-            return Integrator("path", -1, 5, False)
-        outermost = self.state.nodes[nodes[0]].props.plugin_name()
-        while self.state.nodes[nodes[0]].props.plugin_name() in ("aov", "moment"):
-            nodes = self._children_of(nodes[0], mi.ObjectType.Integrator)
-            if not nodes:
-                raise SceneError(
-                    f"{self.path} has an {outermost!r} integrator with none inside that renders "
-                    "light: put a path integrator into it"
-                )
-        props = self.state.nodes[nodes[0]].props
-        shading = int(props.get("shading_samples", 1))
-        samples = (props.get("emitter_samples", shading), props.get("bsdf_samples", shading))
-        return Integrator(
-            props.plugin_name(),
-            int(props.get("max_depth", -1)),
-            int(props.get("rr_depth", 5)),
-            bool(props.get("hide_emitters", False)),
-            (int(samples[0]), int(samples[1])),
-        )
+        """What renders it."""
+        return read_integrator(self.state, self.path)
 
     def has_media(self) -> bool:
         import mitsuba as mi
@@ -218,6 +206,8 @@ class ParsedScene:
                 while data := file.read(2**24):
                     digest.update(data)
         digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
+        if self.instead is not None:
+            digest.update(str(self.instead).encode())
         return digest.hexdigest()[:32]
 
     def assets(self) -> Iterator[Path]:
@@ -245,8 +235,11 @@ class ParsedScene:
 
 
 @contextmanager
-def mitsuba_errors(path: Path) -> Iterator[None]:
-    """Turn what Mitsuba throws into one line: its own words, without its source places."""
+def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Iterator[None]:
+    """Turn what Mitsuba throws into one line: its own words, without its source places.
+
+    instead: the integrator that was put in.
+    """
     try:
         yield
     except MemoryError:
@@ -262,4 +255,7 @@ def mitsuba_errors(path: Path) -> Iterator[None]:
         text = one_line(text, limit=MAX_SAID)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
         hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
+        if "integrator plugin" in text:
+            hint = f"; that is the integrator that was asked for, {instead}"
+            hint = hint if instead else '; integrator="path" renders it with another'
         raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error

@@ -16,16 +16,18 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
+from lightpaint.scene.checks.old import words_for_old_scenes
 from lightpaint.scene.checks.xml import MAX_XML
 from lightpaint.scene.choice import REST, choose_lights
 from lightpaint.scene.emission import EmitterSetting
 from lightpaint.scene.emitters import Emitter, check_emitters, find_emitters, point_emitter
 from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
+from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights_file import Asked, lights_file_for
-from lightpaint.scene.parsed import Integrator, ParsedScene, mitsuba_errors
+from lightpaint.scene.parsed import ParsedScene, mitsuba_errors
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import Listed, Shown, some_of
+from lightpaint.screen import Listed, Shown, some_names, some_of
 
 _Made = TypeVar("_Made")
 
@@ -41,6 +43,7 @@ class Scene(Shown):
         sensor_names: Ids of all sensors.
         spp: Samples per pixel the scene itself asks for.
         integrator: Its plugin and options.
+        instead: What was put in the place of the scene's own integrator, if anything was.
         has_media: Whether there is fog or the like.
         has_null: Whether rays may pass a surface as if it were not there.
         emitters: All of them.
@@ -65,6 +68,7 @@ class Scene(Shown):
     sensor_names: tuple[str, ...]
     spp: int
     integrator: Integrator
+    instead: IntegratorChoice | None
     has_media: bool
     has_null: bool
     emitters: tuple[Emitter, ...]
@@ -111,8 +115,8 @@ class Scene(Shown):
         if set(given) != there:
             raise SceneError(
                 f"{self.path} has other emitters than are asked for: it lacks "
-                f"{', '.join(sorted(set(given) - there)) or 'none'} and also has "
-                f"{', '.join(sorted(there - set(given))) or 'none'}"
+                f"{some_names(sorted(set(given) - there)) or 'none'} and also has "
+                f"{some_names(sorted(there - set(given))) or 'none'}"
             )
         if len(given) > len(there) or not all(members.values()):
             raise SceneError(
@@ -206,6 +210,11 @@ class Scene(Shown):
             del loaded
             gc.collect()
 
+    @property
+    def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
+        """Where those stand that `instead` replaces: file, and byte offset of the element."""
+        return tuple((self.files[file], offset) for file, offset in self._parsed.replaced)
+
     def emitted_image(self, emitter: Emitter) -> Floats:
         """The image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
         import mitsuba as mi
@@ -229,6 +238,7 @@ def load_scene(
     groups: Mapping[str, Iterable[str]] | None = None,
     lights_file: str | Path | None = None,
     use_lights_file: bool = True,
+    integrator: str | None = None,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
@@ -243,6 +253,8 @@ def load_scene(
             replaces what it lists, `groups` are added to its own or replace namesakes; without
             `lights` they are adjusted beside what it lists.
         use_lights_file: False leaves the one beside the scene alone.
+        integrator: To render with instead of the scene's own, like `path`, `direct` or
+            `path:max_depth=8`. What its own says of max_depth, rr_depth and hide_emitters stays.
 
     Raises:
         SceneError: With Mitsuba's own message where it refuses the scene.
@@ -261,11 +273,12 @@ def load_scene(
     if path.suffix.lower() in (".exr", ".json", ".png"):
         raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
     values = {key: str(value) for key, value in (parameters or {}).items()}
-    with mitsuba_errors(path):
-        parsed = ParsedScene(path, values, backend.variant)
+    instead = None if integrator is None else IntegratorChoice.of(integrator)
+    with words_for_old_scenes(path), mitsuba_errors(path):
+        parsed = ParsedScene(path, values, backend.variant, instead)
     index = sensor_index(sensor, parsed.sensor_names, path)
     said = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
-    with mitsuba_errors(path):
+    with words_for_old_scenes(path), mitsuba_errors(path):
         seen = _look_at(parsed, index)
     check_film(path, seen["film"], seen["spp"])
     emitters = seen["emitters"]
@@ -297,6 +310,7 @@ def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
         **seen,
         "sensor_names": parsed.sensor_names,
         "integrator": parsed.integrator(),
+        "instead": parsed.instead,
         "has_media": parsed.has_media(),
         "files": parsed.files,
         "content": parsed.content(sensor),

@@ -1,10 +1,13 @@
 """The cache of bases: found again, gone on with, never mixed, never in the way."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from command import run
 from renderer import write_room
 
 from lightpaint.basis import cache
@@ -84,7 +87,8 @@ def test_the_longest_unused_goes_first(scene: Scene, monkeypatch: pytest.MonkeyP
     left = {entry.path for entry in cache.entries()}
     assert by_age[2].path in left
     assert len(left) == 2
-    assert cache.clear() == 2
+    left_over = cache.entries()
+    assert cache.drop(left_over) == sum(entry.size for entry in left_over)
     assert cache.entries() == []
 
 
@@ -103,3 +107,47 @@ def test_separate_renders_are_kept_as_well(tmp_path: Path) -> None:
     obtain_basis(scene, spp=4)
     assert obtain_basis(scene, spp=4, progress=passes(log)).origin.spp == 4
     assert log == []
+
+
+def test_bases_are_dropped_by_scene_or_file(
+    tmp_path: Path, empty_cache: Path, make_basis: Any
+) -> None:
+    origins = [("hall.xml", "0" * 32), ("hall.xml", "1" * 32), ("room.xml", "2" * 32)]
+    for scene, identity in origins:
+        basis = make_basis(2)
+        origin = replace(basis.origin, scene=scene, scene_identity=identity)
+        assert cache.keep(replace(basis, origin=origin))
+    (empty_cache / f"damaged{cache.SUFFIX}").write_bytes(b"junk")
+
+    def scenes(pattern: str) -> list[str]:
+        return sorted(x.origin.scene if x.origin else "?" for x in cache.named(pattern))
+
+    assert scenes("hall.xml") == scenes("hall") == scenes("h*") == ["hall.xml"] * 2
+    assert scenes("*.xml") == ["hall.xml"] * 2 + ["room.xml"]
+    assert scenes("damaged") == scenes("dam*") == ["?"]
+    assert scenes("hal") == scenes("") == []
+    [file] = {entry.path.name for entry in cache.named("room")}
+    assert scenes(file) == scenes(file.removesuffix(cache.SUFFIX)) == ["room.xml"]
+    here = {"LIGHTPAINT_CACHE": str(empty_cache)}
+    size = sum(entry.size for entry in cache.named("hall"))
+    done = run(tmp_path, "cache", "drop", "hall", "h*", **here)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("hall.xml") == 2
+    assert f"2 deleted from {empty_cache}: {size / 1e6:.1f} MB are free" in done.stdout
+    assert scenes("*") == ["?", "room.xml"]
+    for line, says in (
+        (["drop", "hall"], "no basis of 'hall' is kept in"),
+        (["drop", "room", "gone"], "no basis of 'gone' is kept in"),  # and the other stays
+        (["drop"], "cache drop needs the name of a scene"),
+        (["clear", "room"], "cache clear takes no name: cache drop room does"),
+        (["list", "room"], "cache list takes no name"),
+    ):
+        done = run(tmp_path, "cache", *line, **here)
+        assert done.returncode == 2
+        assert says in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+    assert "it has room.xml" in run(tmp_path, "cache", "drop", "gone", **here).stderr
+    assert scenes("*") == ["?", "room.xml"]
+    assert "of at most 8590 MB" in run(tmp_path, "cache", **here).stdout
+    assert run(tmp_path, "cache", "clear", **here).stdout.startswith("2 deleted")
+    assert cache.entries() == []

@@ -54,6 +54,11 @@ def folder(tmp_path: Path) -> Path:
         ("lightpaint solve hall.xml l", ["looks/"]),
         ("lightpaint relight hall.xml l", ["lighting.json", "looks/"]),
         ("lightpaint solve hall.xml n", []),
+        ("lightpaint solve hall.xml --spp 4 w", ["warm.png"]),
+        ("lightpaint solve --spp 4 hall.xml --resize w", ["warm.png"]),
+        ("lightpaint solve --suggest h", ["hall.basis.exr", "hall.xml"]),
+        ("lightpaint solve hall.xml warm.png --quality ", ["final", "preview"]),
+        ("lightpaint solve hall.xml --seed 1 --qual", ["--quality"]),
     ],
 )
 def test_what_is_offered(folder: Path, line: str, offered: list[str]) -> None:

@@ -18,7 +18,7 @@ from lightpaint.scene.scene import load_scene
 
 FILE = """
 sparse = 3
-prefer = { current = 0.001 }
+prefer_current = 0.001
 
 [light.sun]
 off = true

@@ -1,12 +1,15 @@
 """What `solve` starts from, as it is given on the command line."""
 
+import json
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command import refused
 from light_groups import channels, interleaved, pictures, write
+from renderer import write_room
 
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
@@ -14,6 +17,8 @@ from lightpaint.cli.options import basis_of, jobs_of, settings_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
 from lightpaint.errors import BasisError, ImageError
+from lightpaint.lighting.file import write_lighting
+from lightpaint.lighting.lighting import Lighting
 from lightpaint.sources import BasisFile, GroupsFile
 from lightpaint.target.target import Target
 
@@ -115,7 +120,7 @@ def test_light_groups_are_known_by_how_they_begin(here: Path, name: str, given: 
             r"^x\.exr is cut off or damaged in its header \(.*ttribute.*\): export it again$",
         ),
         (lambda c: c[:-50], r"^x\.exr is .*(cut off|damaged)"),
-        (lambda c: b"", r"^x\.exr is no OpenEXR file"),
+        (lambda c: b"", r"^x\.exr is empty, or only made up"),
         (lambda c: b"\x89PNG\r\n\x1a\n" + c[8:], r"^x\.exr is a PNG file"),
     ],
 )
@@ -168,3 +173,50 @@ def test_holes_are_taken_from_the_painting(tmp_path: Path):
     assert counted.importance[1, 2] == 0
     assert counted.not_finite == 3
     assert counted.without(groups.holes) is counted
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("", ".", "..", "a/b", "/tmp/x", "../x", "a\0b", "a\nb", "a\r", "\x1b[31ma", "\x7f"),
+        *("\u202eabc", "\x9b", "x" * 300, "ü" * 130),
+    ],
+)
+def test_a_target_that_names_no_folder(tmp_path: Path, make_basis: Any, name: str):
+    lighting = Lighting.present(make_basis(2)).named(name)
+    write_lighting(tmp_path / "l.json", lighting)
+    write_lighting(tmp_path / "m.json", lighting.named("good"))
+    if name:  # which is then called as its file is
+        said = refused(tmp_path, "relight", "scene.xml", "l.json")
+        assert "is no name for a folder: choose one with -o" in said
+        assert len(said) < 600
+        several = refused(tmp_path, "relight", "scene.xml", "l.json", "m.json", "-o", "looks")
+        assert "is no name for a folder: take it alone, with -o" in several
+    # Named otherwise, it is only looked for where it is not.
+    assert "no such scene" in refused(tmp_path, "relight", "gone.xml", "l.json", "-o", "there")
+
+
+def test_numbers_beyond_any_light_are_one_line(tmp_path: Path, make_basis: Any):
+    basis = make_basis(2, names=["a", "b"])
+    write_basis(tmp_path / "b.basis.exr", basis)
+    write(
+        tmp_path / "p.exr", ("rgb", channels("", pictures()[0][: basis.size[0], : basis.size[1]]))
+    )
+    write_lighting(tmp_path / "l.json", Lighting.present(basis).named("x"))
+    data = json.loads((tmp_path / "l.json").read_text(encoding="utf-8"))
+    room = write_room(tmp_path)
+    for key in ("emission", "weight", "unit_flux", "standard_error"):
+        for huge in (1e39, 1e31, 1e308):
+            light = {**data["lights"]["a"], key: [1, huge, 1]}
+            bent = {**data, "lights": {**data["lights"], "a": light}}
+            (tmp_path / "huge.json").write_text(json.dumps(bent), encoding="utf-8")
+            said = refused(tmp_path, "relight", room, "huge.json")
+            assert "huge.json" in said
+            assert "from 0 to 1e+30" in said
+    toml = tmp_path / "huge.toml"
+    for asked in ("lock = 1e39", "lock = [1, 1e39, 1]", "limits = {max = 1e39}", 'lock = "1e41%"'):
+        toml.write_text(f"[light.a]\n{asked}\n", encoding="utf-8")
+        said = refused(tmp_path, "solve", "b.basis.exr", "p.exr", "--lights-file", toml)
+        assert "at most 1e+30" in said
+    for option in ("--unit", "--unpainted", "--prefer-current"):
+        assert "<= 1e+30" in refused(tmp_path, "solve", "b.basis.exr", "p.exr", option, "1e39")

@@ -206,7 +206,6 @@ def test_float32_pixels_are_copied_once(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ("content", "kind"),
     [
-        (b"", "no OpenEXR"),
         (b"#?RADIANCE\n", "a Radiance HDR"),
         (b"\x89PNG\r\n\x1a\n" + bytes(99), "a PNG"),
         (b"\xff\xd8\xff\xe0", "a JPEG"),

@@ -463,7 +463,6 @@ def test_masks_are_numbers(tmp_path: Path, dtype: Any):
 @pytest.mark.parametrize(
     ("content", "named"),
     [
-        (b"", "no picture that can be read"),
         (b"#?RADIANCE\n", "a Radiance HDR file"),
         (b"RIFF1234WEBPVP8 ", "a WebP file"),
         (b"gimp xcf v011\0", "a GIMP file"),

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.errors import LightingError
+from lightpaint.expected import BRIGHTEST
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import (
     Certificate,
@@ -18,6 +19,7 @@ from lightpaint.lighting.lighting import (
 
 AMOUNTS = st.floats(min_value=0, allow_nan=False, allow_infinity=False)
 COLOURS = st.tuples(AMOUNTS, AMOUNTS, AMOUNTS)
+EMISSIONS = st.tuples(*[st.floats(0, BRIGHTEST)] * 3)
 COUNTS = st.integers(0, 10**6)
 SETTINGS = st.builds(
     LightSetting,
@@ -25,8 +27,8 @@ SETTINGS = st.builds(
     plugin=st.text(max_size=6),
     parameter=st.text(max_size=6),
     unit=st.text(max_size=6),
-    emission=COLOURS,
-    weight=COLOURS,
+    emission=EMISSIONS,
+    weight=EMISSIONS,
 )
 CERTIFICATES = st.builds(
     Certificate,

@@ -99,7 +99,7 @@ def test_seen_emitters_count_where_somebody_painted_them(make_basis: Any):
 
 def test_nothing_but_emitters(make_basis: Any):
     basis = make_basis(3, SIZE, seen=np.ones(SIZE, bool))
-    with pytest.raises(TargetError, match="emitter in every pixel"):
+    with pytest.raises(TargetError, match="emitter in every painted pixel"):
         solve(basis, _target(np.ones((*SIZE, 3))))
 
 

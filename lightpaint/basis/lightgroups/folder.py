@@ -14,12 +14,10 @@ from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import OWN, read_channels, read_headers
 from lightpaint.images.exr_layers import KRITA_LAYERS
 from lightpaint.images.kinds import head_of, kind_of
+from lightpaint.screen import some_names
 
 #: Files that a folder of light groups may have: more are the frames of a film.
 MAX_FILES = 1000
-
-#: Files that are named in a sentence.
-MOST_NAMED = 10
 
 
 def is_light_groups(path: Path) -> bool:
@@ -120,6 +118,5 @@ def _spoken(why: dict[Path, str]) -> str:
     told = []
     for reason in dict.fromkeys(why.values()):
         names = [file.name for file, its in why.items() if its == reason]
-        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-        told.append(f"{', '.join(names[:MOST_NAMED])}{more} ({reason})")
+        told.append(f"{some_names(names)} ({reason})")
     return "; ".join(told)

@@ -18,6 +18,7 @@ from lightpaint.colour.primaries import are_same, converted, to_rec709
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.exr import Part, read_parts
 from lightpaint.images.exr_layers import ALPHA_NAMES, channel_named, colour_channels, primaries_of
+from lightpaint.screen import some_names
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def read_layers(
     names = [layer.name for layer in layers]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise BasisError(
-            f"{path} has the layers {', '.join(name or 'R, G, B' for name in twice)} more than "
+            f"{path} has the layers {some_names(name or 'R, G, B' for name in twice)} more than "
             "once: is it a sequence of frames, or several views? give one file of one view"
         )
     return layers, remarks
@@ -153,7 +154,7 @@ def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str
     """(h, w, 3), float16 where all are. Raises ImageError if they differ in size."""
     planes = [pixels[name] for name in channels]
     if len({plane.shape for plane in planes}) > 1:
-        raise ImageError(f"{path}: channels {', '.join(channels)} differ in size: export it again")
+        raise ImageError(f"{path}: channels {some_names(channels)} differ in size: export it again")
     kind = np.float16 if all(p.dtype == np.float16 for p in planes) else np.float32
     return np.stack(planes, axis=-1).astype(kind, copy=False)
 

@@ -17,6 +17,7 @@ from lightpaint.basis.lightgroups.conventions import (
     beauty_among,
 )
 from lightpaint.errors import BasisError
+from lightpaint.screen import some_names
 
 #: Who has named files that no convention knows.
 FILES = "one file per light"
@@ -61,7 +62,7 @@ def choose_layers(
     if fitting:
         told = [f"{len(found)} as of {convention.renderer}" for convention, found in fitting]
         raise BasisError(
-            f"{where} names its layers in several ways ({', '.join(told)}): say which are the "
+            f"{where} names its layers in several ways ({some_names(told)}): say which are the "
             f"lights, like pattern={_example(layers)!r}; {_listed(layers)}"
         )
     raise BasisError(
@@ -108,12 +109,12 @@ def _by_convention(
     left = [m[0] for m in found if BESIDE.fullmatch(m[0])]
     found = [m for m in found if m[0] not in left]
     if left:
-        remarks.append(f"{', '.join(left)}: taken for another version of a layer, and left out")
+        remarks.append(f"{some_names(left)}: taken for another version of a layer, and left out")
     views = list(dict.fromkeys(m.groupdict().get("view") or "" for m in found))
     view = views[0]
     if len(views) > 1:
         remarks.append(
-            f"of the view layers {', '.join(views)} the first is taken: "
+            f"of the view layers {some_names(views)} the first is taken: "
             f"pattern='{views[1]}.Combined_{NAME}' takes {views[1]}"
         )
     found = [m for m in found if (m.groupdict().get("view") or "") == view]
@@ -216,6 +217,4 @@ def _example(layers: Iterable[str]) -> str:
 
 
 def _listed(layers: Iterable[str]) -> str:
-    names = [name or "R, G, B" for name in layers]
-    more = f" and {len(names) - 30} more" if len(names) > 30 else ""
-    return f"its RGB layers are {', '.join(names[:30]) or 'none'}{more}"
+    return f"its RGB layers are {some_names(name or 'R, G, B' for name in layers) or 'none'}"

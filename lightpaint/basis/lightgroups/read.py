@@ -19,7 +19,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import FILES
 from lightpaint.basis.lightgroups.roles import Roles, roles_of
 from lightpaint.errors import BasisError
-from lightpaint.screen import shortly
+from lightpaint.screen import shortly, some_names
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
@@ -111,7 +111,7 @@ def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
     missing = _what_is_missing(roles, holes)
-    listed = f"light groups as of {roles.renderer}: {', '.join(names)}"
+    listed = f"light groups as of {roles.renderer}: {some_names(names)}"
     if beauty is not None:
         listed += f"; the whole picture: {beauty.name or 'R, G, B'}"
     remarks = [*told, listed, *roles.remarks, missing.told]
@@ -173,7 +173,7 @@ def _spoken_black(lights: Mapping[str, RenderLayer], missing: float | None) -> l
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
         return []
-    told = f"the file holds nothing of {', '.join(black)}: black in every pixel, so kept as it is"
+    told = f"the file holds nothing of {some_names(black)}: black in every pixel, so kept as it is"
     if missing is None or missing <= NOTHING:
         return [f"{told}; is the light off, or the group renamed?"]
     return [

@@ -9,6 +9,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
 
 
 def obtain_basis(
@@ -54,8 +55,8 @@ def check_same_view(scene: Scene, basis: Basis) -> None:
     its = {light.name: light.members for light in basis.lights}
     if mine != its:
         raise BasisError(
-            f"the basis has the lights {', '.join(its)}, and {scene.path} was loaded with "
-            f"{', '.join(mine)}: load it with the same lights and groups"
+            f"the basis has the lights {some_names(its)}, and {scene.path} was loaded with "
+            f"{some_names(mine)}: load it with the same lights and groups"
         )
     if (origin.scene_identity, origin.sensor) != (scene.identity, sensor):
         what = "another state of the scene" if origin.sensor == sensor else "another sensor"

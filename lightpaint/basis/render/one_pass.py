@@ -28,7 +28,7 @@ from lightpaint.basis.render.guide import Guide
 from lightpaint.basis.render.half_sums import HalfSums
 from lightpaint.basis.render.paths import Planes, camera_rays, trace
 from lightpaint.basis.render.sobol import SobolPairs
-from lightpaint.scene.parsed import Integrator
+from lightpaint.scene.integrator import Integrator
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
 

@@ -140,6 +140,7 @@ def _origin(
         method=method,
         halves=halves,
         passes=passes,
+        integrator="" if scene.instead is None else str(scene.instead),
     )
 
 

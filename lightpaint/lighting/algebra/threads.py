@@ -30,6 +30,23 @@ def one_thread() -> AbstractContextManager[object]:
     return limits
 
 
+def linear_algebra() -> tuple[str, str]:
+    """The library under NumPy with its version, and its kernel: `openblas 0.3.31`, `Haswell`.
+
+    Kernels add in different orders, so that results differ in their last digits. "" for what is not
+    known: a library that is not listed, or says nothing of a kernel.
+    """
+    found = [x for x in _controller().info() if x.get("user_api") == "blas"]
+    # SciPy has one of its own.
+    found.sort(key=lambda library: "numpy" not in library["filepath"])
+    if not found:
+        return "", ""
+    first = found[0]
+    return f"{first['internal_api']} {first.get('version') or ''}".strip(), str(
+        first.get("architecture") or ""
+    )
+
+
 def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
     """work(job) of each job, several at a time with BLAS on one thread; results in order.
 

@@ -19,35 +19,70 @@ AT_LIMIT = 1e-9
 
 
 @dataclass(frozen=True)
+class Held:
+    """What holds the unknowns of a block, bounds first, then the sums that are at a limit.
+
+    ways: (k, h), for each a direction that leaves it, and nothing else that holds, by one unit.
+    room: (h,), how far that may go. of_bounds: (b,), whose bounds they are, for the first b.
+    sums: (h - b, k), coefficients of the others.
+    """
+
+    ways: Doubles
+    room: Doubles
+    of_bounds: Indices
+    sums: Doubles
+
+    @property
+    def own(self) -> Doubles:
+        """(k, h), of the ways what they do to the unknowns that are held there themselves."""
+        its = np.zeros(self.ways.shape, dtype=bool)
+        its[self.of_bounds, np.arange(self.of_bounds.size)] = True
+        its[:, self.of_bounds.size :] = self.sums.T != 0
+        return np.where(its, self.ways, 0)
+
+    def kept(self, covariance: Doubles) -> Doubles:
+        """A covariance of the unknowns, (k, k), where what holds them does hold."""
+        kept = covariance.copy()
+        kept[self.of_bounds], kept[:, self.of_bounds] = 0, 0
+        for row in self.sums:
+            its = np.flatnonzero(row)
+            along = kept[np.ix_(its, its)] @ row[its]
+            if (variance := float(row[its] @ along)) > 0:
+                kept[np.ix_(its, its)] -= np.outer(along, along) / variance
+        return kept
+
+
+@dataclass(frozen=True)
 class Room:
     """What the unknowns of one block may do about an answer.
 
-    columns: (3 n, k), what each changes of the weights, 0 where a light reaches nothing.
-    x: (k,), where they are. free: (k, m), directions in which no bound and no cap holds them.
-    off: (o,), those that are at 0 and may be more, each by itself.
+    columns: (3 n, k), what each changes of the weights, 0 where a light reaches nothing. emitted:
+    the same there, too. free: (k, m), directions in which no bound and no cap holds them.
     """
 
     columns: Doubles
-    x: Doubles
+    emitted: Doubles
     free: Doubles
-    off: Indices
+    held: Held
 
 
 def rooms(solution: Solution, equations: NormalEquations) -> Iterator[Room]:
     """One for every set of channels that the unknowns couple. equations: what is solved."""
     reduction, lit = solution.problem.reduction, solution.equations.reached
     x = solve_reduced(equations, reduction, solution.weights).x
-    at_cap = _at_caps(reduction, x)
+    rows, left = _at_caps(reduction, x)
     for block in reduction.blocks:
         its = block.its
         columns = _columns(reduction, its, lit)
-        reaches = columns.any(axis=0)
-        inside = (reduction.lower[its] < x[its]) & (x[its] < reduction.upper[its]) & reaches
-        rows = at_cap[:, its]
-        rows = rows[rows.any(axis=1)]
-        off = (x[its] == 0) & (reduction.lower[its] == 0) & (reduction.upper[its] > 0) & reaches
-        off &= ~rows.any(axis=0)
-        yield Room(columns, x[its], _keeping(rows, np.flatnonzero(inside)), np.flatnonzero(off))
+        lower, upper = reduction.lower[its], reduction.upper[its]
+        may = (lower < upper) & columns.any(axis=0)
+        at = np.where(x[its] <= lower, 1, np.where(x[its] >= upper, -1, 0)) * may
+        inside, bound = np.flatnonzero(may & (at == 0)), np.flatnonzero(at)
+        mine = rows[:, its].any(axis=1)
+        sums = rows[mine][:, its]
+        free, back = _keeping(sums, inside)
+        held = _held(sums, back, bound, at, np.concatenate([(upper - lower)[bound], left[mine]]))
+        yield Room(columns, _columns(reduction, its, np.ones_like(lit)), free, held)
 
 
 def moving(solution: Solution) -> list[Doubles]:
@@ -95,23 +130,55 @@ def _columns(reduction: Reduction, its: Indices, lit: Bools) -> Doubles:
     return (made * lit.T[:, :, None]).reshape(3 * len(lit), its.size)
 
 
-def _at_caps(reduction: Reduction, x: Doubles) -> Doubles:
-    """(j, unknowns), coefficients of the caps whose sums are at a limit."""
-    rows = []
+def _at_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
+    """Of the caps whose sums are at a limit: coefficients, and how far they may go from there.
+
+    Returns (j, unknowns), negative where the sum may only rise, and (j,).
+    """
+    rows, room = [], []
     for cap in reduction.caps:
         its, coefficients = list(cap.unknowns), np.asarray(cap.coefficients)
-        if not cap.lower * (1 + AT_LIMIT) < coefficients @ x[its] < cap.upper * (1 - AT_LIMIT):
+        total = coefficients @ x[its]
+        if not cap.lower * (1 + AT_LIMIT) < total < cap.upper * (1 - AT_LIMIT):
             row = np.zeros(x.size)
-            row[its] = coefficients
+            row[its] = coefficients if total >= cap.upper * (1 - AT_LIMIT) else -coefficients
             rows.append(row)
-    return np.array(rows).reshape(-1, x.size)
+            room.append(cap.upper - cap.lower)
+    return np.array(rows).reshape(-1, x.size), np.array(room)
 
 
-def _keeping(rows: Doubles, inside: Indices) -> Doubles:
-    """(k, m), directions of the unknowns inside their bounds that keep the sums `rows`, (j, k)."""
+def _keeping(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:
+    """What the unknowns inside their bounds may do about the sums `rows`, (j, k).
+
+    Returns (k, m), directions that keep them, and (k, j), for each one that lowers it by one and
+    keeps the others; NaN where there is none.
+    """
     free = np.eye(rows.shape[1])[:, inside]
     if not len(rows):
-        return free
-    _, sizes, right = np.linalg.svd(rows[:, inside])
+        return free, np.zeros((rows.shape[1], 0))
+    left, sizes, right = np.linalg.svd(rows[:, inside])
     rank = int((sizes > AT_LIMIT * sizes.max(initial=0)).sum())
-    return np.asarray(free @ right[rank:].T)
+    inverse = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
+    lost = np.abs(rows[:, inside] @ inverse - np.eye(len(rows))).max(axis=0) > AT_LIMIT
+    back = np.where(lost, np.nan, -free @ inverse)
+    return np.asarray(free @ right[rank:].T), np.asarray(back)
+
+
+def _held(rows: Doubles, back: Doubles, bound: Indices, at: Indices, room: Doubles) -> Held:
+    """What holds a block, as far as each thing can be left by itself.
+
+    rows, back: of the sums, (j, k) and (k, j), as of `_keeping`. bound: (b,), unknowns at a bound.
+    at: (k,), 1 at the lower, -1 at the upper one. room: (b + j,).
+    """
+    ways = np.eye(len(at))[:, bound] * at[bound]
+    pushed = rows @ ways
+    for j, b in np.argwhere(pushed != 0):
+        # Those inside make up for what this does to the sum.
+        ways[:, b] += back[:, j] * pushed[j, b]
+    can_leave = np.isfinite(ways).all(axis=0), np.isfinite(back).all(axis=0)
+    return Held(
+        np.hstack([ways[:, can_leave[0]], back[:, can_leave[1]]]),
+        room[np.concatenate(can_leave)],
+        bound[can_leave[0]],
+        rows[can_leave[1]],
+    )

@@ -5,7 +5,9 @@ their difference, pixel by pixel, has the covariance of the gradient's noise, an
 of M turns that into the covariance of the weights (docs/method.md, "How sure").
 """
 
+import math
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 
@@ -25,14 +27,19 @@ from lightpaint.lighting.analysis.noise import (
     pseudo_inverse,
     without_noise,
 )
-from lightpaint.lighting.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
+from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
 from lightpaint.screen import shortly
 
-#: Standard errors on either side of a 95 % interval.
-SIDES = 1.96
+#: Standard errors on either side of a 95 % interval, and the part of all cases that is outside.
+SIDES, OUTSIDE = 1.96, 0.05
+
+NORMAL = NormalDist()
+
+#: Standard deviations beyond a bound from which on a normal tail is taken for an exponential one.
+FAR = 30.0
 
 #: Steps in which it is decided how much of the noise to take out of M.
 SHARES = 8
@@ -42,11 +49,15 @@ SHARES = 8
 class Uncertainty:
     """What noise does to a solve. All are estimates themselves, good to a third or so.
 
+    Of a channel of a light that reaches nothing that counts nothing is known: NaN.
+
     Attributes:
         weights: (n, 3), as solved.
         scatter: (n, 3), standard deviation of the weights from one seed to another. Of a light that
-            is off, what is left of it above zero (see `_one_sided`).
+            is off or at a limit, what is left of it on the side where it may go (see `_one_sided`).
         bias: (n, 3), how much higher the weights would be without the noise power in M.
+        interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. Of what is
+            off or at a limit it has one side, which is never empty.
         objective_error: (3,), standard deviation of the objective.
         objective_noise: (3,), what the prediction's own noise adds to it.
         excess: (3,), by how much the objective of these weights, were they rendered without noise,
@@ -63,6 +74,7 @@ class Uncertainty:
     weights: Doubles
     scatter: Doubles
     bias: Doubles
+    interval: tuple[Doubles, Doubles]
     objective_error: Doubles
     objective_noise: Doubles
     excess: Doubles
@@ -81,12 +93,6 @@ class Uncertainty:
         """Root mean square of scatter and bias, (n, 3): what the answer is off by."""
         return np.hypot(self.scatter, self.bias)
 
-    @property
-    def interval(self) -> tuple[Doubles, Doubles]:
-        """The 95 % interval of each weight, lower and upper ends, (n, 3) each."""
-        side = SIDES * self.standard_error
-        return np.maximum(self.weights - side, 0), self.weights + side
-
 
 def error_bars(solution: Solution) -> Uncertainty | None:
     """Standard error and bias of every weight that a solve or `refine` found.
@@ -94,9 +100,8 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     None where nothing is known of the noise of the basis: that is not the same as none. After
     reweighting they are of the last linear problem.
 
-    Lights that are kept or reach nothing have none. What a limit holds that was asked for has none
-    either: the error is of what is free to move there. What is off may be on by as much as noise
-    could hide, and no more (see `_one_sided`).
+    What is kept or locked has an error of 0; of what reaches nothing none is known. What is off or
+    at a limit may have been pushed there by noise: it has an interval on one side (`_one_sided`).
 
     Args:
         solution: As `solve`, `refine` or `correct_noise` made it.
@@ -118,7 +123,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     unbiased = NormalEquations(corrected, right, equations.target_norm2)
     bias = np.asarray(answer_to(solution, unbiased) - weights)
 
-    # How firmly lights are off, had there been no bias.
+    # How firmly lights are held, had there been no bias.
     asked = problem.pulled(unbiased)
     gradient = asked.gradient(weights + bias).T.ravel()
     # A render of the mix shows all of an earlier error, of which a step by the noisy M leaves
@@ -126,25 +131,39 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     scatters = problem.pulled(solved if problem.refinement is None else unbiased)
     M, C = scatters.whole, noise.gradient.reshape(gradient.size, -1)
     missed = equations.whole
-    variance, excess = np.zeros(gradient.size), np.zeros(gradient.size)
+    below, above, excess = (np.zeros(gradient.size) for _ in range(3))
     for room in rooms(solution, scatters):
-        to = room.columns
-        errors, covariance = _propagated(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
+        to, held = room.columns, room.held
+        steps, covariance = _propagated(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
         excess += np.einsum("pq,qp->p", missed, to @ covariance @ to.T)
-        covariance[room.off], covariance[:, room.off] = 0, 0
-        variance += np.einsum("pi,ij,pj->p", to, covariance, to, optimize=True)
-        variance += np.square(to) @ np.square(errors)
-    scatter = np.sqrt(np.maximum(variance, 0)).reshape(3, -1).T
+        both = np.einsum("pi,ij,pj->p", room.emitted, held.kept(covariance), room.emitted)
+        own = room.emitted @ (held.own * steps)
+        below += both + np.square(np.minimum(own, 0)).sum(axis=1)
+        above += both + np.square(np.maximum(own, 0)).sum(axis=1)
+    sides = [np.sqrt(np.maximum(side, 0)).reshape(3, -1).T for side in (below, above)]
     by_channel = excess.reshape(3, -1).sum(axis=1)
     by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
+    told = np.where(solution.reached, 1, np.nan)
     return Uncertainty(
         weights,
-        scatter,
-        bias,
+        np.maximum(*sides) * told,
+        bias * told,
+        _interval(solution, bias * told, sides),
         noise.objective_error,
         noise.objective_noise,
         by_channel,
         solution.norm2,
+    )
+
+
+def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[Doubles, Doubles]:
+    """Lower and upper ends, (n, 3) each, within what is allowed. sides: below and above."""
+    weights = solution.weights
+    low, high = solution.problem.reduction.ends
+    below, above = (SIDES * np.hypot(side, bias) for side in sides)
+    return (
+        np.minimum(np.maximum(weights - below, low), weights),
+        np.maximum(np.minimum(weights + above, high), weights),
     )
 
 
@@ -208,40 +227,66 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
     """`solution` with the standard errors of lights and objective, where they are known."""
     if uncertainty is None:
         return solution
-    lights: list[LightSetting] = []
-    for light, error in zip(solution.lighting.lights, uncertainty.standard_error, strict=True):
-        kept = light.is_fixed or light.name in solution.certificate.unreached
-        lights.append(light if kept else replace(light, standard_error=as_rgb(error)))
-    lighting = replace(solution.lighting, lights=tuple(lights))
+    ends = np.stack(uncertainty.interval, axis=-1)
+    lights = tuple(
+        light if light.is_fixed or not any(light.reached) else _with_errors(light, error, interval)
+        for light, error, interval in zip(
+            solution.lighting.lights, uncertainty.standard_error, ends, strict=True
+        )
+    )
+    lighting = replace(solution.lighting, lights=lights)
     error = as_rgb(uncertainty.objective_error)
     return replace(solution, lighting=lighting).told(objective_error=error)
 
 
 def _propagated(M: Doubles, C: Doubles, room: Room, gradient: Doubles) -> tuple[Doubles, Doubles]:
-    """Errors of unknowns that are off, (k,), and the covariance of all, (k, k), 0 for what is held.
+    """How far what holds may be left, (h,), and the covariance of all unknowns, (k, k).
 
     M: (k, k); C: (k, k), covariance of the noise of the gradient, (k,). Cov(x) = M⁻¹ C M⁻¹ over
-    what is free, and what is off by no more than noise.
+    what is free, and over what noise alone may hold.
     """
-    errors = np.zeros(room.x.size)
-    for i in room.off.tolist():
-        errors[i] = _one_sided(M, C, room.free, i, float(gradient[i]))
-    free = np.hstack([room.free, np.eye(room.x.size)[:, errors > 0]])
+    free = room.free
+    # Left, with what is free making the best of it.
+    ways = room.held.ways - free @ (
+        pseudo_inverse(free.T @ M @ free) @ (free.T @ M @ room.held.ways)
+    )
+    stiffness, alone = (np.einsum("kh,kl,lh->h", w, M, w) for w in (ways, room.held.ways))
+    # The others do all that some could do.
+    counts = stiffness > SINGULAR * alone
+    safe = np.where(counts, stiffness, 1)
+    pushed = np.where(counts, np.maximum(ways.T @ gradient, 0), 0) / safe
+    noise = np.maximum(np.einsum("kh,kl,lh->h", ways, C, ways), 0)
+    spread = np.where(counts, np.sqrt(noise), 0) / safe
+    ends = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
+    free = np.hstack([free, ways[:, pushed < SIDES * spread]])
     inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
-    return errors, inverse @ C @ inverse
+    return np.minimum(ends, room.held.room) / SIDES, inverse @ C @ inverse
 
 
-def _one_sided(M: Doubles, C: Doubles, free: Doubles, i: int, gradient: float) -> float:
-    """Error of an unknown that is off: how far noise alone could have kept it from being on.
+def _one_sided(pushed: float, spread: float) -> float:
+    """End of the 95 % interval of something that is at a bound, from there on.
 
-    Were it free it would have the value u < 0 with some standard deviation s, so it may be
-    on by SIDES · s − |u|. free: (k, m), what the others may do.
+    Were it free it would be beyond the bound by `pushed`, u, with the standard deviation s of
+    `spread`. Of what is known not to be beyond, the end is U with
+
+        P(X > U) = 0.05 P(X > 0),   X ~ N(-u, s²),
+
+    which is 1.96 s at u = 0, about 3 s²/u far beyond, and never 0: whatever the true value is, it
+    is below U in 95 % of all cases or more.
     """
-    along = -free @ (pseudo_inverse(free.T @ M @ free) @ (free.T @ M[:, i]))
-    along[i] = 1
-    stiffness = M[i] @ along
-    if stiffness <= SINGULAR * M[i, i]:
-        return 0.0  # the others do all that it could do
-    wanted = -max(gradient, 0.0) / stiffness
-    spread = float(np.sqrt(np.maximum(along @ C @ along, 0.0))) / stiffness
-    return max(0.0, float(spread + wanted / SIDES))
+    if spread <= 0:
+        return 0.0
+    u = pushed / spread
+    if u > FAR:
+        # The tail of a normal distribution is nearly exp(-u t - t²/2) there.
+        return spread * (math.hypot(u, math.sqrt(-2 * math.log(OUTSIDE))) - u)
+    beyond = math.erfc(u / math.sqrt(2)) / 2
+    return spread * (-NORMAL.inv_cdf(OUTSIDE * beyond) - u)
+
+
+def _with_errors(light: LightSetting, error: Doubles, interval: Doubles) -> LightSetting:
+    """A light with its standard error, (3,), and its interval, (3, 2); NaN where nothing tells."""
+    r, g, b = (None if np.isnan(e) else float(e) for e in error)
+    ends = ((float(low), float(high)) for low, high in interval)
+    red, green, blue = (None if np.isnan(low) else (low, high) for low, high in ends)
+    return replace(light, standard_error=(r, g, b), interval=(red, green, blue))

@@ -14,6 +14,7 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     overlaid,
 )
+from lightpaint.screen import some_names
 
 
 def of_each_light(
@@ -38,14 +39,14 @@ def tied_lights(
     tie_of: dict[int, tuple[Tie, list[int]]] = {}
     for tie in constraints.ties:
         members = sorted({k for name in tie.lights for k in _found(name, lights, tie.where)})
-        listed = ", ".join(tie.lights)
+        listed = some_names(tie.lights)
         if len(members) < 2:
             raise ConstraintError(f"{tie.where}: {listed} is one light: a tie has at least two")
         for k in members:
             if k in tie_of:
                 raise ConstraintError(
                     f"{tie.where}: light {lights[k].name!r} is in two ties, "
-                    f"{', '.join(tie_of[k][0].lights)} and {listed}: it has one dimmer"
+                    f"{some_names(tie_of[k][0].lights)} and {listed}: it has one dimmer"
                 )
             tie_of[k] = (tie, members)
     return tie_of
@@ -78,5 +79,5 @@ def _found(
         there = [light.name for light in lights if not light.is_fixed]
         close = difflib.get_close_matches(name, there, n=1)
         hint = f"did you mean {close[0]!r}? There" if close else "there"
-        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {', '.join(there)}")
+        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {some_names(there)}")
     return found

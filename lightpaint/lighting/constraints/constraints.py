@@ -155,7 +155,7 @@ class Constraints:
         return cls(
             tuple(lights),
             _ties(tie, f"{lead}tie"),
-            strength_of(prefer_current, f"{lead}prefer"),
+            strength_of(prefer_current, f"{lead}prefer_current"),
             count_of(sparse, f"{lead}sparse"),
         )
 

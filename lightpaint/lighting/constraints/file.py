@@ -1,10 +1,13 @@
 """Constraints from a lights file, the TOML beside a scene."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.values import check_keys, strength_of
 from lightpaint.scene.lights_file import Asked, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
@@ -33,13 +36,32 @@ def constraints_of(asked: Asked) -> Constraints:
     """The same of what was read already. Raises ConstraintError."""
     keys = asked.keys
     try:
+        strength = _preferred(keys, asked.source)
         return Constraints.of(
             keys.get("light"),
             tie=keys.get("tie", ()),
-            prefer_current=keys.get("prefer", 0.0),
+            prefer_current=strength,
             sparse=keys.get("sparse"),
             where=asked.source,
         )
     except ConstraintError as error:
         # What stands in the file may be of any length.
         raise ConstraintError(one_line(str(error), limit=MAX_SAID)) from None
+
+
+def _preferred(keys: Mapping[str, Any], source: str) -> Any:
+    """The strength of the pull to the present, or what stands for it.
+
+    `prefer = { current = 0.01 }` and `prefer = 0.01` are what files had before `prefer_current`.
+    """
+    if "prefer" not in keys:
+        return keys.get("prefer_current", 0.0)
+    if "prefer_current" in keys:
+        raise ConstraintError(
+            f"{source}: both prefer_current and prefer, which is its older name: leave prefer out"
+        )
+    strength, where = keys["prefer"], f"{source}: prefer"
+    if isinstance(strength, Mapping):
+        check_keys(strength, ("current",), where)
+        strength, where = strength.get("current", 0.0), f"{where}.current"
+    return strength_of(strength, where)

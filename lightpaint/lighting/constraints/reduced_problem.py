@@ -65,7 +65,8 @@ class ReducedOptimum:
     the objective.
     weights: (n, 3), C x + w₀. kkt_residual, tolerance: (3,), the largest violation of the
     optimality conditions, after scaling, and what it was to come down to. sweeps: (3,).
-    reached: (n,), whether what moves a light reaches anything; what is held was not left to.
+    reached: (n, 3), whether what moves a light in a channel reaches anything; what is held was not
+    left to.
     """
 
     x: Doubles
@@ -100,11 +101,8 @@ def solve_reduced(
     `start`. method, tolerance, max_sweeps: see `minimise`.
     """
     lit = equations.reached
-    reached = np.ones(len(lit), dtype=bool)
-    if not lit.any(axis=1).all():
-        for knob in reduction.knobs:
-            reached[list(knob.lights)] = lit[list(knob.lights)].any()
-    x = nearest(reduction, start, reached) if x is None else x.copy()
+    reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.reached(lit)
+    x = nearest(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
     how: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
     left = _left(equations, reduction, lit, start)
     optima = _optima(left, equations.across, reduction, x, how)

@@ -148,6 +148,33 @@ class Reduction:
         np.add.at(w, light, x[unknown, None] * rgb)
         return w
 
+    def reached(self, lit: Bools) -> Bools:
+        """(n, 3), whether what moves a light in a channel reaches something that counts.
+
+        lit: (n, 3), whether the light itself does. A dimmer that does so in one channel or with
+        one of its lights tells all of them; what is held is told already.
+        """
+        unknown, light, rgb = self.columns
+        moves, felt = rgb != 0, np.zeros(len(self.unknowns), dtype=bool)
+        np.logical_or.at(felt, unknown, (moves & lit[light]).any(axis=1))
+        moved, told = np.zeros_like(lit), np.zeros_like(lit)
+        np.logical_or.at(moved, light, moves)
+        np.logical_or.at(told, light, moves & felt[unknown, None])
+        # A colour without blue says how much blue there is, if it is known how bright it is.
+        either = told.any(axis=1, keepdims=True) | ~moved.any(axis=1, keepdims=True)
+        return np.asarray(told | (~moved & either))
+
+    @cached_property
+    def ends(self) -> tuple[Doubles, Doubles]:
+        """The least and the most that bounds leave of each weight, (n, 3) each."""
+        unknown, light, rgb = self.columns
+        low, high = self.held.copy(), self.held.copy()
+        for end, bounds in ((low, self.lower), (high, self.upper)):
+            most = np.broadcast_to(bounds[unknown, None], rgb.shape)
+            its = np.multiply(most, rgb, out=np.zeros(rgb.shape), where=rgb != 0)
+            np.add.at(end, light, its)
+        return low, high
+
     @cached_property
     def channel_groups(self) -> list[list[int]]:
         """Channels that one problem couples; apart where no unknown and no limit joins them."""

@@ -1,6 +1,5 @@
 """Values of what is asked of a light, as people write them: levels, colours, temperatures."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.errors import ColorError, ConstraintError
+from lightpaint.expected import BRIGHTEST, is_amount
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ def level_of(value: Any, where: str, expected: str = "") -> Level:
             number = float(text.removesuffix("%"))
         except ValueError:
             number = -1.0
-        if not 0 <= number < math.inf:
-            raise ConstraintError(f"{where} is {value!r}: {expected}")
+        if not is_amount(number):
+            raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
         return Level(number / 100, is_share=True) if text.endswith("%") else Level(number)
-    if _is_number(value) and 0 <= value < math.inf:
+    if _is_number(value) and is_amount(value):
         return Level(float(value))
     if _is_rgb(value):
         return Level(as_rgb(value))
-    raise ConstraintError(f"{where} is {value!r}: {expected}")
+    raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
 
 
 def limits_of(value: Any, where: str) -> tuple[Level | None, Level | None]:
@@ -150,17 +150,14 @@ def _kelvin(kelvin: float, duv: float, where: str) -> RGB:
 
 def _duv(asked: Mapping[str, Any], where: str) -> float:
     duv = asked.get("duv", 0.0)
-    if not (_is_number(duv) and math.isfinite(duv)):
+    if not (_is_number(duv) and is_amount(abs(duv))):
         raise ConstraintError(f"{where}.duv is {duv!r}: expected a number like 0.003")
     return float(duv)
 
 
 def strength_of(value: Any, where: str) -> float:
-    """That of a pull, from a number or from a table of `current`."""
-    if isinstance(value, Mapping):
-        check_keys(value, ("current",), where)
-        value, where = value.get("current", 0.0), f"{where}.current"
-    if not (_is_number(value) and 0 <= value < math.inf):
+    """That of a pull."""
+    if not (_is_number(value) and is_amount(value)):
         raise ConstraintError(f"{where} is {value!r}: expected a strength >= 0, like 0.1")
     return float(value)
 
@@ -199,5 +196,5 @@ def _is_rgb(value: Any) -> bool:
         isinstance(value, Sequence)
         and not isinstance(value, str)
         and len(value) == 3
-        and all(_is_number(v) and 0 <= v < math.inf for v in value)
+        and all(_is_number(v) and is_amount(v) for v in value)
     )

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -13,7 +14,8 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
 from lightpaint.images.exr import Part, rgb_channels, write_parts
-from lightpaint.lighting.lighting import Lighting, LightSetting
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import LightSetting
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 
 #: Everything that `write_exports` may write.
@@ -21,6 +23,10 @@ EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", LAYERS, "relit.exr")
 
 #: Renderers whose answer a Blender script may take; a pattern may be of Blender as well.
 BLENDER = ("Blender", "pattern")
+
+#: Where a spreadsheet may take text for a formula: at the beginning of a cell, which in some
+#: countries is also behind a semicolon, and before what begins one, full-width signs too.
+_FORMULA = re.compile(r"(\A|[;\t\r\n])(?=['=+\-@\t\r\n＝＋－＠])")
 
 #: The largest finite float16.
 LARGEST_HALF = 65504.0
@@ -71,9 +77,8 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
 
     Stops are `off` at 0, and `unknown` of lights that reach nothing painted.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["light", "layer", "red", "green", "blue", "luminance", "stops", "kept"])
+    headings = ("light", "layer", "red", "green", "blue", "luminance", "stops", "kept", "unreached")
+    rows = [_row(*headings)]
     layers = {
         light.name: layer.name
         for light, layer in zip(groups.basis.lights, groups.layers, strict=False)
@@ -86,8 +91,26 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
         kept = "yes" if light.is_fixed else "no"
-        table.writerow([light.name, layers.get(light.name, ""), *numbers, stops, kept])
-    return text.getvalue()
+        # Channels of which nothing told: their multiplier is what it was.
+        untold = "".join(c for c, told in zip("RGB", light.reached, strict=True) if not told)
+        names = map(plain_cell, (light.name, layers.get(light.name, "")))
+        rows.append(_row(*names, *numbers, stops, kept, untold))
+    return "".join(rows)
+
+
+def plain_cell(text: str) -> str:
+    """`text` for a cell of a table, with a `'` in front of all that may be taken for a formula.
+
+    It is put in front of a `'` there as well, so that one less in each place is the text again.
+    """
+    return _FORMULA.sub(r"\1'", text)
+
+
+def _row(*cells: str) -> str:
+    # Told that lines end in both, it quotes cells that hold either.
+    row = io.StringIO()
+    csv.writer(row, lineterminator="\r\n").writerow(cells)
+    return row.getvalue().removesuffix("\r\n") + "\n"
 
 
 def blender_script(groups: LightGroups, lighting: Lighting) -> str:

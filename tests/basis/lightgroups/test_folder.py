@@ -136,7 +136,7 @@ def test_of_a_group_without_a_pixel_nobody_is_told_to_paint_it(tmp_path: Path):
     assert "of the light of the beauty is in no group" in done.stderr
     assert "paint where it shines" not in done.stderr
     rows = (tmp_path / "p" / "lights.csv").read_text().splitlines()
-    assert [row.split(",")[-2] for row in rows if row.startswith("old")] == ["unknown"]
+    assert [row.split(",")[6] for row in rows if row.startswith("old")] == ["unknown"]
 
 
 def test_a_solve_into_the_folder_of_its_lights_twice(folder: Path):
@@ -148,5 +148,5 @@ def test_a_solve_into_the_folder_of_its_lights_twice(folder: Path):
         printed.append(succeed(folder.parent, *how))
         table = (folder / "lights.csv").read_text().splitlines()[1:]
         assert [row.split(",")[0] for row in table] == LIGHTS
-        assert [row.split(",")[-2] for row in table] == ["off", "+1.000", "-1.000"]
+        assert [row.split(",")[6] for row in table] == ["off", "+1.000", "-1.000"]
     assert printed[0] == printed[1]

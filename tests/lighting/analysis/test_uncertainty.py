@@ -6,13 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import truncnorm
 
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise import pseudo_inverse
 from lightpaint.lighting.analysis.refine import refine
-from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars, with_error_bars
+from lightpaint.lighting.analysis.uncertainty import (
+    SIDES,
+    _one_sided,
+    correct_noise,
+    error_bars,
+    with_error_bars,
+)
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
@@ -134,8 +141,12 @@ def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
     basis = replace(basis, lights=lights)
     solution = solve(basis, _target(clean[0] + 0.5 * clean[1]))
     found = error_bars(solution)
-    assert not found.standard_error[[0, 2]].any()
+    assert not found.standard_error[0].any()
     assert found.standard_error[1].all()
+    # Of what reaches nothing nothing is known: that is not the same as no error.
+    assert np.isnan(found.standard_error[2]).all()
+    assert np.isnan(found.interval)[:, 2].all()
+    assert not np.isnan(found.interval)[:, :2].any()
     told = with_error_bars(solution, found).lighting
     assert [x.standard_error is None for x in told.lights] == [True, False, True]
 
@@ -233,7 +244,7 @@ def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
     others = {key: value for key, value in asked.items() if key != "lights"}
     constraints = Constraints.of(asked.get("lights", {}), **others)
     target = _painted(clean)
-    solved, errors = [], []
+    solved, errors, ends = [], [], []
     for seed in range(SEEDS):
         images, halves = _noisy(clean, 0.1, np.random.default_rng(seed))
         basis = make_basis(
@@ -241,11 +252,14 @@ def test_error_bars_under_constraints(make_basis: Any, name: str) -> None:
         )
         solution = solve(basis, target, constraints=constraints)
         solved.append(solution.lighting.weights_for(basis))
-        errors.append(error_bars(solution).scatter)
+        found = error_bars(solution)
+        errors.append(found.scatter)
+        ends.append([end == solved[-1] for end in found.interval])
     spread, told = np.std(solved, axis=0, ddof=1), np.sqrt(np.mean(np.square(errors), axis=0))
     held = spread < 1e-9
-    # Round-off of what does not move.
-    assert told[held].max(initial=0) < 1e-6
+    # What does not move is at a bound, or locked.
+    assert np.any(ends, axis=(0, 1))[held].all()
+    assert name != "lock" or not told[0].any()
     its = ["abcde".index(light) for light in lights]
     # Lights that go off in some seeds have an error of which a half is cut off.
     always_on = (np.array(solved) > 0).all(axis=0) & ~held
@@ -364,3 +378,100 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
     ours = lacking @ np.linalg.solve(M, lacking) + known
     refined = refine(solution, mixed)
     assert refined.problem.refinement.share == pytest.approx(ours / (ours + rendered), rel=1e-4)
+
+
+@pytest.mark.parametrize("u", [0.0, 0.5, 3.0, 10.0, 29.9, 30.1, 1e3])
+def test_an_interval_at_a_bound_is_that_of_a_cut_off_normal(u: float):
+    """P(X > U) = 0.05 P(X > 0) for X ~ N(-u s, s²), with s = 2."""
+    end = _one_sided(2 * u, 2.0)
+    cut_off = truncnorm(u, np.inf, loc=-2 * u, scale=2)
+    # Far out SciPy's own loses itself; there its tail is exponential.
+    expected = cut_off.isf(0.05) if u <= 30 else 2 * np.log(20) / u
+    assert end == pytest.approx(expected, rel=2e-3)
+    assert u > 0 or end == pytest.approx(2 * SIDES, rel=1e-4)
+    assert _one_sided(u, 0.0) == 0
+
+
+def test_a_light_that_is_off_by_more_than_noise_may_be_on_by_little(make_basis: Any):
+    """By hand, of one light: u = b / M < 0 and s² = Σ (h r)² / M² at w = 0."""
+    rng = np.random.default_rng(1)
+    image = 1 + rng.random((1, *SIZE, 3))
+    half = rng.normal(0, 0.5, image.shape)
+    painted = -0.1 * rng.random((*SIZE, 3)) * np.array([1, 0.2, 0.02])
+    basis = make_basis(images=image, half_differences=half)
+    solution = solve(basis, _target(painted))
+    found = error_bars(solution)
+    M, b = (np.einsum("hwc,hwc->c", image[0], x) for x in (image[0], painted))
+    u, s = -b / M, np.sqrt(np.square(half[0] * painted).sum((0, 1))) / M
+    assert (u > 3 * s).all()
+    expected = truncnorm.isf(0.05, u / s, np.inf, loc=-u, scale=s)
+    low, high = found.interval
+    np.testing.assert_array_equal(low, 0)
+    np.testing.assert_allclose(high[0], expected, rtol=1e-3)
+    [light] = with_error_bars(solution, found).lighting.lights
+    assert light.interval == tuple((0, end) for end in high[0])
+
+
+#: What a light of 0.5 may be held by, and to which side it may go from there.
+AT_BOUNDS: dict[str, tuple[dict[str, Any], int]] = {
+    "a dimmer at most": ({"color": [1, 1, 1], "limits": {"max": 0.5}}, -1),
+    "a dimmer at least": ({"color": [1, 1, 1], "limits": {"min": 0.5}}, 1),
+    "a luminance at most": ({"limits": {"max": 0.5}}, -1),
+    "a luminance at least": ({"limits": {"min": 0.5}}, 1),
+    "channels at most": ({"limits": {"max": [0.5, 0.5, 0.5]}}, -1),
+    "zero": ({}, 1),
+}
+
+
+@pytest.mark.parametrize("inside", [0.4, 1.2])
+@pytest.mark.parametrize("name", AT_BOUNDS)
+def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str, inside: float):
+    """Normal noise of little power, so that coverage is known: 95 % at least, by the binomial.
+
+    inside: how far the true weight is from its bound, in standard deviations.
+    """
+    asked, side = AT_BOUNDS[name]
+    rng, seeds = np.random.default_rng(3), 60
+    # What a standard deviation is here, of one channel and of three that go together.
+    one = 0.005 / (np.sqrt(3) if "dimmer" in name else 1)
+    truth = (0.0 if name == "zero" else 0.5) + side * inside * one
+    clean = 0.5 + rng.random((2, *SIZE, 3))
+    painted = np.einsum("nhwc,n->hwc", clean, [1, truth]) + _out_of_reach(clean, rng)
+    constraints = Constraints.of({"lamp": asked})
+    held, spread = [], []
+    for _ in range(seeds):
+        a, b = (clean + 0.02 * rng.normal(size=clean.shape) for _ in range(2))
+        basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2, names=["key", "lamp"])
+        found = error_bars(solve(basis, _target(painted), constraints=constraints))
+        low, high = (end[1] for end in found.interval)
+        assert (low < high).all()
+        held.append((low <= truth) & (truth <= high))
+        spread.append(found.weights[1])
+    assert np.mean(np.std(spread, axis=0)) == pytest.approx(one, rel=0.5)
+    count = seeds if "dimmer" in name else 3 * seeds
+    assert np.mean(held) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)
+
+
+def _out_of_reach(clean: Any, rng: np.random.Generator) -> Any:
+    """(h, w, 3) of unit variance that no mix of the lights has a part in."""
+    residual = rng.normal(0, 1, clean.shape[1:])
+    for c in range(3):
+        span, _ = np.linalg.qr(clean[..., c].reshape(len(clean), -1).T)
+        flat = residual[..., c].ravel()
+        residual[..., c] = (flat - span @ (span.T @ flat)).reshape(clean.shape[1:3])
+    return residual
+
+
+def test_a_limit_that_is_met_leaves_one_side(make_basis: Any):
+    """Far outside: the interval goes inwards from the limit, and not beyond it."""
+    rng = np.random.default_rng(2)
+    clean = 0.5 + rng.random((2, *SIZE, 3))
+    halves = 0.1 * rng.normal(size=clean.shape)
+    basis = make_basis(images=clean, half_differences=halves, names=["key", "lamp"])
+    target = _target(np.einsum("nhwc,n->hwc", clean, [1, 2]))
+    for asked, at in (({"limits": {"max": [1, 1, 1]}}, 1), ({"limits": {"min": [3, 3, 3]}}, 0)):
+        constraints = Constraints.of({"lamp": asked})
+        found = error_bars(solve(basis, target, constraints=constraints))
+        ends = [end[1] for end in found.interval]
+        np.testing.assert_array_equal(ends[at], found.weights[1])
+        assert (ends[0] < ends[1]).all()

@@ -12,7 +12,7 @@ from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.lighting.problem import Problem
-from lightpaint.scene.lights_file import Asked
+from lightpaint.scene.lights_file import Asked, read_lights_file
 
 FILE = '[light.bulb]\nlock = "40%"\n[light.panel]\nkelvin = 3200\n'
 
@@ -87,6 +87,10 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
         ({"light": {"bulb": {"lock": "much"}}}, r"hall\.toml: light\.bulb\.lock is 'much'"),
         ({"light": {"blub": {"off": True}}}, r"hall\.toml: light\.blub: no light 'blub'; did you"),
         ({"tie": 3}, r"hall\.toml: tie is 3"),
+        ({"prefer_current": "x"}, r"hall\.toml: prefer_current is 'x': expected a strength"),
+        ({"prefer": {"current": "x"}}, r"hall\.toml: prefer\.current is 'x'"),
+        ({"prefer": {"past": 1}}, r"hall\.toml: prefer.*known are current"),
+        ({"prefer": 1, "prefer_current": 1}, r"hall\.toml: both prefer_current and prefer"),
     ]:
         with pytest.raises(ConstraintError, match=wrong) as caught:
             lp.solve(basis.asking(Asked(keys, "hall.toml")), _target(basis))
@@ -95,7 +99,7 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
 
 def test_the_same_tie_twice_is_one_tie(make_basis: Any, tmp_path: Path):
     path = tmp_path / "a.lights.toml"
-    path.write_text('tie = [["a", "b"]]\nprefer = 0.1\n[light."*"]\noff = false\n', "utf-8")
+    path.write_text('tie = [["a", "b"]]\nprefer_current = 0.1\n[light."*"]\noff = false\n', "utf-8")
     file = read_constraints(path)
     given = lp.Constraints.of({"c": {"lock": True}}, tie=[{"lights": ["b", "a"], "color": "3200K"}])
     both = file.and_then(given)
@@ -107,6 +111,18 @@ def test_the_same_tie_twice_is_one_tie(make_basis: Any, tmp_path: Path):
         np.array(b.emission) / sum(b.emission)
     )
     assert c.emission == pytest.approx(basis.lights[2].emission)
+
+
+@pytest.mark.parametrize(
+    "said", ["prefer_current = 0.01", "prefer = { current = 0.01 }", "prefer = 0.01"]
+)
+def test_the_pull_has_the_name_it_has_in_python_and_the_one_of_older_files(
+    tmp_path: Path, said: str
+):
+    path = tmp_path / "a.lights.toml"
+    path.write_text(said, encoding="utf-8")
+    assert read_constraints(path) == lp.Constraints.of(prefer_current=0.01)
+    assert read_lights_file(path).asked.keys
 
 
 def test_all_views_heed_it(make_basis: Any):

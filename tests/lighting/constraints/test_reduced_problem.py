@@ -202,7 +202,7 @@ def test_a_light_that_reaches_nothing_keeps_its_start():
     dark = np.concatenate([columns, np.zeros_like(columns[..., :1])], axis=2)
     start = np.array([[1.0, 1, 1]] * 3 + [[0.25, 0.5, 0.75]])
     result = _solve(dark, values, start)
-    assert result.reached.tolist() == [True, True, True, False]
+    assert result.reached.tolist() == [[True] * 3] * 3 + [[False] * 3]
     np.testing.assert_array_equal(result.weights[3], start[3])
     np.testing.assert_array_equal(result.weights[:3], _solve(columns, values).weights)
 
@@ -211,7 +211,7 @@ def test_a_light_of_one_colour_keeps_the_others_and_counts_as_reached():
     columns, values = _problem(2, "uniform", 10)
     columns[1:, :, 1] = 0
     result = _solve(columns, values, np.full((2, 3), 0.125))
-    assert result.reached.tolist() == [True, True]
+    assert result.reached.tolist() == [[True] * 3, [True, False, False]]
     np.testing.assert_array_equal(result.weights[1, 1:], 0.125)
     assert result.weights[1, 0] != 0.125
 

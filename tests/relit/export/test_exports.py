@@ -17,13 +17,21 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from light_groups import channels, interleaved, multi_part, pictures, write
 
 import lightpaint as lp
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.relit.export.exports import EXPORTS, blender_script, lights_table, write_exports
+from lightpaint.relit.export.exports import (
+    EXPORTS,
+    blender_script,
+    lights_table,
+    plain_cell,
+    write_exports,
+)
 from lightpaint.relit.export.nuke import (
     LAYERS,
     copied_part,
@@ -495,3 +503,49 @@ def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, blender: list[st
     assert "all as expected" in told
     assert "no light is in the group gone" in told
     assert "inside the node group hidden, set it by hand" in told
+
+
+#: What a name may hold to be taken for a formula, or to end its cell or its line.
+FORMULAS = [
+    "=cmd|'/C calc'!A0",
+    "+1",
+    "-1.5",
+    "@sum",
+    "\t=a",
+    "a\r=b",
+    "a\n=b",
+    "a;=b",
+    "'q",
+    'a,"b',
+]
+
+
+def _without_marks(cell: str) -> str:
+    """As docs/light-groups.md says how."""
+    return re.sub(r"(\A|[;\t\r\n])'", r"\1", cell)
+
+
+@given(st.text("ab'=+-@;, \t\r\n＝", max_size=8))
+@example("\t\t=")
+@example("';'=")
+def test_cells_are_no_formulas_and_names_come_back(name: str) -> None:
+    cell = plain_cell(name)
+    assert _without_marks(cell) == name
+    for column in re.split("[;\t\r\n]", cell):
+        assert not column.startswith(tuple("=+-@＝"))
+
+
+def test_the_table_of_names_that_are_formulas(tmp_path: Path, make_basis: Any) -> None:
+    groups = replace(_groups(tmp_path), basis=make_basis(len(FORMULAS), names=FORMULAS))
+    lighting = Lighting.present(groups.basis)
+    text = lights_table(groups, lighting)
+    # However a reader ends its lines, and where it reads none but what is quoted as one.
+    for lines in (io.StringIO(text, newline=""), io.StringIO(text.replace("\n", "\r\n"), "")):
+        rows = list(csv.DictReader(lines))
+        assert len(rows) == len(FORMULAS)
+    rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    assert [_without_marks(row["light"]) for row in rows] == FORMULAS
+    for row, light in zip(rows, lighting.lights, strict=True):
+        assert row["light"][0] not in "=+-@\t\r"
+        assert float(row["red"]) == pytest.approx(light.weight[0], rel=1e-8)
+        assert re.fullmatch(r"[+-]\d+\.\d{3}", row["stops"])  # a number, with its sign

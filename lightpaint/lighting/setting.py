@@ -1,0 +1,89 @@
+"""One light of an answer: its emission, what was asked of it, and how sure it is."""
+
+from dataclasses import dataclass
+
+from lightpaint.arrays import RGB
+from lightpaint.errors import LightingError
+from lightpaint.expected import BRIGHTEST, is_amount
+
+#: A number of each channel, None where nothing tells; an interval of each.
+Errors = tuple[float | None, float | None, float | None]
+Ends = tuple[float, float]
+Intervals = tuple[Ends | None, Ends | None, Ends | None]
+
+ALL_REACHED = (True, True, True)
+
+
+@dataclass(frozen=True)
+class LightSetting:
+    """One light of a lighting.
+
+    emission: linear RGB in `unit`, the parameter's own unit in Mitsuba.
+    weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
+    is_fixed: whether it is what stays as it is in the scene, with weight 1.
+    members: names of the emitters it consists of; itself if none are given.
+    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
+    constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
+    whether that held it back from what the painting asks for.
+    reached: of each channel whether it reaches anything that counts; where it does not, nothing
+    tells its emission, and it stays as it was.
+    standard_error: of the emission, from the noise it was solved with, where that is known; None in
+    channels that reach nothing.
+    interval: 95 % interval of each channel, lower and upper end; as standard_error.
+    """
+
+    name: str
+    plugin: str
+    parameter: str
+    unit: str
+    emission: RGB
+    weight: RGB
+    is_fixed: bool = False
+    members: tuple[str, ...] = ()
+    unit_flux: RGB | None = None
+    constraint: str = ""
+    is_active: bool = False
+    reached: tuple[bool, bool, bool] = ALL_REACHED
+    standard_error: Errors | None = None
+    interval: Intervals | None = None
+
+    def __post_init__(self) -> None:
+        if not self.members:
+            object.__setattr__(self, "members", (self.name,))
+        self._check_errors()
+        given = {"emission": self.emission, "weight": self.weight}
+        for what, rgb in given.items():
+            if not all(map(is_amount, rgb)):
+                raise LightingError(
+                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers from 0 "
+                    f"to {BRIGHTEST:g}"
+                )
+            if self.is_fixed and rgb != (1, 1, 1):
+                raise LightingError(
+                    f"light {self.name!r} is kept as it is, so its {what} must be 1 1 1, "
+                    f"not {list(rgb)}"
+                )
+        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
+            raise LightingError(
+                f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}"
+            )
+
+    @property
+    def is_partly_reached(self) -> bool:
+        """Whether some of its channels were solved for and others reach nothing."""
+        return any(self.reached) and not all(self.reached)
+
+    def _check_errors(self) -> None:
+        errors = () if self.is_fixed else self.standard_error or ()
+        if not all(e is None or is_amount(e) for e in errors):
+            raise LightingError(
+                f"light {self.name!r} has the standard error {list(errors)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}, or null where nothing tells"
+            )
+        for ends in filter(None, self.interval or ()):
+            if not 0 <= ends[0] <= ends[1] <= BRIGHTEST:
+                raise LightingError(
+                    f"light {self.name!r} has the interval {list(ends)}: need two numbers, "
+                    f"0 <= lower <= upper <= {BRIGHTEST:g}"
+                )

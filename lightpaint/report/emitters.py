@@ -1,0 +1,74 @@
+"""What is said of emitters in view: which painted pixels they take out, and how they come out."""
+
+import numpy as np
+
+from lightpaint.arrays import Bools
+from lightpaint.colour.color import luminance
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.painting import left_out
+from lightpaint.lighting.solution import Solution
+from lightpaint.screen import some_of
+from lightpaint.target.target import Target
+
+#: Times as bright as painted from which on an emitter that does not count is worth a warning.
+BRIGHTER = 4.0
+
+#: Part of the painted energy from which on emitters that count rule the answer.
+MOST = 0.5
+
+
+def emitters_in_view(target: Target, solution: Solution, predicted: Estimate) -> list[str]:
+    """Sentences for a person. target: of one view, as it was given to the solve."""
+    seen = solution.basis.emitters_seen
+    painted = target.importance > 0
+    out = left_out(target, seen, solution.problem.fit.emitters)
+    if out.any():
+        return [
+            f"{_share(out, painted)}, and count nothing; "
+            'emitters="count" holds the emitters themselves to how bright they were painted',
+            *_too_bright(target, solution, predicted, out),
+        ]
+    counted = seen & painted
+    energy = target.importance[..., None] * np.square(target.image, dtype=np.float64)
+    if counted.any() and (part := energy[counted].sum() / (energy.sum() or 1)) >= MOST:
+        return [
+            f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted energy "
+            'and rule the fit: emitters="skip" leaves them out'
+        ]
+    return []
+
+
+def _share(some: Bools, painted: Bools) -> str:
+    count, every = int(some.sum()), int(painted.sum())
+    return (
+        f"emitters are seen in {count} of {every} painted pixels "
+        f"({100 * count / every:.{1 if count < 0.1 * every else 0}f} %)"
+    )
+
+
+def _too_bright(target: Target, solution: Solution, predicted: Estimate, out: Bools) -> list[str]:
+    """A warning of lights that come out far brighter than they were painted where they are seen."""
+    basis = solution.basis
+    # Where the painting says at least so bright, no more is too bright.
+    if target.at_least is not None:
+        out = out & ~target.at_least.any(axis=-1)
+    images = basis.images[:, out] * solution.weights[:, None].astype(np.float32)
+    whose = np.argmax(luminance(images), axis=0) if out.any() else np.zeros(0, np.intp)
+    here, meant = (np.asarray(luminance(x[out])) for x in (predicted.image, target.image))
+    told = []
+    for k in np.unique(whose):
+        there, wanted = here[whose == k].sum(), np.maximum(meant[whose == k], 0).sum()
+        if there > BRIGHTER * wanted and not basis.is_fixed[k]:
+            told.append(f"{basis.names[k]} ({_times(float(there), float(wanted))})")
+    if not told:
+        return []
+    return [
+        f"WARNING: brighter than painted where they are seen: {some_of(told, room=300)}; "
+        'emitters="count" holds them to the painting'
+    ]
+
+
+def _times(there: float, meant: float) -> str:
+    if meant <= 0:
+        return "painted black"
+    return f"{there / meant:,.{0 if there >= 10 * meant else 1}f} times"

@@ -1,0 +1,167 @@
+"""What goes to the terminal: nothing in a file steers it, or passes for a line of its own."""
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command import refused, run, spawn, succeed
+from renderer import write_room
+from rich.markup import escape
+
+from lightpaint.basis import cache
+from lightpaint.basis.file import write_basis
+from lightpaint.cli import lines, terminal
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.file import write_lighting
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.screen import some_names, visible
+
+#: A name that colours, erases, breaks the line, turns the reading order, and speaks rich's markup.
+BAD = "b\x1b[2J\x1b[31m\r\n\t\x7f\x9b\u202e\u2066\u2028\u200b[red]c[/red][/]\\"
+SHOWN = r"b\x1b[2J\x1b[31m\r\n\t\x7f\x9b\u202e\u2066\u2028\u200b[red]c[/red][/]" + "\\"
+
+#: What may not reach a terminal.
+STEERS = re.compile(
+    r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2066-\u2069]"
+)
+
+
+def room_with(folder: Path, name: str) -> Path:
+    """The small room, its bulb called `name`."""
+    path = write_room(folder)
+    written = "".join(f"&#{ord(c)};" for c in name)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('id="bulb"', f'id="{written}"'), encoding="utf-8")
+    return path
+
+
+def test_what_is_seen_is_left_alone() -> None:
+    plain = "Größe 灯 👩\u200d🚀 می\u200cخواهم a\\b [x] \u00a0 é e\u0301"
+    assert visible(plain) == plain
+    assert visible(BAD) == SHOWN
+    for code in range(0x110000):
+        shown = visible(chr(code))
+        assert shown == chr(code) or shown.isascii()
+        assert not STEERS.search(shown)
+        shown.encode()  # halves of surrogate pairs, too
+
+
+def test_lists_are_cut_with_a_count() -> None:
+    assert some_names(["a", "b"]) == "a, b"
+    assert some_names([]) == ""
+    names = [f"light_{k}" for k in range(30_000)]
+    told = some_names(names)
+    assert len(told) < 400
+    shown = told.split(", ")
+    assert shown[:-1] == names[: len(shown) - 1]
+    assert shown[-1] == f"… and {30_000 - len(shown) + 1} more"
+    assert some_names(["x" * 10**6, "y"]).startswith("x" * 100)
+    assert len(some_names(["x" * 10**6, "y"])) < 400
+
+
+def test_lights_and_errors(tmp_path: Path) -> None:
+    room = room_with(tmp_path, BAD.replace("\0", ""))
+    output = succeed(tmp_path, "lights", room)
+    assert SHOWN in output
+    assert not STEERS.search(output)
+    assert len(output.splitlines()) == 6
+    listed = json.loads(succeed(tmp_path, "lights", room, "--json"))["lights"]
+    assert listed[1]["name"] == BAD
+    assert not STEERS.search(succeed(tmp_path, "lights", room, "--json"))
+    said = refused(tmp_path, "lights", room, "--lights", "nope\x1b[1m")
+    assert r"no light 'nope\x1b[1m'" in said
+    assert SHOWN in said
+    assert not STEERS.search(said)
+
+
+@pytest.mark.parametrize("command", ["lights", "basis", "template", "solve", "relight", "verify"])
+def test_paths_and_options(tmp_path: Path, command: str) -> None:
+    for line in ([f"no\n{BAD}.xml", f"{BAD}.png"], [f"--{BAD}", "a", "b"], ["a.xml", "--spp", BAD]):
+        said = refused(tmp_path, command, *line)
+        assert not STEERS.search(said)
+        assert r"\x1b[31m" in said or "not a whole number" in said
+
+
+def test_a_path_that_is_no_unicode(tmp_path: Path) -> None:
+    said = refused(tmp_path, "lights", "a\udcff\x1b.xml")
+    assert r"a\udcff\x1b.xml" in said
+
+
+def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
+    basis = make_basis(2, names=["a", BAD.replace("\0", "")])
+    folder = tmp_path / "cache"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIGHTPAINT_CACHE", str(folder))
+        assert cache.keep(basis)
+    done = run(tmp_path, "cache", "list", LIGHTPAINT_CACHE=str(folder))
+    assert done.returncode == 0
+    assert not STEERS.search(done.stdout)
+    write_basis(tmp_path / "b.basis.exr", basis)
+    write_rgb(tmp_path / "p.exr", basis.images.sum(axis=0))
+    done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert SHOWN in done.stdout
+    assert not STEERS.search(done.stdout + done.stderr)
+
+
+def test_relight_of_names_that_steer(tmp_path: Path, make_basis: Any) -> None:
+    lighting = Lighting.present(make_basis(2, names=["a", BAD])).named("evening")
+    write_lighting(tmp_path / "l.json", lighting)
+    said = refused(tmp_path, "relight", write_room(tmp_path), "l.json")
+    assert SHOWN in said
+    assert not STEERS.search(said)
+
+
+def test_thousands_of_names_are_not_repeated(tmp_path: Path, make_basis: Any) -> None:
+    names = [f"light_{k}" for k in range(3000)]
+    basis = make_basis(images=[[[[1.0] * 3]]] * 3000, names=names)
+    write_lighting(tmp_path / "l.json", Lighting.present(basis).named("evening"))
+    said = refused(tmp_path, "relight", write_room(tmp_path), "l.json")
+    assert "more that the scene does not have" in said
+    assert len(said) < 1000
+
+
+def test_progress_and_remarks_on_a_terminal(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "dumb")
+    with terminal.Listener() as listen:
+        listen(f"basis of {BAD}", 0, 2)
+        listen(f"basis of {BAD}", 1, 2)
+        assert listen._bars is not None
+        [task] = listen._bars.tasks
+        assert task.description == f"basis of {SHOWN}"
+        listen.say(f"remark on {BAD}")
+    assert f"remark on {SHOWN}" in capfd.readouterr().err.replace("\n", "")
+    listen(f"basis of {BAD}", 0, 2)
+    assert capfd.readouterr().err == f"basis of {SHOWN}: 2 passes\n"
+
+
+def test_markup_of_rich_is_text(capfd: pytest.CaptureFixture[str]) -> None:
+    table = terminal.table("name")
+    table.row(escape("[red]x[/red]") + "[/blue]")
+    terminal.print_table(table)
+    assert capfd.readouterr().out.splitlines()[1] == r"\[red]x\[/red][/blue]"
+
+
+def test_a_line_of_stderr_has_an_end(capfd: pytest.CaptureFixture[str]) -> None:
+    lines.err("x" * 10**7)
+    assert len(capfd.readouterr().err) < 5000
+
+
+def test_a_fault_of_its_own_is_told_whole_and_steers_nothing(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(
+        "import lightpaint.cli.commands as c\n"
+        "def fails(**_): raise RuntimeError('\\x1b[2J told')\n"
+        "c.doctor = fails\n"
+    )
+    path = ":".join([str(tmp_path), *filter(None, sys.path)])
+    done = spawn(tmp_path, "doctor", PYTHONPATH=path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Traceback")
+    assert r"RuntimeError: \x1b[2J told" in done.stderr
+    assert not STEERS.search(done.stderr)

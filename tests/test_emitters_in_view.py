@@ -1,0 +1,145 @@
+"""Painted pixels in which the camera sees an emitter: which count, and what is said of the others.
+
+A bulb is painted as bright as it is, on a wall that it would have to be 350 times as bright for.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import refused, run, succeed
+
+import lightpaint as lp
+from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.report.emitters import emitters_in_view
+
+SIZE = (12, 10)
+TIMES = 350.0
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> lp.Basis:
+    """`sky` lights the wall evenly; `bulb` little, and is seen in four pixels."""
+    seen = np.zeros(SIZE, bool)
+    seen[5:7, 5:7] = True
+    images = np.zeros((2, *SIZE, 3))
+    images[0, :, :5] = 0.5
+    images[1] = np.where(seen, 1.0, 0.01)[..., None]
+    return make_basis(images=images, names=["sky", "bulb"], seen=seen)
+
+
+@pytest.fixture
+def image(basis: lp.Basis) -> Any:
+    wall = basis.mix(np.array([[1.0] * 3, [TIMES] * 3]))
+    return np.where(basis.emitters_seen[..., None], 1, wall).astype(np.float32)
+
+
+def _said(basis: lp.Basis, target: lp.Target, **fit: Any) -> tuple[float, list[str]]:
+    """How bright the bulb is, and what is said of it."""
+    solution = lp.solve(basis, target, **fit)
+    predicted = lp.combine(basis, solution.lighting)
+    return solution.lighting["bulb"].emission[1], emitters_in_view(target, solution, predicted)
+
+
+ALL, PAINTED = None, np.ones(SIZE)
+
+
+@pytest.mark.parametrize(
+    ("importance", "emitters", "counts"),
+    [
+        (ALL, "auto", False),
+        (ALL, "count", True),
+        (ALL, "skip", False),
+        (PAINTED, "auto", True),
+        (PAINTED, "count", True),
+        (PAINTED, "skip", False),
+    ],
+)
+def test_which_pixels_count(
+    basis: lp.Basis, image: Any, importance: Any, emitters: str, counts: bool
+):
+    target = lp.Target.of(image, importance)
+    times, said = _said(basis, target, emitters=emitters)
+    if counts:
+        assert times < 5
+        assert said == []
+        return
+    assert times == pytest.approx(TIMES, rel=1e-4)
+    left, warning = said
+    assert "4 of 120 painted pixels (3.3 %), and count nothing" in left
+    assert 'emitters="count"' in left
+    assert warning.startswith("WARNING")
+    assert "bulb (350 times)" in warning
+
+
+def test_a_bulb_as_painted_is_no_warning(basis: lp.Basis):
+    target = lp.Target.of(basis.mix(np.array([[1.0] * 3, [2.0] * 3])))
+    _, said = _said(basis, target)
+    assert len(said) == 1
+    assert "WARNING" not in said[0]
+
+
+def test_where_brighter_is_as_good_nothing_is_too_bright(basis: lp.Basis, image: Any):
+    at_least = np.broadcast_to(basis.emitters_seen[..., None], image.shape)
+    target = lp.Target("t", image, np.ones(SIZE, np.float32), everything=True, at_least=at_least)
+    _, said = _said(basis, target)
+    assert len(said) == 1
+
+
+def test_a_bulb_that_is_painted_black_is_a_warning(basis: lp.Basis, image: Any):
+    black = np.where(basis.emitters_seen[..., None], 0, image)
+    _, said = _said(basis, lp.Target.of(black))
+    assert "bulb (painted black)" in said[1]
+
+
+def test_emitters_that_rule_the_fit_are_named(basis: lp.Basis, image: Any):
+    bright = np.where(basis.emitters_seen[..., None], 100, image)
+    _, [said] = _said(basis, lp.Target.of(bright, PAINTED))
+    assert "of the painted energy and rule the fit" in said
+    assert 'emitters="skip"' in said
+    assert _said(basis, lp.Target.of(image, ~basis.emitters_seen))[1] == []
+
+
+def test_strokes_over_an_emitter_are_left_out_where_it_is_asked(basis: lp.Basis, image: Any):
+    where = (slice(4, 8), slice(4, 8))
+    for emitters, counts in (("auto", 1), ("skip", 0)):
+        problem = lp.Problem.of(basis, lp.Target.of(image), fit=lp.Fit(emitters=emitters))
+        painted = problem.painted(where, image[where], 1.0)
+        importance = painted.views.targets[0].importance
+        assert (importance[basis.emitters_seen] == counts).all()
+        assert (importance[~basis.emitters_seen] == 1).all()
+
+
+def test_nothing_left_is_an_error(basis: lp.Basis, image: Any):
+    only = lp.Target.of(image, basis.emitters_seen)
+    with pytest.raises(lp.LightpaintError, match=r'sees an emitter in every painted.*"count"'):
+        lp.solve(basis, only, emitters="skip")
+    lp.solve(basis, only)
+
+
+def test_the_terminal_and_the_report_say_so(basis: lp.Basis, image: Any, tmp_path: Path):
+    lp.write_basis(tmp_path / "a.basis.exr", basis)
+    write_parts(tmp_path / "t.exr", [Part("", rgb_channels(image))])
+    done = run(tmp_path, "solve", "a.basis.exr", "t.exr", "-o", "out")
+    assert done.returncode == 0
+    assert "emitters are seen in 4 of 120 painted pixels (3.3 %)" in done.stderr
+    assert "--emitters count holds the emitters themselves" in done.stderr
+    assert "WARNING: brighter than painted where they are seen: bulb" in done.stderr
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "emitters are seen in 4 of 120 painted pixels" in page
+    assert "WARNING: brighter than painted" in page
+    args = ("solve", "a.basis.exr", "t.exr", "-o", "counted", "--emitters", "count")
+    done = run(tmp_path, *args)
+    assert "emitters are seen" not in done.stderr
+    page = (tmp_path / "counted" / "report.html").read_text(encoding="utf-8")
+    assert "emitters are seen in" not in page
+    assert "bulb" in succeed(tmp_path, *args[:-1], "skip")
+
+
+def test_light_groups_know_of_no_emitters(tmp_path: Path, image: Any):
+    channels = rgb_channels(image)
+    write_parts(tmp_path / "g.exr", [Part("ViewLayer.Combined_key", channels)])
+    write_parts(tmp_path / "t.exr", [Part("", channels)])
+    said = refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
+    assert "--emitters" in said

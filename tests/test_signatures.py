@@ -1,0 +1,35 @@
+"""What public functions have in common: whoever knows one knows the others."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import lightpaint
+
+PACKAGE = Path(lightpaint.__file__).parent
+
+#: What a place to be written to is called.
+PLACES = ("path", "folder")
+
+
+def _writers() -> Iterator[tuple[str, list[str]]]:
+    """Name and positional parameters of every function that writes something."""
+    for file in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("write_"):
+                where = f"{file.relative_to(PACKAGE)}:{node.name}"
+                yield where, [argument.arg for argument in node.args.args]
+
+
+def test_there_are_writers_and_the_public_ones_are_among_them() -> None:
+    names = {where.partition(":")[2] for where, _ in _writers()}
+    assert {name for name in lightpaint.__all__ if name.startswith("write_")} <= names
+    assert len(names) > 10
+
+
+@pytest.mark.parametrize(("where", "parameters"), [*_writers()], ids=str)
+def test_the_place_comes_first(where: str, parameters: list[str]) -> None:
+    assert parameters[0] in PLACES
+    assert not set(PLACES) & set(parameters[1:])

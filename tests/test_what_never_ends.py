@@ -1,0 +1,187 @@
+"""What is no file, or has no end, wherever a path is given: one line, at once."""
+
+import errno
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import nullcontext
+from pathlib import Path
+from types import FrameType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from command import refused
+from renderer import write_room
+
+from lightpaint import files
+from lightpaint.basis.file import write_basis
+from lightpaint.errors import SceneError
+from lightpaint.images.exr import write_rgb
+
+#: Seconds that a refusal may take; Mitsuba starts in them.
+AT_ONCE = 60
+
+#: What a path may be: a pipe, devices, what a kernel makes up, a folder, a terabyte of nothing.
+
+KINDS = {
+    "pipe": "is a device or a pipe",
+    "/dev/zero": "is a device or a pipe",
+    "/proc/kmsg": "is empty, or only made up when it is read",
+    "/proc/kpagecount": "is empty, or only made up when it is read",
+    "folder": "folder",
+    "sparse": "",
+}
+
+#: Commands with a path X, its ending, and what else it may be taken for than a file.
+COMMANDS = {
+    "lights": ("lights X", ".xml"),
+    "basis": ("basis X", ".xml"),
+    "template": ("template X", ".xml"),
+    "scene": ("solve X painting.exr", ".xml"),
+    "saved basis": ("solve X painting.exr", ".basis.exr"),
+    "painting": ("solve b.basis.exr X -o out", ".png"),
+    "painted EXR": ("solve b.basis.exr X -o out", ".exr"),
+    "layered": ("solve b.basis.exr X -o out", ".kra"),
+    "mask": ("solve b.basis.exr painting.exr --mask X", ".png"),
+    "lights file": ("lights room.xml --lights-file X", ".toml"),
+    "its constraints": ("solve b.basis.exr painting.exr --lights-file X", ".toml"),
+    "lighting": ("relight room.xml X", ".json"),
+    "groups": ("solve painting.exr --lights X", ".exr"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _at_once() -> Iterator[None]:
+    """A test that waits for ever fails."""
+
+    def waited(_signal: int, _frame: FrameType | None) -> None:
+        raise AssertionError("it waits")
+
+    before = signal.signal(signal.SIGALRM, waited)
+    signal.alarm(AT_ONCE)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, make_basis: Any) -> Path:
+    basis = make_basis(2)
+    write_basis(tmp_path / "b.basis.exr", basis)
+    write_rgb(tmp_path / "painting.exr", basis.images.sum(axis=0))
+    write_room(tmp_path)
+    return tmp_path
+
+
+def made(path: Path, kind: str) -> None:
+    """`kind` at `path`."""
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "sparse":
+        with path.open("wb") as file:
+            file.truncate(2**40)
+    elif not Path(kind).exists():
+        pytest.skip(kind)
+    else:
+        path.symlink_to(kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_path_of_a_command(folder: Path, command: str, kind: str) -> None:
+    line, ending = COMMANDS[command]
+    made(folder / f"x{ending}", kind)
+    said = refused(folder, *line.replace("X", f"x{ending}").split())
+    assert f"x{ending}" in said
+    # A folder may hold light groups, too.
+    others = ("EXR", ".exr file") if kind == "folder" else ("holds no light groups",)
+    assert any(words in said for words in (KINDS[kind], *others))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("element", "ending"),
+    [
+        ('<include filename="X"/>', ".xml"),
+        ('<bsdf type="diffuse"><spectrum name="reflectance" filename="X"/></bsdf>', ".spd"),
+        ('<texture type="bitmap"><string name="filename" value="X"/></texture>', ".png"),
+        ('<emitter type="envmap"><string name="filename" value="X"/></emitter>', ".exr"),
+        ('<shape type="ply"><string name="filename" value="X"/></shape>', ".ply"),
+        ('<shape type="obj"><string name="filename" value="X"/></shape>', ".obj"),
+        ('<shape type="serialized"><string name="filename" value="X"/></shape>', ".serialized"),
+    ],
+)
+def test_every_file_of_a_scene(folder: Path, element: str, ending: str, kind: str) -> None:
+    made(folder / f"x{ending}", kind)
+    room = folder / "room.xml"
+    text = room.read_text(encoding="utf-8")
+    element = element.replace("X", f"x{ending}")
+    room.write_text(text.replace("</scene>", f"{element}</scene>"), encoding="utf-8")
+    said = refused(folder, "lights", room)
+    assert f"x{ending}" in said
+    assert KINDS[kind] in said
+
+
+def test_beside_the_scene_and_in_a_template(folder: Path) -> None:
+    (folder / "room.lights.toml").symlink_to("/proc/kmsg")
+    (folder / "template").mkdir()
+    (folder / "template" / "template.json").symlink_to("/proc/kmsg")
+    said = refused(folder, "solve", "b.basis.exr", "painting.exr", "-o", "out")
+    assert "template.json" in said
+
+
+def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither where it is asked what there is, nor where it is read, at once or half-way."""
+    room = folder / "room.xml"
+    open_again, asleep = threading.Event(), []
+    monkeypatch.setattr(files, "PATIENCE_S", 0.05)
+
+    def sleeps(*_: object) -> Any:
+        asleep.append(threading.current_thread())
+        open_again.wait(AT_ONCE)
+        return nullcontext()
+
+    half_way = SimpleNamespace(read=sleeps)
+
+    for name, stub in (
+        ("_opened", sleeps),
+        ("_beginning", sleeps),
+        ("_opened", lambda _: nullcontext(half_way)),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(files, name, stub)
+            began = time.monotonic()
+            with pytest.raises(SceneError, match=r"cannot read .*room\.xml: no answer within"):
+                files.read_text(room, "scene file", SceneError)
+            assert time.monotonic() - began < 5
+    assert all(thread.daemon for thread in asleep)  # none is waited for at the end
+    open_again.set()
+    for thread in asleep:
+        thread.join()
+
+
+def test_what_goes_wrong_in_time_is_told_as_ever(tmp_path: Path) -> None:
+    def fails() -> None:
+        raise OSError(errno.EIO, "broken")
+
+    with pytest.raises(OSError, match="broken"):
+        files._in_time(fails)
+    assert files._in_time(lambda: np.pi) == np.pi
+
+
+def test_files_that_are_read_as_they_were(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    for size in (1, 2, files.PIECE, files.PIECE + 1):
+        path.write_bytes(b"x" * size)
+        assert files.read_bytes(path, "file", SceneError) == b"x" * size
+    with pytest.raises(SceneError, match="bytes long"):
+        files.read_bytes(path, "file", SceneError, limit=files.PIECE)
+    path.write_bytes(b"")
+    assert files.read_bytes(path, "file", SceneError, may_be_empty=True) == b""
+    with pytest.raises(SceneError, match="a is empty, or only made up"):
+        files.file_length(path, "file", SceneError)
