@@ -1,0 +1,175 @@
+"""What a painting means: held where nothing is painted, lamps in their colour, as it was seen."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import lightpaint as lp
+from lightpaint.colour.color import LUMINANCE
+from lightpaint.errors import TargetError
+from lightpaint.lighting.fit import HOLD, Fit, meant_by
+from lightpaint.lighting.painting import weight_of_rest
+from lightpaint.lighting.problem import GENTLE, Problem
+from lightpaint.lighting.solve import solution_of
+
+SRGB = lp.ViewTransform()
+
+
+def _basis(make_basis: Any, n: int = 4, seed: int = 0) -> lp.Basis:
+    rng = np.random.default_rng(seed)
+    return make_basis(images=rng.random((n, 12, 10, 3)) ** 3, emission=rng.random((n, 3)) + 0.1)
+
+
+def _painted(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
+    """Something else than the look, within the left half."""
+    rng = np.random.default_rng(seed)
+    mask = np.zeros(basis.size)
+    mask[:, :5] = rng.random((basis.size[0], 5))
+    made = lp.Target.of(rng.random((*basis.size, 3)), mask)
+    return replace(made, **about)
+
+
+@pytest.mark.parametrize(
+    ("about", "fit"),
+    [
+        ({}, ("linear", 0, "free", None)),
+        ({"transform": SRGB}, ("linear", 0, "free", None)),
+        ({"over_look": True}, ("linear", HOLD, "gentle", None)),
+        ({"through_view": True, "transform": SRGB}, ("display", 0, "gentle", SRGB)),
+        (
+            {"through_view": True, "over_look": True, "transform": SRGB},
+            ("display", HOLD, "gentle", SRGB),
+        ),
+    ],
+)
+def test_what_is_left_open_follows_from_how_it_was_painted(make_basis: Any, about: Any, fit: Any):
+    target = _painted(_basis(make_basis), **about)
+    found = meant_by(Fit(), [target])
+    assert (found.space, found.hold, found.colors, found.transform) == fit
+    literal = meant_by(Fit(literal=True), [target])
+    assert (literal.space, literal.hold, literal.colors) == ("linear", 0, "free")
+    # What is said holds, whatever else is taken at its word.
+    said = Fit(space="display", hold=0.7, colors="white", literal=True)
+    assert meant_by(said, [target]) == replace(said, transform=SRGB)
+
+
+def test_views_of_which_one_was_painted_over_the_look(make_basis: Any):
+    basis = _basis(make_basis)
+    both = [_painted(basis), _painted(basis, over_look=True)]
+    assert meant_by(Fit(), both).hold == HOLD
+    agx = lp.ViewTransform("agx")
+    seen = [_painted(basis, through_view=True, transform=x) for x in (SRGB, agx)]
+    with pytest.raises(TargetError, match=r"srgb at \+0 stops.*transform=\.\.\."):
+        meant_by(Fit(), seen)
+    assert meant_by(Fit(transform=agx), seen).transform == agx
+
+
+def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
+    """h Σ D over all of it, but no pixel more than a painted one."""
+    basis = _basis(make_basis)
+    target = _painted(basis, over_look=True)
+    problem = Problem.of(basis, target)
+    D = target.importance.astype(float)
+    rest = problem.squares.weight[..., 0] - D
+    np.testing.assert_allclose(rest.sum(), HOLD * D.sum(), rtol=1e-6)
+    np.testing.assert_allclose(rest, rest.max() * (1 - D), rtol=1e-5, atol=1e-9)
+    most = replace(target, importance=np.where(np.arange(10) > 0, 1, D).astype(np.float32))
+    assert weight_of_rest(Problem.of(basis, most).views, meant_by(Fit(hold=5), [most])) == 1
+
+
+def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
+    basis = _basis(make_basis)
+    look = basis.mix(basis.present_weights)
+    for about in ({"over_look": True}, {"over_look": True, "through_view": True}):
+        target = replace(_painted(basis, transform=lp.ViewTransform("srgb", -1.0)), image=look)
+        solution = lp.solve(basis, replace(target, **about))
+        np.testing.assert_allclose(solution.weights, basis.present_weights, rtol=1e-4)
+
+
+def test_colors_are_pulled_as_the_formula_says(make_basis: Any):
+    """The optimum of squares and pull together, found by another solver."""
+    basis = _basis(make_basis)
+    target = _painted(basis, over_look=True)
+    solution = lp.solve(basis, target, hold=0)
+    D, present = target.importance.astype(float), basis.present_weights
+    images = basis.images.astype(float)
+    colors = present / (present @ LUMINANCE)[:, None]
+    power = np.square(images).sum(axis=(1, 2))
+
+    def cost(flat: np.ndarray) -> float:
+        w = flat.reshape(-1, 3)
+        missed = target.image - np.einsum("nhwc,nc->hwc", images, w)
+        hue = w - (w @ LUMINANCE)[:, None] * colors
+        return float((D[..., None] * missed**2).sum() + GENTLE * D.mean() * (power * hue**2).sum())
+
+    bounds = [(0, None)] * present.size
+    found = minimize(
+        cost,
+        present.ravel(),
+        bounds=bounds,
+        method="L-BFGS-B",
+        options={"ftol": 1e-15, "maxiter": 5000},
+    )
+    assert cost(solution.weights.ravel()) <= found.fun * (1 + 1e-7)
+    np.testing.assert_allclose(solution.weights.ravel(), found.x, rtol=1e-3, atol=1e-4)
+    assert solution.certificate.converged
+
+
+def test_lamps_that_only_dim_cost_nothing(make_basis: Any):
+    """What the present colours can do is done exactly, however strong the pull."""
+    basis = _basis(make_basis)
+    dimmed = basis.present_weights * np.array([[0.2], [3.0], [0.0], [1.0]])
+    target = replace(lp.Target.of(basis.mix(dimmed).astype(np.float32)), over_look=True)
+    np.testing.assert_allclose(lp.solve(basis, target).weights, dimmed, rtol=1e-5, atol=1e-6)
+
+
+def test_colors_that_were_asked_for_are_not_pulled(make_basis: Any):
+    basis = _basis(make_basis)
+    target = _painted(basis, over_look=True)
+    red = lp.Constraints.of({"light 0": {"color": "#ff0000"}})
+    problem = Problem.of(basis, target, constraints=red)
+    assert problem.keeps_color.tolist() == [False, True, True, True]
+    solution = solution_of(problem)
+    assert solution.weights[0, 1:].tolist() == [0, 0]
+    assert solution.certificate.converged
+
+
+def test_white_is_what_kelvin_does(make_basis: Any):
+    basis = _basis(make_basis)
+    target = _painted(basis)
+    asked = lp.Constraints.of({"*": {"kelvin": [2200, 9000]}})
+    expected = lp.solve(basis, target, constraints=asked).weights
+    np.testing.assert_allclose(lp.solve(basis, target, colors="white").weights, expected, rtol=1e-9)
+    # What is asked of a light goes before.
+    locked = lp.Constraints.of({"light 1": {"lock": True}})
+    found = lp.solve(basis, target, colors="white", constraints=locked).weights
+    np.testing.assert_allclose(found[1], basis.present_weights[1])
+
+
+def test_strokes_change_what_the_rest_weighs(make_basis: Any):
+    basis = _basis(make_basis)
+    problem = Problem.of(basis, _painted(basis, over_look=True))
+    region = (slice(3, 9), slice(2, 8))
+    after = problem.painted(region, (0.3, 0.2, 0.1), 1.0)
+    target = problem.views.targets[0]
+    image, importance = target.image.copy(), target.importance.copy()
+    image[region], importance[region] = (0.3, 0.2, 0.1), 1
+    anew = Problem.of(basis, replace(target, image=image, importance=importance))
+    for name in ("M", "b", "target_norm2"):
+        np.testing.assert_allclose(
+            getattr(after.equations, name), getattr(anew.equations, name), rtol=1e-12
+        )
+    np.testing.assert_allclose(solution_of(after).weights, solution_of(anew).weights, rtol=1e-9)
+    # Problems that were not painted on keep theirs.
+    assert problem.color_strength != after.color_strength
+
+
+def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):
+    basis = _basis(make_basis)
+    lighting = lp.solve(basis, _painted(basis, over_look=True)).lighting
+    lp.write_lighting(tmp_path / "a.json", lighting)
+    certificate = lp.read_lighting(tmp_path / "a.json").certificate
+    assert (certificate.hold, certificate.colors) == (HOLD, "gentle")
