@@ -99,10 +99,13 @@ def file_length(
     if status.st_size == 0 and (_is_made_up(status) or not may_be_empty):
         raise error(f"{path} is empty, or only made up when it is read: expected {article} {what}")
     try:
-        if status.st_size:
-            _in_time(lambda: _beginning(path))
+        hollow = _in_time(lambda: _is_hollow(path, status.st_size)) if status.st_size else False
     except OSError as reason:
         raise error(f"cannot read {path}: {reason.strerror or reason}") from None
+    if hollow:
+        raise error(
+            f"{path} is {status.st_size} bytes long, and nearly all of it was never written"
+        )
     return status.st_size
 
 
@@ -111,9 +114,24 @@ def _is_made_up(status: os.stat_result) -> bool:
     return os.path.ismount("/proc") and status.st_dev == os.stat("/proc").st_dev
 
 
-def _beginning(path: Path) -> bytes:
+def _is_hollow(path: Path, size: int) -> bool:
+    """Whether less than a thousandth of a long file was ever written: who reads it is long at it.
+
+    Reads the first byte, to see whether it can be read at all.
+    """
     with _opened(path) as file:
-        return file.read(1)
+        file.read(1)
+        if size <= MAX_TEXT:
+            return False
+        written = at = 0
+        while 1000 * written < size:
+            try:
+                start = os.lseek(file.fileno(), at, os.SEEK_DATA)
+            except OSError:  # there is no more
+                return True
+            at = os.lseek(file.fileno(), start, os.SEEK_HOLE)
+            written += at - start
+    return False
 
 
 def _opened(path: Path) -> BinaryIO:

@@ -150,7 +150,7 @@ def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPa
 
     for name, stub in (
         ("_opened", sleeps),
-        ("_beginning", sleeps),
+        ("_is_hollow", sleeps),
         ("_opened", lambda _: nullcontext(half_way)),
     ):
         with monkeypatch.context() as patch:
@@ -163,6 +163,21 @@ def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPa
     open_again.set()
     for thread in asleep:
         thread.join()
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj", ".serialized", ".png", ".exr"])
+def test_a_long_file_of_nearly_nothing(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"x{ending}"
+    with path.open("wb") as file:
+        file.write(b"ply\nformat ascii 1.0\nelement vertex 3\n")
+        file.truncate(2**32 - 10)
+    with pytest.raises(SceneError, match="nearly all of it was never written"):
+        files.file_length(path, "file to read", SceneError, limit=2**32)
+    # One that has holes, and is mostly there, is a file like any other.
+    with path.open("wb") as file:
+        file.seek(2**26)
+        file.write(bytes(2**20))
+    assert files.file_length(path, "file to read", SceneError, limit=2**32) == 2**26 + 2**20
 
 
 def test_what_goes_wrong_in_time_is_told_as_ever(tmp_path: Path) -> None:

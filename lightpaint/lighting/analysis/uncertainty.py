@@ -136,7 +136,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         to, held = room.columns, room.held
         steps, covariance = _propagated(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
         excess += np.einsum("pq,qp->p", missed, to @ covariance @ to.T)
-        both = np.einsum("pi,ij,pj->p", room.emitted, held.kept(covariance), room.emitted)
+        both = ((room.emitted @ held.kept(covariance)) * room.emitted).sum(axis=1)
         own = room.emitted @ (held.own * steps)
         below += both + np.square(np.minimum(own, 0)).sum(axis=1)
         above += both + np.square(np.maximum(own, 0)).sum(axis=1)
@@ -250,12 +250,12 @@ def _propagated(M: Doubles, C: Doubles, room: Room, gradient: Doubles) -> tuple[
     ways = room.held.ways - free @ (
         pseudo_inverse(free.T @ M @ free) @ (free.T @ M @ room.held.ways)
     )
-    stiffness, alone = (np.einsum("kh,kl,lh->h", w, M, w) for w in (ways, room.held.ways))
+    stiffness, alone = (((M @ w) * w).sum(axis=0) for w in (ways, room.held.ways))
     # The others do all that some could do.
     counts = stiffness > SINGULAR * alone
     safe = np.where(counts, stiffness, 1)
     pushed = np.where(counts, np.maximum(ways.T @ gradient, 0), 0) / safe
-    noise = np.maximum(np.einsum("kh,kl,lh->h", ways, C, ways), 0)
+    noise = np.maximum(((C @ ways) * ways).sum(axis=0), 0)
     spread = np.where(counts, np.sqrt(noise), 0) / safe
     ends = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
     free = np.hstack([free, ways[:, pushed < SIDES * spread]])
