@@ -18,8 +18,9 @@ Space = Literal["linear", "display"]
 #: whites only.
 Colors = Literal["free", "gentle", "white"]
 
-#: Weight of all that is not painted beside all that is, where it was painted over the current look.
-HOLD = 0.3
+#: Weight of all that is not painted beside all that is, where it was painted over the current look:
+#: benchmarks/intent.py has what others do.
+HOLD = 1.0
 
 F = TypeVar("F", bound="Fit")
 

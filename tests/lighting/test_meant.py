@@ -77,7 +77,7 @@ def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
     np.testing.assert_allclose(rest.sum(), HOLD * D.sum(), rtol=1e-6)
     np.testing.assert_allclose(rest, rest.max() * (1 - D), rtol=1e-5, atol=1e-9)
     most = replace(target, importance=np.where(np.arange(10) > 0, 1, D).astype(np.float32))
-    assert weight_of_rest(Problem.of(basis, most).views, meant_by(Fit(hold=5), [most])) == 1
+    assert weight_of_rest(Problem.of(basis, most).views, meant_by(Fit(hold=50), [most])) == 1
 
 
 def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
