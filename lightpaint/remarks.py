@@ -1,6 +1,7 @@
 """What is worth saying to a person before a job is run, in plain text."""
 
-from lightpaint.basis.render.render import memory_needed, why_not_one_pass
+from lightpaint.basis.render.integrators import remark_on_separate_renders
+from lightpaint.basis.render.render import memory_needed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.settings import Settings
@@ -20,10 +21,8 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     # Python gets the same as a warning.
     if note := use_variant().note:
         remarks.append(note)
-    elif is_rendered and (reason := why_not_one_pass(scene)):
-        remarks.append(
-            f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
-        )
+    elif is_rendered and (note := remark_on_separate_renders(scene)):
+        remarks.append(note)
     return remarks
 
 

@@ -22,6 +22,9 @@ from lightpaint.scene.checks.xml import check_nodes, check_xml
 from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
 from lightpaint.scene.film import Film
 
+#: How long paths are where nobody says, if not without end.
+DEPTHS = {"prb": 6, "prb_basic": 6, "prb_projective": 6, "prbvolpath": 6}
+
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000
 
@@ -195,7 +198,7 @@ class ParsedScene:
         samples = (props.get("emitter_samples", shading), props.get("bsdf_samples", shading))
         return Integrator(
             props.plugin_name(),
-            int(props.get("max_depth", -1)),
+            int(props.get("max_depth", DEPTHS.get(props.plugin_name(), -1))),
             int(props.get("rr_depth", 5)),
             bool(props.get("hide_emitters", False)),
             (int(samples[0]), int(samples[1])),

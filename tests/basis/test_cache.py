@@ -98,7 +98,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
 
 def test_separate_renders_are_kept_as_well(tmp_path: Path) -> None:
     log: list[int] = []
-    path = write_room(tmp_path, integrator='<integrator type="volpath"/>')
+    path = write_room(tmp_path, integrator='<integrator type="volpathmis"/>')
     scene = load_scene(path)
     obtain_basis(scene, spp=4)
     assert obtain_basis(scene, spp=4, progress=passes(log)).origin.spp == 4

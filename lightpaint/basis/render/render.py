@@ -6,37 +6,18 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.basis.render.budget import Budget, Keeper, passes
+from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.separate import LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
-from lightpaint.scene.emission import ENVIRONMENTS
 from lightpaint.scene.render import SAMPLES_PER_PASS, view_seed
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.variant import use_variant
 
 #: Camera samples that choices of emitters are learned from before any counts.
 REHEARSAL = 2**18
 
 ONE_PASS = "one pass"
 SEPARATE = "separate renders"
-
-
-def why_not_one_pass(scene: Scene) -> str | None:
-    """What keeps `scene` from the one-pass basis, in a few words; None if nothing does."""
-    variant = use_variant()
-    integrator = scene.integrator
-    if not variant.is_jit:
-        return f"the variant is {variant.variant}"
-    if integrator.plugin not in ("path", "direct"):
-        return f"the integrator is {integrator.plugin!r}"
-    if integrator.plugin == "direct" and integrator.samples != (1, 1):
-        return "the direct integrator draws other than one sample of emitters and BSDF"
-    backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
-    if scene.has_null and (integrator.hide_emitters or not backdrop):
-        return "rays may pass surfaces and leave, which Mitsuba counts as black"
-    if scene.has_media:
-        return "the scene has participating media"
-    return None
 
 
 def render_basis(
