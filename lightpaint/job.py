@@ -23,7 +23,12 @@ from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import check_relightable
-from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
+from lightpaint.remarks import (
+    remarks_of_film,
+    remarks_of_memory,
+    remarks_of_scene,
+    remarks_of_target,
+)
 from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
@@ -269,7 +274,9 @@ class Job:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))
         for target, view in zip(targets, self.views, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.settings)
-        return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
+        for scene in rendered:
+            remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
+        return remarks
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:

@@ -122,6 +122,7 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
         seed=seed,
         spp=spp,
         guided=None if plain else Guided(seed, 0, guide),
+        block=scene.film.block,
         must_bounce=needs_a_bounce(scene),
     )
     del loaded

@@ -75,6 +75,7 @@ class Tracer:
             seen=seen,
             spp=spp,
             guided=numbers,
+            block=self.scene.film.block,
             must_bounce=needs_a_bounce(self.scene),
         )
         # A running kernel cannot be interrupted, and what is not waited for is still running.
@@ -118,6 +119,7 @@ def accumulate(
     spp: int,
     seed: int = 0,
     guided: Guided | None = None,
+    block: int = 1,
     must_bounce: bool = False,
 ) -> int:
     """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.
@@ -127,10 +129,11 @@ def accumulate(
     planes: Float array of n·h·w·3 values, laid out (n, h, w, 3).
     seen: Float array of h·w values; counts the camera rays that see an emitter.
     guided: None draws all numbers at random, from `seed`, in Mitsuba's order.
+    block: side of the blocks of the film's pixels that are pixels here.
     must_bounce: whether paths that only pass surfaces carry nothing (see integrators.py).
     Returns the number of paths per pixel, which some samplers round up.
     """
-    width, height = (int(v) for v in camera.film().crop_size())
+    width, height = (int(v) // block for v in camera.film().crop_size())
     sampler = None
     if guided is None:
         sampler = camera.sampler().clone()

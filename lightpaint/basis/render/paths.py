@@ -20,7 +20,10 @@ from lightpaint.basis.render.sobol import APERTURE, FILM, TIME
 
 
 def camera_rays(sensor, sampler, numbers, pixel, width, height):
-    """One ray per sample, drawing random numbers as Mitsuba's SamplingIntegrator does."""
+    """One ray per sample, drawing random numbers as Mitsuba's SamplingIntegrator does.
+
+    width, height: pixels into which the film's crop window is divided, its own or larger ones.
+    """
     film = sensor.film()
     corner = mi.Vector2f(pixel % width, pixel // width) + mi.Vector2f(film.crop_offset())
     position = corner + (sampler.next_2d() if numbers is None else numbers.pair(FILM))

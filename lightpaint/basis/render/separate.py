@@ -14,6 +14,7 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.budget import SHORTER, Budget, Clock, Keeper, next_pair
+from lightpaint.images.blocks import block_mean
 from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces
 from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_pass
 from lightpaint.scene.scene import Scene
@@ -117,10 +118,15 @@ def _turns(
     """(light, its passes, what to call after each) in turn, until `budget` is spent."""
     height, width = scene.size
     pixels, lights = height * width, len(scene.lights)
+    step = scene.film.block_pixels
+
+    def plan_to(spp: int, light: int) -> Plan:
+        return plan_passes(pixels, spp, done=sums.done(light), shorter=SHORTER, step=step)
+
     if budget.time_s is None:
         # One light after the other: a large scene takes long to load.
         for light in range(lights):
-            plan = plan_passes(pixels, budget.spp, done=sums.done(light), shorter=SHORTER)
+            plan = plan_to(budget.spp, light)
             if plan:
                 yield light, plan, _count(f"basis: {scene.lights[light].name}", plan, progress)
         return
@@ -131,10 +137,10 @@ def _turns(
     while pairs > 0:
         fullest = int(sums.spp.max())
         begin_s, rendered = clock.left_s, 0
-        goal = next_pair(pixels, (fullest, fullest), pairs)
+        goal = next_pair(pixels, (fullest, fullest), pairs, step=step)
         spp = 2 * fullest + sum(size for _, size in goal)
         for light in range(lights):
-            plan = plan_passes(pixels, spp, done=sums.done(light), shorter=SHORTER)
+            plan = plan_to(spp, light)
             rendered += len(plan)
             yield light, plan, clock.report
         pair_of_all_s = (begin_s - clock.left_s) / rendered * 2 * lights
@@ -178,9 +184,10 @@ def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
         return np.zeros(scene.size, dtype=bool)
     loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
     direct = mi.load_dict({"type": "path", "max_depth": 1})
+    spp = -(-16 // scene.film.block_pixels)
     image = as_float32(
-        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=16))
+        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=spp))
     )
     del loaded
     gc.collect()
-    return np.asarray(image.max(axis=-1) > 0)
+    return np.asarray(block_mean(image, scene.film.block).max(axis=-1) > 0)
