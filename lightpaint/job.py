@@ -47,7 +47,7 @@ from lightpaint.sources import (
 from lightpaint.target.target import Target
 
 #: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "time_s", "quality", "resolution", "refine", "suggest")
+RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit")
 
 

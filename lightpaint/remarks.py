@@ -38,7 +38,7 @@ def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
         whole = "x".join(map(str, film.crop_size))
         remarks.append(
             f"film of {whole} reduced to {width}x{height} blocks of {film.block}x{film.block} "
-            f"pixels; {_spoken_rest(film.left_out)} in none and counted nowhere"
+            f"pixels: {_spoken_rest(film.left_out)} left over, and nowhere counted"
         )
     few = None
     if settings.quality is not None and settings.resolution is None:
@@ -80,8 +80,10 @@ def remarks_of_target(
     is_asked_for = settings.resize or settings.resolution or settings.quality
     if size != target.size and not is_asked_for:
         rest = left_over(target.size, whole_factor(target.size, size) or 1)
-        lost = f"; {_spoken_rest((rest[1], rest[0]))} counted nowhere" if any(rest) else ""
-        remarks.append(f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}{lost}")
+        remark = f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}"
+        if any(rest):
+            remark += f": {_spoken_rest((rest[1], rest[0]))} left over, and nowhere counted"
+        remarks.append(remark)
     name = "srgb" if target.transform is None else target.transform.name
     if settings.space == "linear" and name not in ("srgb", "linear"):
         remarks.append(

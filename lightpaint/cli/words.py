@@ -5,6 +5,7 @@ import re
 #: Arguments of the library that errors and remarks name, and their options.
 OPTIONS = {
     "cd_per_unit": "--unit",
+    "exact_spp": "--exact-spp",
     "groups": "--group",
     "layer": "--layer",
     "lights": "--lights",

@@ -87,6 +87,8 @@ class Certificate:
         display: The view transform through which the objective is seen; "" where it is of linear
             light.
         rounds: Linear problems solved one after the other, the last of which is the certified one.
+        basis_spp: Samples per pixel of the basis it was solved with, of the first of several views;
+            None where nobody knows of any.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -107,6 +109,7 @@ class Certificate:
     objective_error: RGB | None = None
     display: str = ""
     rounds: int = 1
+    basis_spp: int | None = None
 
     __repr__ = shortly
 

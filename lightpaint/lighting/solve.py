@@ -177,6 +177,7 @@ def _solution(
         converged=optimum.converged,
         unreached=tuple(n for n, ok in zip(names, optimum.reached, strict=True) if not ok),
         display="" if transform is None else transform.spoken,
+        basis_spp=problem.basis.origin.spp if problem.basis.knows_noise else None,
     ).of(problem.objective(weights), problem.norm2)
     labels = problem.reduction.labels
     asked = [(label, False) for label in labels]

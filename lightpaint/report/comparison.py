@@ -54,7 +54,7 @@ def comparison_image(
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
-    predicted, verified: (h, w, 3) linear, the latter possibly larger by a whole factor; what
+    predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target; pixels that do not
     count are grey, dim and hatched. Raises SizeError if target and basis differ in size.

@@ -144,16 +144,17 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     small = on_film(scene, None, "1/3")
     assert remarks_of_film(scene, asked) == []
     assert remarks_of_film(small, asked) == [
-        "film of 23x20 reduced to 7x6 blocks of 3x3 pixels; 2 columns of pixels at the right and 2 "
-        "rows at the bottom are in none and counted nowhere"
+        "film of 23x20 reduced to 7x6 blocks of 3x3 pixels: 2 columns of pixels at the right and 2 "
+        "rows at the bottom are left over, and nowhere counted"
     ]
     assert remarks_of_film(scene.reduced("1/2"), asked)[0].endswith(
-        "11x10 blocks of 2x2 pixels; 1 column of pixels at the right is in none and counted nowhere"
+        "11x10 blocks of 2x2 pixels: 1 column of pixels at the right is left over, and nowhere "
+        "counted"
     )
     target = Target.of(np.ones((20, 23, 3)))
     assert remarks_of_target(target, small.size, None, Settings()) == [
-        "target: 23x20 pixels averaged to the basis's 7x6; 2 columns of pixels at the right and 2 "
-        "rows at the bottom are counted nowhere"
+        "target: 23x20 pixels averaged to the basis's 7x6: 2 columns of pixels at the right and 2 "
+        "rows at the bottom are left over, and nowhere counted"
     ]
     thin = load_scene(write_room(tmp_path), parameters={"width": 700_000})
     [said] = remarks_of_film(on_film(thin, "preview", None), Settings(quality="preview"))

@@ -39,14 +39,14 @@ def why_not_one_pass(scene: Scene) -> str | None:
 
 
 def remark_on_separate_renders(scene: Scene) -> str | None:
-    """What `scene` costs for want of one pass, and what to do; None if one serves."""
-    if (reason := why_not_one_pass(scene)) is None:
+    """What `scene` costs for want of one pass, and what to do; None if it costs nothing."""
+    count = len(scene.lights)
+    if (reason := why_not_one_pass(scene)) is None or count == 1:
         return None
     if use_variant().is_jit:
         instead = "the integrator path, where it shows the same,"
     else:
         instead = "a variant like llvm_ad_rgb"
-    count = len(scene.lights)
     return (
         f"{reason}: each of the {count} lights is rendered by itself, {count} times the work; "
         f"{instead} renders all in one pass"

@@ -112,21 +112,26 @@ def render_separately(
         ) from None
 
 
+def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> Plan:
+    """The passes that bring one light from `done` samples per pixel of each half to `spp` in all.
+
+    On a film of blocks those are a little more: each pixel of a block takes one sample at least.
+    """
+    height, width = scene.size
+    step = scene.film.block_pixels
+    return plan_passes(height * width, spp, done=done, shorter=SHORTER, step=step)
+
+
 def _turns(
     scene: Scene, budget: Budget, sums: LightSums, progress: Progress
 ) -> Iterator[tuple[int, Plan, Callable[[], None]]]:
     """(light, its passes, what to call after each) in turn, until `budget` is spent."""
     height, width = scene.size
     pixels, lights = height * width, len(scene.lights)
-    step = scene.film.block_pixels
-
-    def plan_to(spp: int, light: int) -> Plan:
-        return plan_passes(pixels, spp, done=sums.done(light), shorter=SHORTER, step=step)
-
     if budget.time_s is None:
         # One light after the other: a large scene takes long to load.
         for light in range(lights):
-            plan = plan_to(budget.spp, light)
+            plan = plan_of_light(scene, budget.spp, done=sums.done(light))
             if plan:
                 yield light, plan, _count(f"basis: {scene.lights[light].name}", plan, progress)
         return
@@ -137,10 +142,10 @@ def _turns(
     while pairs > 0:
         fullest = int(sums.spp.max())
         begin_s, rendered = clock.left_s, 0
-        goal = next_pair(pixels, (fullest, fullest), pairs, step=step)
+        goal = next_pair(pixels, (fullest, fullest), pairs, step=scene.film.block_pixels)
         spp = 2 * fullest + sum(size for _, size in goal)
         for light in range(lights):
-            plan = plan_to(spp, light)
+            plan = plan_of_light(scene, spp, done=sums.done(light))
             rendered += len(plan)
             yield light, plan, clock.report
         pair_of_all_s = (begin_s - clock.left_s) / rendered * 2 * lights
