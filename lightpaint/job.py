@@ -24,7 +24,12 @@ from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.relight import check_relightable
-from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
+from lightpaint.remarks import (
+    remarks_of_film,
+    remarks_of_memory,
+    remarks_of_scene,
+    remarks_of_target,
+)
 from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
@@ -43,7 +48,7 @@ from lightpaint.sources import (
 from lightpaint.target.target import Target
 
 #: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "time_s", "quality", "resolution", "refine", "suggest")
+RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
@@ -285,7 +290,9 @@ class Job:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))
         for target, view in zip(targets, self.views, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.settings)
-        return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
+        for scene in rendered:
+            remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
+        return remarks
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.basis.render.render import samples_for
 from lightpaint.files import restoring
 from lightpaint.images.estimate import write_estimate
 from lightpaint.job import Job, PaintedView
@@ -84,12 +85,14 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
         is_rendered = True
         listen(label, done, total, unit)
 
+    asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
     basis = obtain_basis(
         scene,
-        spp=samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
+        spp=asked,
         time_s=None if settings.time_s is None else settings.time_s / views,
         seed=settings.seed,
         use_cache=settings.use_cache,
+        exact_spp=settings.exact_spp,
         progress=report,
     )
     if settings.use_cache and not cache.is_kept(basis):
@@ -97,11 +100,17 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
             f"the basis could not be kept in {cache.folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
-    if not is_rendered:
+    has = f"basis of {basis.origin.spp} samples per pixel"
+    wanted = scene.spp if asked is None else asked
+    if not is_rendered and basis.origin.spp > samples_for(scene, asked):
         listen.say(
-            f"basis of {basis.origin.spp} samples per pixel kept from an earlier run "
-            "(use_cache=False renders it anew)"
+            f"{has} kept from an earlier run: more than the {wanted} asked for, so the answer may "
+            "differ a little from one of these (exact_spp=True takes just them)"
         )
+    elif not is_rendered:
+        listen.say(f"{has} kept from an earlier run (use_cache=False renders it anew)")
+    elif settings.time_s is None and basis.origin.spp > wanted + 1:
+        listen.say(f"{has}, not {wanted}: it takes one in each pixel of a block for each half")
     return basis
 
 
@@ -161,7 +170,7 @@ def _finished(
         if settings.checks_as_basis:
             pixels, checked = (size[0] * size[1] for size in (basis.size, relit.size))
             spp = max(FEWEST, basis.origin.spp * pixels // checked)
-    write_predicted(view.folder / "predicted.exr", predicted, sensor=basis.origin.sensor, spp=spp)
+    write_predicted(view.folder / "predicted.exr", predicted, origin=basis.origin, spp=spp)
     if relit is not None:
         verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=listen)
         write_estimate(view.folder / "verified.exr", verification.verified, {})

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
@@ -142,9 +142,13 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     return names
 
 
-def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -> None:
-    """predicted.exr, with a note of how to see the relit scene as the basis saw it."""
-    write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
+def write_predicted(path: Path, predicted: Estimate, *, origin: Origin, spp: int) -> None:
+    """predicted.exr, with a note of how to see the relit scene as the basis saw it.
+
+    origin: of the basis. spp: samples per pixel of the verification.
+    """
+    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp}
+    write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
 
 
 def write_report(folder: Path, look: Look, *, command: str) -> None:

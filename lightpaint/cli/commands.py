@@ -21,7 +21,7 @@ from lightpaint.lighting.file import read_lighting
 from lightpaint.pipeline import obtain, run
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import scene_of
-from lightpaint.remarks import remarks_of_memory, remarks_of_scene
+from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.renders import relight_look, render_look, render_template
 from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film
@@ -56,7 +56,8 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> int:
     check_writable(output.parent)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
     with terminal.Listener() as listen:
-        for remark in (*remarks_of_scene(loaded), *remarks_of_memory(loaded)):
+        of_film = remarks_of_film(loaded, settings)
+        for remark in (*remarks_of_scene(loaded), *of_film, *remarks_of_memory(loaded)):
             listen.say(remark)
         made = obtain(loaded, settings, listen)
     write_basis(output, made)
@@ -79,6 +80,8 @@ def template(
     loaded = _loaded(scene)
     if settings.resolution:
         loaded = loaded.reduced(settings.resolution)
+        for remark in remarks_of_film(loaded, settings):
+            terminal.say(remark)
     how: dict[str, Any] = {"transform": transform, "spp": settings.spp, "seed": settings.seed}
     linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:

@@ -6,6 +6,7 @@ import re
 OPTIONS = {
     "cd_per_unit": "--unit",
     "emitters": "--emitters",
+    "exact_spp": "--exact-spp",
     "groups": "--group",
     "integrator": "--integrator",
     "layer": "--layer",

@@ -33,6 +33,8 @@ class Certificate:
             light.
         rounds: Linear problems solved one after the other, the last of which is the certified one.
         software: What it was computed with, where that is known.
+        basis_spp: Samples per pixel of the basis it was solved with, of the first of several views;
+            None where nobody knows of any.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -54,6 +56,7 @@ class Certificate:
     display: str = ""
     rounds: int = 1
     software: Software | None = None
+    basis_spp: int | None = None
 
     __repr__ = shortly
 

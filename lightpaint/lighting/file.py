@@ -53,7 +53,7 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
     }
     if (q := lighting.certificate) is not None:
         data["solve"] = fields_of(
-            q, "curve", "bounds", "objective_error", "display", "rounds", "software"
+            q, "curve", "bounds", "objective_error", "display", "rounds", "software", "basis_spp"
         )
     write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 

@@ -199,6 +199,7 @@ def _solution(
         unreached=tuple(n for n, ok in zip(names, reached, strict=True) if not ok.any()),
         display="" if transform is None else transform.spoken,
         software=Software.here(),
+        basis_spp=problem.basis.origin.spp if problem.basis.knows_noise else None,
     ).of(problem.objective(weights), problem.norm2)
     asked = [(label, False) for label in labels]
     if any(labels):

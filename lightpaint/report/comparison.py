@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display import to_8_bit
-from lightpaint.images.blocks import block_mean, enlarged
+from lightpaint.images.blocks import block_mean, enlarged, whole_factor
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.pictures import (
@@ -54,7 +54,7 @@ def comparison_image(
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
-    predicted, verified: (h, w, 3) linear, the latter possibly larger by a whole factor; what
+    predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target; pixels that do not
     count are grey, dim and hatched. Raises SizeError if target and basis differ in size.
@@ -77,7 +77,8 @@ def comparison_image(
         ),
     ]
     if verified is not None:
-        factor = verified.shape[0] // predicted.shape[0]
+        factor = whole_factor(verified.shape[:2], predicted.shape[:2])
+        assert factor is not None
         gap = predicted.astype(np.float64) - block_mean(verified, factor)
         rmse = float(np.sqrt(np.square(gap).mean()))
         tiles.append(
@@ -96,7 +97,7 @@ def comparison_image(
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     """Tiles in a row on neutral grey, captions below. Returns (H, W, 3).
 
-    The size of the largest tile is a whole multiple of the others'.
+    Pixels of the others are whole blocks of those of the largest tile.
     """
     height, width = max(tile.picture.shape[:2] for tile in tiles)
     zoom = max(1, -(-NARROWEST // width))
@@ -107,7 +108,8 @@ def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     sheet = Image.new("RGB", size, SURROUND)
     for k, tile in enumerate(tiles):
         x = gap + k * (width + gap)
-        picture = enlarged(to_8_bit(tile.picture), width // tile.picture.shape[1])
+        factor = whole_factor((height, width), tile.picture.shape[:2])
+        picture = enlarged(to_8_bit(tile.picture), factor or zoom)
         sheet.paste(Image.fromarray(picture), (x, gap))
         _caption(ImageDraw.Draw(sheet), tile, (x, gap + height + text // 2), width, text)
         if tile.limit is not None:

@@ -75,13 +75,10 @@ def _figures(
     basis: Basis, pictures: list[tuple[Doubles, str, str]], transform: ViewTransform
 ) -> str:
     """Pictures of weights (n, 3), each with its name and a caption."""
-    height, width = basis.size
-    factor = max(1, width // WIDTH)
-    whole = (slice(height // factor * factor), slice(width // factor * factor))
+    factor = max(1, min(basis.size[1] // WIDTH, *basis.size))
     figures = []
     for weights, name, caption in pictures:
-        # What does not make a whole block at the border is left out; it is for looking at.
-        image = block_mean(basis.mix(weights)[whole], factor)
+        image = block_mean(basis.mix(weights), factor)
         pixels = transform.encode(np.asarray(image, np.float32))
         figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
     return "".join(figures)

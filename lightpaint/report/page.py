@@ -12,6 +12,7 @@ from string import Template
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import covered
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -111,7 +112,7 @@ def _looks(
         ),
     ]
     if verified is not None:
-        shown = transform.encode(verified)
+        shown = transform.encode(covered(verified, predicted.shape[:2]))
         looks.append(Picture("verified", "An independent render of the relit scene.", shown))
     return looks
 

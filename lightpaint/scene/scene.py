@@ -131,8 +131,8 @@ class Scene(Shown):
 
     @property
     def size(self) -> tuple[int, int]:
-        """(height, width) in pixels of the sensor's film, or of its crop window."""
-        width, height = self.film.crop_size
+        """(height, width) in pixels of the picture: of the sensor's film, or its crop window."""
+        width, height = self.film.pixels
         return height, width
 
     def light(self, name: str) -> Light:
@@ -140,10 +140,10 @@ class Scene(Shown):
         return light_named(name, self.lights, scene=str(self.path))
 
     def reduced(self, resolution: str) -> "Scene":
-        """This scene on a smaller film of the same field of view.
+        """This scene on a smaller film: each pixel is the mean of a square block of pixels.
 
-        resolution: `1/4`, or `320x180`: a part of the film that cuts it into whole blocks of
-        pixels. Raises SceneError, with sizes that would do, for any other.
+        resolution: `1/4`, or `320x180`. What makes no whole block at the right and at the bottom
+        is left out. Raises SceneError, with sizes that would do, for sizes that no blocks have.
         """
         return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 

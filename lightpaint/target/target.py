@@ -186,8 +186,8 @@ class Target(Shown):
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """This target at `size` (height, width) of the basis.
 
-        A whole multiple of that is reduced: so is one that was painted at full size, for a
-        basis on a reduced film. Raises SizeError if it has another size and may not be
+        One that has as many square blocks of pixels is reduced: so is one that was painted at full
+        size, for a basis on a reduced film. Raises SizeError if it has another size and may not be
         resampled.
         """
         if factor := whole_factor(self.size, size):

@@ -16,8 +16,8 @@ from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.scene.scene import load_scene
 
-VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
-INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}
+SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
+INTEGRATORS = {"one pass": PATH, "separate renders": SEPARATELY}
 
 #: Samples per pixel: seconds of work, where it goes slowly.
 SPP = {"one pass": 10_000, "separate renders": 1000}
