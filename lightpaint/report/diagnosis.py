@@ -106,6 +106,7 @@ def _shares(diagnosis: Diagnosis) -> str:
         ("out of reach of any mix", d.unreachable),
         (f"forbidden: {by_what}", d.forbidden),
         *([("noise of the basis", d.noise)] if d.noise > 0 else []),
+        *([("noise of the painting", d.painting_noise)] if d.painting_noise > 0 else []),
     ]
     if d.compromise > 0:
         parts.insert(2, ("given up for the other views", d.compromise))

@@ -90,6 +90,7 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
         else "what is asked of the lights, or zero, forbids": d.forbidden,
         "is given up for the other views": d.compromise,
         "is noise of the basis": d.noise,
+        noise_of_painting(d): d.painting_noise,
     }
     told = [
         (d.share(energy), what)
@@ -107,6 +108,13 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     for bound in dict.fromkeys([*most, *to_switch_on[:1]]):
         sentences.append(spoken_bound(bound, d.gained(bound)))
     return sentences
+
+
+def noise_of_painting(diagnosis: Diagnosis) -> str:
+    """Whose that noise is: where nothing is known of the basis' own, it may be its as well."""
+    if diagnosis.noise > 0:
+        return "is noise of the painting, as renders have"
+    return "is noise of the painting or of the lights' images"
 
 
 def spoken_bound(bound: Bound, share: float) -> str:
