@@ -11,7 +11,6 @@ edge or a stroke goes on there, so that these products are taken off.
 """
 
 from collections.abc import Iterator
-
 from typing import TypeVar
 
 import numpy as np
@@ -77,8 +76,9 @@ def _seen_by_taps(residual: Floats, counted: Bools, step: int) -> Doubles:
 
 def _taps(image: npt.NDArray[_Kind], step: int, axis: int) -> list[npt.NDArray[_Kind]]:
     """`image` three times, `step` pixels apart along an axis."""
-    length = image.shape[axis] - 2 * step
-    return [np.moveaxis(np.moveaxis(image, axis, 0)[k * step :][:length], 0, axis) for k in range(3)]
+    lines = np.moveaxis(image, axis, 0)
+    length = len(lines) - 2 * step
+    return [np.moveaxis(lines[k * step :][:length], 0, axis) for k in range(3)]
 
 
 def _apart(distance: int) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
@@ -94,4 +94,4 @@ def _around(image: Doubles) -> Doubles:
     """The mean over a block and those around it, of each block, the last of which may be cut."""
     rows, columns = (np.arange(0, length, BLOCK) for length in image.shape)
     sums = np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1)
-    return box_mean(sums, AROUND)
+    return np.asarray(box_mean(sums, AROUND), np.float64)
