@@ -12,7 +12,7 @@ from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
-from lightpaint.target.painted import LOSSY_RADIUS, painted_where
+from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target
 from lightpaint.target.template import LIGHT, SHOWN, Template, find_template, read_template
 from lightpaint.target.whole import what_became_of
@@ -187,7 +187,7 @@ def _of_all(picture: Picture, template: Template) -> str:
     transform = picture.transform or template.transform
     mine, its = (transform.encode(x) for x in (picture.image, template.image))
     if picture.lossy:  # which leaves the means of a few pixels as they are
-        mine, its = (box_mean(x, LOSSY_RADIUS) for x in (mine, its))
+        mine, its = (box_mean(x, SHARP_RADIUS) for x in (mine, its))
     return what_became_of(mine, its)
 
 

@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles, Floats
 
 #: Of the painting's own contrast, what a smooth function of the template's colours may miss of it.
 #: Views and profiles were seen to leave 0.04 at most, and paintings 0.2 at least.
-SMOOTH = 0.12
+SMOOTH = 0.1
 
 #: Pixels that are looked at, evenly spread, and how near to white a display value is cut off.
 PIXELS, WHITE = 20_000, 0.998

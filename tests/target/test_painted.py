@@ -282,7 +282,7 @@ SRGB = ViewTransform("srgb")
 CONVERTED = {
     "darker": lambda shown, light: 0.8 * shown,
     "agx": lambda shown, light: ViewTransform("agx", 1.0).encode(light),
-    "filmic": lambda shown, light: ViewTransform("filmic", -0.5).encode(light),
+    "filmic": lambda shown, light: ViewTransform("filmic", 1.0).encode(light),
     "another gamma": lambda shown, light: shown ** (2.2 / 1.8),
     "linear": lambda shown, light: np.clip(light, 0, 1),
     "exposure": lambda shown, light: SRGB.encode(2 * light),
