@@ -1,5 +1,8 @@
 """In plain sentences: how sure the answer is, and why it does not look like the painting."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 
 from lightpaint.arrays import Doubles
@@ -11,12 +14,16 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.verdict import energy_shares
+from lightpaint.screen import some_of
 
 #: Shares of the miss, or of a light, that are too small to speak of.
 SMALL = 0.05
 
 #: The same of a light that is switched off: it is easily switched on.
 SMALLER = 0.01
+
+#: Characters of names in a sentence.
+NAMES = 120
 
 #: What the painting and the light there must differ by to be called another colour.
 SEEN = 0.06
@@ -54,7 +61,8 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
         why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
         return f"More samples would change no light: {why}."
     k = int(np.argmax(effect))
-    light = f"light {solution.lighting.lights[k].name}, {spoken_percent(shares[k])} of the picture"
+    name = solution.lighting.lights[k].name
+    light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
     return (
         f"More samples would change {light}, by {change} (95 %); "
@@ -117,10 +125,22 @@ def noise_of_painting(diagnosis: Diagnosis) -> str:
     return "is noise of the painting or of the lights' images"
 
 
+def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
+    """`light key`, `lights key, fill`, or `light_3` alone where that says what it is.
+
+    start: of a sentence. Of very many the first are named, and how many there are.
+    """
+    listed = some_of([name or "without a name" for name in names], room=NAMES)
+    if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
+        return listed
+    word = "light" if len(names) == 1 else "lights"
+    return f"{word.capitalize() if start else word} {listed}"
+
+
 def spoken_bound(bound: Bound, share: float) -> str:
     """What holds a light, and which share of the miss that is."""
     is_one = len(bound.lights) == 1
-    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {', '.join(bound.lights)} are"
+    lights = spoken_lights(bound.lights, start=True) + (" is" if is_one else " are")
     if bound.kind == "zero":
         return (
             f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
