@@ -94,7 +94,7 @@ def solution_html(solution: Solution) -> str:
         light, setting = basis.lights[k], lighting.lights[k]
         # What a page of the report stacks stands in a line here.
         told = change(light, setting, solution.certificate.unreached)
-        told = told.replace("<small>", " ").replace("</small>", "")
+        told = told.replace("<small>", "").replace("</small>", "")
         colour = _swatch(setting.emission, lighting.photometry(setting))
         now, new = _rgb(light.emission), _rgb(setting.emission)
         return light.name, colour, now, new, told, setting.constraint

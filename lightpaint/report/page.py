@@ -22,7 +22,7 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.figures import Picture, maps, wipe
-from lightpaint.report.lights_table import amounts_heading, lights_table
+from lightpaint.report.lights_table import lights_table
 from lightpaint.report.pictures import target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
@@ -76,7 +76,6 @@ def report_page(
         ),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
-        amounts=amounts_heading(solution),
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, predicted, verification),

@@ -13,7 +13,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
-from lightpaint.report.html import facts, row
+from lightpaint.report.html import facts, listed, row
 from lightpaint.report.verdict import (
     codes_missed,
     linear_residual,
@@ -78,7 +78,7 @@ def render_table(
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
     adjusted = int((~basis.is_fixed).sum())
-    told = [
+    told: list[tuple[str, str]] = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
@@ -88,9 +88,9 @@ def render_table(
     told += _fitted(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:
-            told.append(("Kept as they are", ", ".join(light.members)))
+            told.append(("Kept as they are", listed(light.members)))
     if q.unreached:
-        told.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
+        told.append(("Reach nothing painted, so kept", listed(q.unreached)))
     if target.not_finite:
         told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
     return facts(told)

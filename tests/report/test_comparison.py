@@ -16,7 +16,7 @@ from lightpaint.files import write_bytes
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.comparison import SURROUND, Tile, compose, comparison_image
+from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
 from lightpaint.report.pictures import (
     DIVERGING,
     coverage,

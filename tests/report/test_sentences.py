@@ -163,7 +163,7 @@ def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
     page = missed_section(
         solution, replace(found, bounds=(bound,)), current, transform=ViewTransform()
     )
-    assert "−2.5<small>per unit of luminance" in page
+    assert "−2.5 <small>per unit of luminance" in page
     assert "not looked into" not in page
     found = replace(found, bounds=(bound,), bounds_left_out=7)
     page = missed_section(solution, found, current, transform=ViewTransform())
