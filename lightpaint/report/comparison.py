@@ -11,7 +11,6 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display import to_8_bit
 from lightpaint.images.blocks import block_mean, enlarged
-from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.pictures import (
     diverging,
@@ -60,7 +59,7 @@ def comparison_image(
     count are grey, dim and hatched. Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    current = combine(basis, Lighting.present(basis)).image
+    current = basis.present_look
     transform = transform_of(target, predicted, verified)
     share = float(painted(target, solution).mean())
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""

@@ -14,7 +14,7 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure, signed_scale
 from lightpaint.report.html import folded, listed, name_of, row, share_cell, table
-from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
+from lightpaint.report.pictures import FINEST_SCALE, coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
     how_sure,
     relative_errors,
@@ -138,11 +138,7 @@ def _maps(
             + " So is what other views ask for." * (diagnosis.compromise > 0),
         ),
     ]
-    counted = solution.importance > 0
-    sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]
-    limit = round_up(
-        max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-transform.stops)
-    )
+    limit = maps_limit(solution, diagnosis, transform=transform)
     share = coverage(solution.importance)[..., None]
     grey = unpainted_look(current, transform=transform)
     figures = []
@@ -168,6 +164,14 @@ def _maps(
             )
         )
     return "".join(figures)
+
+
+def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTransform) -> float:
+    """The end of the scale of all maps of what is missed."""
+    counted = solution.importance > 0
+    maps = (diagnosis.unreachable_map, diagnosis.forbidden_map)
+    sizes = np.concatenate([np.abs(luminance(image))[counted] for image in maps])
+    return round_up(max(float(np.percentile(sizes, 99)), FINEST_SCALE * 2.0**-transform.stops))
 
 
 def _bounds(diagnosis: Diagnosis) -> str:

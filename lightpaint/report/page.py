@@ -15,7 +15,6 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
@@ -23,7 +22,7 @@ from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import lights_table
-from lightpaint.report.pictures import target_picture, transform_of
+from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.verdict import verdict
@@ -53,7 +52,7 @@ def report_page(
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    current = combine(basis, Lighting.present(basis)).image
+    current = basis.present_look
     verified = None if verification is None else verification.verified.image
     transform = transform_of(target, predicted.image, verified)
     looks = _looks(target, solution, current, predicted.image, verified, transform=transform)
@@ -134,7 +133,7 @@ def _banner(verification: Verification | None) -> str:
 def _exposure(transform: ViewTransform, predicted: Floats) -> str:
     """How linear light became these pictures, and what of it they cannot show."""
     at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
-    clipped = float((predicted.max(axis=-1) > transform.white).mean())
+    clipped = brighter_than_white(predicted, transform)
     text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."

@@ -53,14 +53,13 @@ def spoken_error(light: LightSetting, error: float) -> str:
 
 def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     """What more samples would change, of the light whose error changes the picture most."""
-    shares = energy_shares(basis, solution.lighting)
-    errors = relative_errors(uncertainty)
-    effect = np.where(np.isfinite(errors), errors, 0) * shares
-    if not effect.any():
+    k = most_uncertain(basis, solution, uncertainty)
+    if k is None:
         has_noise = bool(basis.half_differences.any())
         why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
         return f"More samples would change no light: {why}."
-    k = int(np.argmax(effect))
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
     name = solution.lighting.lights[k].name
     light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
@@ -68,6 +67,13 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
     )
+
+
+def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:
+    """The light whose error changes the picture most; None where none does."""
+    errors = relative_errors(uncertainty)
+    effect = np.where(np.isfinite(errors), errors, 0) * energy_shares(basis, solution.lighting)
+    return int(np.argmax(effect)) if effect.any() else None
 
 
 def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:

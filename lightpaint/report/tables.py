@@ -10,11 +10,11 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, listed, row
 from lightpaint.report.verdict import (
+    brighter_as_allowed,
     codes_missed,
     linear_residual,
     relative_residual,
@@ -115,17 +115,10 @@ def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
                 f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
             ),
         ]
-    loss = solution.problem.loss
-    if isinstance(loss, PaintingLoss) and loss.at_least[solution.importance > 0].any():
-        its = loss.at_least & (solution.importance > 0)[..., None]
-        brighter = its & (predicted.image > loss.painted)
-        told.append(
-            (
-                "Painted as at least so bright",
-                f"{its.any(axis=-1).sum()} pixels, {brighter.any(axis=-1).sum()} of which are "
-                "brighter now",
-            )
-        )
+    if (at_least := brighter_as_allowed(solution, predicted.image)) is not None:
+        pixels, brighter = at_least
+        text = f"{pixels} pixels, {brighter} of which are brighter now"
+        told.append(("Painted as at least so bright", text))
     return [*told, ("Linear problems solved", f"{q.rounds}, each certified")]
 
 

@@ -35,6 +35,7 @@ RESULTS = {
     "predicted.exr",
     "verified.exr",
     "comparison.png",
+    "report.json",
     "report.html",
 }
 
