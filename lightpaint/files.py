@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -212,10 +213,20 @@ def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
     return text if len(text) <= limit else f"{text[:limit]} …"
 
 
-def first_line(said: str | BaseException) -> str:
-    """Of what a library says, or else that it says nothing."""
+def first_line(said: str | BaseException, *, of: str | Path | None = None) -> str:
+    """Of what a library says, or else that it says nothing.
+
+    of: the file that it is about, which the error names already.
+    """
     silent = "no reason given" if isinstance(said, str) else type(said).__name__
-    return next(iter(str(said).strip().splitlines()), silent)
+    line = next(iter(str(said).strip().splitlines()), silent)
+    return line if of is None else unnamed(line, of)
+
+
+def unnamed(said: str, path: str | Path) -> str:
+    """`said` with `it` for the path of a file, in quotes or not, wherever that stands whole."""
+    named = rf"""(?<![\w./\\-])(["']?){re.escape(str(path))}\1(?![\w/\\-])"""
+    return re.sub(named, "it", said)
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.notebook import look_html
+from lightpaint.report.numbers import report_numbers
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
@@ -35,10 +36,10 @@ from lightpaint.target.target import Target
 VIEW_KEY = "lightpaint.view"
 
 #: What every solve writes.
-ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html")
+ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
 
 #: What each view has where there are several.
-VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html")
+VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html", "report.json")
 
 #: What a solve and a relight write, and the next solve replaces.
 RESULTS = (
@@ -47,6 +48,7 @@ RESULTS = (
     "verified.exr",
     "comparison.png",
     "report.html",
+    "report.json",
     "relit.xml",
     "relit.png",
     "relit.exr",
@@ -152,7 +154,7 @@ def write_predicted(path: Path, predicted: Estimate, *, origin: Origin, spp: int
 
 
 def write_report(folder: Path, look: Look, *, command: str) -> None:
-    """Write the pictures people look at: comparison.png and report.html."""
+    """Write what people look at, comparison.png and report.html, and its numbers, report.json."""
     verified = look.verification.verified.image if look.verification else None
     sheet = comparison_image(
         basis=look.basis,
@@ -162,19 +164,20 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         verified=verified,
     )
     write_bytes(folder / "comparison.png", png_bytes(sheet))
-    page = report_page(
-        basis=look.basis,
-        target=look.target,
-        solution=look.solution,
-        predicted=look.predicted,
-        verification=look.verification,
-        command=command,
-        uncertainty=look.uncertainty,
-        diagnosis=look.diagnosis,
-        unconstrained=look.analysis.unconstrained,
-        suggestions=look.suggestions,
-    )
-    write_text(folder / "report.html", page)
+    for name, written in (("report.json", report_numbers), ("report.html", report_page)):
+        text = written(
+            basis=look.basis,
+            target=look.target,
+            solution=look.solution,
+            predicted=look.predicted,
+            verification=look.verification,
+            command=command,
+            uncertainty=look.uncertainty,
+            diagnosis=look.diagnosis,
+            unconstrained=look.analysis.unconstrained,
+            suggestions=look.suggestions,
+        )
+        write_text(folder / name, text)
 
 
 def verify_result(

@@ -15,7 +15,7 @@ from typing import Any
 
 from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
-from lightpaint.files import one_line
+from lightpaint.files import one_line, unnamed
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.xml import check_nodes, check_xml
 from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
@@ -249,13 +249,22 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
             f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
         ) from None
     except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
-        text = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", str(error))
-        if "str_from_cstr" in text:  # the binding's word for it
-            text = "it, or a file that it refers to, has a name that is not UTF-8"
-        text = one_line(text, limit=MAX_SAID)
+        text = one_line(_without_places(str(error), path), limit=MAX_SAID)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
         hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
         if "integrator plugin" in text:
             hint = f"; that is the integrator that was asked for, {instead}"
             hint = hint if instead else '; integrator="path" renders it with another'
         raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error
+
+
+def _without_places(said: str, path: Path) -> str:
+    """Mitsuba's words without places in its source, and without the file where that is `path`."""
+    if "str_from_cstr" in said:  # the binding's word for it
+        return "it, or a file that it refers to, has a name that is not UTF-8"
+    said = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", said)
+    file = re.escape(str(path))
+    said = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", said)
+    said = re.sub(rf'Error while loading XML file "{file}": ', "", said)
+    said = re.sub(rf'Parsing of XML file "{file}" failed', "it is no XML", said)
+    return unnamed(said, path)

@@ -1,6 +1,7 @@
 """Something to paint on: the current look, what helps to select in it, and what it was made of."""
 
 import json
+import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
@@ -156,9 +157,10 @@ def read_template(folder: Path) -> Template:
         if (folder / ALBEDO).exists():
             albedo = _read_picture(folder / ALBEDO, about.size)
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
-        said = one_line(str(error) or type(error).__name__)
+        # Its files are named as they are called in it.
+        said = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
         raise TargetError(
-            f"{folder} is no template: {said}; make one with lightpaint template"
+            f"{folder} is no template: {one_line(said)}; make one with lightpaint template"
         ) from None
     return Template(image, transform, about.scene, about.content, about.sensor, albedo)
 

@@ -36,6 +36,7 @@ RESULTS = {
     "predicted.exr",
     "verified.exr",
     "comparison.png",
+    "report.json",
     "report.html",
 }
 
@@ -239,7 +240,7 @@ def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
     done = run(tmp_path, *command, "-o", "out")
     assert done.returncode == 0, done.stderr
     # 12 x 12 of 32 x 32 pixels.
-    assert "warmer: 14.1 % painted: what differs from the template in template" in done.stderr
+    assert "warmer: 14.1 % painted: what differs from template/template.png" in done.stderr
     assert "nothing in" in refused(tmp_path, *command[:2], "template/template.png", *command[3:])
     about = folder / "template.json"
     other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
