@@ -10,7 +10,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
+
+#: What asks a process to end: Ctrl-C; `kill`, docker stop, Slurm, timeout; a closing terminal.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Progress(Protocol):
@@ -78,30 +81,28 @@ def labelled(listen: Listener, name: str) -> Listener:
 
 @contextmanager
 def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C back, and yield a function that lets it through where it does no harm.
+    """Hold Ctrl-C and the like back, and yield a function that lets them through.
 
     An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded
-    loops behind; between two passes it is clean. An interrupt that is ignored, or that a
-    program around this one handles outside Python, is left alone.
+    loops behind; between two passes it is clean. A signal that is ignored, that ends the process
+    at once, or that a program around this one handles outside Python, is left alone.
     """
     # Signals arrive in the main thread; None stands for a handler that is not Python's.
     elsewhere = threading.current_thread() is not threading.main_thread()
-    if elsewhere or signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None):
-        yield lambda: None
-        return
-    pending = False
-
-    def remember(_signal: int, _frame: Any) -> None:
-        nonlocal pending
-        pending = True
+    found = {number: signal.getsignal(number) for number in (() if elsewhere else ENDING)}
+    handlers = {number: its for number, its in found.items() if callable(its)}
+    pending: list[int] = []
 
     def let_through() -> None:
-        if pending:
-            raise KeyboardInterrupt
+        while pending:
+            number = pending.pop(0)
+            handlers[signal.Signals(number)](number, None)
 
-    before = signal.signal(signal.SIGINT, remember)
+    for number in handlers:
+        signal.signal(number, lambda number, _frame: pending.append(number))
     try:
         yield let_through
         let_through()
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

@@ -16,6 +16,7 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.read import is_light_groups
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
+from lightpaint.files import check_files
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -125,10 +126,14 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
     # One scene, which is loaded once for all.
     source = () if basis is not None else (scene_of(options),)
     folders = folders_of(options.output and Path(options.output), [Path(p).stem for p in paths])
-    return [
+    jobs = [
         Job(source, (painting,), folder, basis, asked, settings)
         for painting, folder in zip(paintings, folders, strict=True)
     ]
+    if options.lights_file:
+        for job in jobs:  # where there is no scene to have read it
+            check_files(job.results.files, [Path(options.lights_file)])
+    return jobs
 
 
 def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
@@ -222,8 +227,11 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
             raise OutputError(f"{name!r} is no name for a folder: choose one with -o")
     if len(names) == 1:
         return [output or Path(names[0])]
-    if len(set(names)) < len(names):
-        raise OutputError(f"results would overwrite each other: {', '.join(names)}")
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise OutputError(
+            f"results of several would go to one folder, {', '.join(twice)}: give each a command "
+            "of its own, with -o"
+        )
     return [(output or Path()) / name for name in names]
 
 

@@ -5,6 +5,8 @@ import re
 #: Arguments of the library that errors and remarks name, and their options.
 OPTIONS = {
     "cd_per_unit": "--unit",
+    "folder": "-o",
+    "force": "--force",
     "groups": "--group",
     "layer": "--layer",
     "lights": "--lights",

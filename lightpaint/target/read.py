@@ -13,7 +13,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.target.painted import painted_where
 from lightpaint.target.target import Target
-from lightpaint.target.template import Template, find_template, read_template
+from lightpaint.target.template import Template, find_template, read_template, template_files
 
 #: What a brush puts down: how the picture is to look, or the light that is to fall there.
 Paint = Literal["look", "light"]
@@ -99,6 +99,11 @@ def read_target(
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
         transform=reading.transform,
+        files=(
+            reading.path,
+            *([] if mask is None else [Path(mask)]),
+            *([] if reading.folder is None else template_files(reading.folder)),
+        ),
     )
 
 

@@ -81,6 +81,11 @@ class LightGroups:
         return len(self.basis.lights) > len(self.layers)
 
     @property
+    def files(self) -> list[Path]:
+        """That they were read from."""
+        return _files(self.path) if self.path.is_dir() else [self.path]
+
+    @property
     def is_half(self) -> bool:
         """Whether the file holds no more than float16."""
         return all(layer.is_half for layer in self.layers)
