@@ -5,6 +5,7 @@ import os
 import signal
 import stat
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -29,16 +30,18 @@ def fill(folder: Path, contents: dict[str, str]) -> None:
 
 
 def read(folder: Path) -> dict[str, str]:
+    """What a person sees in it."""
     return {
-        file.relative_to(folder).as_posix(): file.read_text(encoding="utf-8")
+        name: file.read_text(encoding="utf-8")
         for file in folder.rglob("*")
-        if file.is_file()
+        if file.is_file() and not (name := file.relative_to(folder).as_posix()).startswith(".")
     }
 
 
 def hidden(folder: Path) -> list[str]:
-    """Hidden folders for `folder`, beside it and in it."""
-    return [p.name for p in (*folder.parent.iterdir(), *folder.glob("*")) if MARK in p.name]
+    """What is left of staging, beside `folder` and in it."""
+    there = (*folder.parent.iterdir(), *folder.iterdir())
+    return [path.name for path in there if MARK in path.name or path.name == JOURNAL]
 
 
 def replace(folder: Path) -> None:
@@ -66,11 +69,11 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     return str(request.param)
 
 
-@pytest.mark.usefixtures("way")
-def test_new_files_take_the_place_of_earlier_ones_and_others_stay(look: Path) -> None:
+def test_new_files_take_the_place_of_earlier_ones_and_others_stay(look: Path, way: str) -> None:
     look.chmod(0o751)
-    mine = (look / "notes.txt").stat().st_ino
+    mine, before = (look / "notes.txt").stat().st_ino, look.stat().st_ino
     replace(look)
+    assert (look.stat().st_ino != before) == (way == "exchanged")
     assert read(look) == LATER | OTHERS
     assert (look / "notes.txt").stat().st_ino == mine
     assert os.readlink(look / "link") == "nowhere"
@@ -83,10 +86,14 @@ def test_new_files_take_the_place_of_earlier_ones_and_others_stay(look: Path) ->
 @pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("trouble", [OutputError("full"), KeyboardInterrupt(), ValueError()])
 def test_trouble_leaves_all_as_it_was(look: Path, trouble: BaseException) -> None:
-    with pytest.raises(type(trouble)), staged(look, [look / "a"]) as stage:
-        fill(stage, LATER)
-        assert read(look) == EARLIER | OTHERS
-        raise trouble
+    def work() -> None:
+        with staged(look, [look / "a"]) as stage:
+            fill(stage, LATER)
+            assert read(look) == EARLIER | OTHERS
+            raise trouble
+
+    with pytest.raises(type(trouble)):
+        work()
     assert read(look) == EARLIER | OTHERS
     assert hidden(look) == []
 
@@ -103,9 +110,7 @@ def test_a_folder_that_is_not_there_appears_whole_or_not_at_all(tmp_path: Path) 
     assert hidden(folder) == []
 
 
-def test_whoever_works_in_a_folder_stays_in_it(
-    look: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_whoever_works_in_a_folder_stays_in_it(look: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(look / "deep")
     before = look.stat().st_ino
     replace(look)
@@ -156,28 +161,32 @@ def test_where_names_cannot_be_exchanged_files_are_moved(
     assert hidden(look) == []
 
 
-#: Where a process may be killed: before and behind each of these.
+#: Where a process may be killed: before each of these.
 STEPS = (
     (os, ("mkdir", "rename", "replace", "link", "unlink", "rmdir", "open", "fsync", "chmod")),
     (staging, ("exchange",)),
 )
 
 
+def fork() -> int:
+    with warnings.catch_warnings():
+        # Threads of other tests may wait in this process; the child asks nothing of them.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return os.fork()
+
+
 def killed_at(step: int, work: Callable[[], None]) -> bool:
     """Do `work` in a process that is killed at its step number `step`; whether it came so far."""
-    if (child := os.fork()) == 0:
+    if (child := fork()) == 0:
         count = 0
 
         def counted(do: Callable[..., object]) -> Callable[..., object]:
             def counting(*args: object, **how: object) -> object:
                 nonlocal count
-                for wait in (True, False):
-                    count += 1
-                    if count > step:
-                        os.kill(os.getpid(), signal.SIGKILL)
-                    if wait:
-                        made = do(*args, **how)
-                return made
+                count += 1
+                if count > step:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return do(*args, **how)
 
             return counting
 
@@ -212,7 +221,7 @@ def test_killed_at_any_step_it_is_the_one_or_the_other(tmp_path: Path, way: str)
     found = []
     for step in _steps(replace, tmp_path):
         look = tmp_path / str(step)
-        seen = {k: v for k, v in read(look).items() if MARK not in k and k != JOURNAL}
+        seen = read(look)
         if way == "exchanged":
             assert seen in whole, step
         finish(look)
@@ -220,12 +229,10 @@ def test_killed_at_any_step_it_is_the_one_or_the_other(tmp_path: Path, way: str)
         if way == "exchanged":
             assert read(look) == seen
         assert hidden(look) == [], step
-        replace(look)
-        assert read(look) == LATER | OTHERS
     # First all earlier, later all new, and no way back.
     assert found == sorted(found)
     assert {0, 1} == set(found)
-    assert len(found) > 50
+    assert len(found) > 25
 
 
 def test_killed_while_it_finishes_what_was_killed(tmp_path: Path) -> None:
@@ -240,7 +247,7 @@ def test_killed_while_it_finishes_what_was_killed(tmp_path: Path) -> None:
     for step in range(200):
         look = tmp_path / str(step)
         fill(look, EARLIER | OTHERS)
-        if (child := os.fork()) == 0:
+        if (child := fork()) == 0:
             cut_short(look)
         os.waitpid(child, 0)
         assert read(look) == EARLIER | OTHERS
@@ -296,7 +303,6 @@ def test_a_journal_from_elsewhere_reaches_nothing_outside(look: Path, journal: s
     fill(look, {JOURNAL: journal})
     finish(look)
     assert (look.parent / "stolen").read_text(encoding="utf-8") == "mine"
-    (look / JOURNAL).unlink(missing_ok=True)
     assert read(look) == EARLIER | OTHERS
     assert not stage.exists()
 
