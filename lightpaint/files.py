@@ -157,12 +157,15 @@ def check_files(files: Iterable[Path], reads: Iterable[Path]) -> None:
 
 def check_name(path: Path) -> None:
     """Raise OutputError for a name that is not UTF-8, which not all that writes can write to."""
-    try:
-        str(path).encode()
-    except UnicodeEncodeError:
+    if not is_utf_8(path):
         raise OutputError(
             f"{one_line(str(path))} is not a name in UTF-8: choose another (folder=...)"
-        ) from None
+        )
+
+
+def is_utf_8(path: Path) -> bool:
+    """Whether its name is; bytes that are not stand in Python's text as halves of pairs."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path))
 
 
 def _inode(path: Path) -> tuple[int, int]:

@@ -5,15 +5,9 @@ listen; which of them listens is the caller's choice. Who listens to the corrido
 remarks, too.
 """
 
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
-
-#: What asks a process to end: Ctrl-C; `kill`, docker stop, Slurm, timeout; a closing terminal.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Progress(Protocol):
@@ -77,32 +71,3 @@ def labelled(listen: Listener, name: str) -> Listener:
         listen(f"{label} of {name}", done, total, unit)
 
     return _Split(report, listen.say)
-
-
-@contextmanager
-def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C and the like back, and yield a function that lets them through.
-
-    An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded
-    loops behind; between two passes it is clean. A signal that is ignored, that ends the process
-    at once, or that a program around this one handles outside Python, is left alone.
-    """
-    # Signals arrive in the main thread; None stands for a handler that is not Python's.
-    elsewhere = threading.current_thread() is not threading.main_thread()
-    found = {number: signal.getsignal(number) for number in (() if elsewhere else ENDING)}
-    handlers = {number: its for number, its in found.items() if callable(its)}
-    pending: list[int] = []
-
-    def let_through() -> None:
-        while pending:
-            number = pending.pop(0)
-            handlers[signal.Signals(number)](number, None)
-
-    for number in handlers:
-        signal.signal(number, lambda number, _frame: pending.append(number))
-    try:
-        yield let_through
-        let_through()
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import MAX_TEXT, read_text, write_text
-from lightpaint.progress import interruptible_between_pieces
 from lightpaint.records import read_record, strict_json
+from lightpaint.signals import interruptible_between_pieces
 from lightpaint.system import exchange, is_mounted, is_somebody_in
 
 #: In the names of hidden folders, `.evening.lightpaint-1a2b3c4d` beside `evening`.

@@ -13,12 +13,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code."""
     came: list[int] = []
     try:
-        # What takes time to import is imported where an interrupt is heard.
-        from lightpaint.cli.signals import hearing
+        # What takes time to import is imported where an interrupt is heard, and waits.
+        from lightpaint.signals import hearing, interruptible_between_pieces
 
         with hearing(came):
-            from lightpaint.cli.command import run_command
-
+            with interruptible_between_pieces():
+                from lightpaint.cli.command import run_command
             code = run_command(arguments, came)
     except KeyboardInterrupt:
         import sys

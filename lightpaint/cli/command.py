@@ -26,10 +26,14 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
     options = parser.parse_args(given)
     how_to_go_on = ""
     try:
-        # What a command needs is imported when it runs: --help answers at once.
-        from lightpaint.cli import commands
-        from lightpaint.cli.options import values_of
-        from lightpaint.scene.variant import SlowBackendWarning
+        # What a command needs is imported when it runs: --help answers at once. An interrupt in
+        # the middle of it would leave libraries half there, which some do not survive.
+        from lightpaint.signals import interruptible_between_pieces
+
+        with interruptible_between_pieces():
+            from lightpaint.cli import commands
+            from lightpaint.cli.options import values_of
+            from lightpaint.scene.variant import SlowBackendWarning
 
         # The commands say it in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)

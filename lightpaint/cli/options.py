@@ -229,8 +229,8 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
         return [output or Path(names[0])]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise OutputError(
-            f"results of several would go to one folder, {', '.join(twice)}: give each a command "
-            "of its own, with -o"
+            f"results would overwrite each other in {', '.join(twice)}: give those of one name "
+            "a command each, with another -o"
         )
     return [(output or Path()) / name for name in names]
 

@@ -8,11 +8,12 @@ from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.basis.render.budget import Budget, Keeper, passes
 from lightpaint.basis.render.separate import LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
+from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.emission import ENVIRONMENTS
 from lightpaint.scene.render import SAMPLES_PER_PASS, view_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
+from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples that choices of emitters are learned from before any counts.
 REHEARSAL = 2**18

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lightpaint.progress import interruptible_between_pieces
+from lightpaint.signals import interruptible_between_pieces
 
 
 @pytest.fixture(autouse=True)
