@@ -184,7 +184,10 @@ def when_staged(stage: Stage) -> None:
     end_s = time.monotonic() + 60
     while time.monotonic() < end_s:
         staged = [path / "result.json" for path in stage.hidden]
-        if any(path.exists() for path in staged) or stage.what_is_there() != "earlier":
+        try:
+            if any(path.exists() for path in staged) or stage.what_is_there() != "earlier":
+                return
+        except FileNotFoundError:  # it appears at this moment
             return
 
 
