@@ -3,7 +3,6 @@
 import errno
 import os
 import re
-import shutil
 import stat
 import tempfile
 import threading
@@ -15,9 +14,6 @@ from typing import Any, BinaryIO, TypeVar, cast
 
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.screen import visible
-
-#: What the name of a folder begins with in which earlier results wait.
-ASIDE = ".earlier."
 
 #: Longest text that is read whole, in bytes; and how much of it at a time.
 MAX_TEXT, PIECE = 2**26, 2**22
@@ -229,56 +225,57 @@ def unnamed(said: str, path: str | Path) -> str:
     return re.sub(named, "it", said)
 
 
-@contextmanager
-def restoring(folder: Path, files: Iterable[Path]) -> Iterator[None]:
-    """Move `files`, all below `folder`, out of the way of those that the block writes.
-
-    If it raises or is interrupted, they are put back, and what it has made of them is deleted.
-    Moving takes no space, so that they survive a full disk.
-    """
-    files = list(dict.fromkeys(file.relative_to(folder) for file in files))
-    there = [file for file in files if (folder / file).is_file()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=ASIDE, dir=folder))
-    except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
-    try:
-        _move(there, folder, aside)
-        yield
-    except BaseException:
-        moved = [file for file in there if (aside / file).is_file()]
-        for file in files:
-            if file in moved or file not in there:
-                (folder / file).unlink(missing_ok=True)
-        _move(moved, aside, folder)
-        shutil.rmtree(aside, ignore_errors=True)
-        with suppress(OSError):
-            folder.rmdir()  # if nothing was in it before
-        raise
-    # With what a killed process could not put back: this result takes its place as well.
-    for old in folder.glob(f"{ASIDE}*"):
-        shutil.rmtree(old, ignore_errors=True)
-
-
-def _move(files: Iterable[Path], source: Path, target: Path) -> None:
-    try:
-        for file in files:
-            (target / file).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(source / file, target / file)
-    except OSError as error:
-        reason = error.strerror or error
-        raise OutputError(f"cannot move {source / file} to {target}: {reason}") from error
-
-
 def check_writable(folder: Path) -> None:
     """Raise OutputError unless files can be made in `folder`, or it and files in it.
 
     Called before long work, so that an hour of rendering never ends at a closed door.
     """
+    check_name(folder)
     try:
+        if ".." in folder.parts:  # through something that is not there it leads nowhere
+            last = len(folder.parts) - folder.parts[::-1].index("..")
+            Path(*folder.parts[:last]).stat()
         there = next(f for f in (folder, *folder.absolute().parents) if f.exists())
         with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
         raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+
+
+def check_files(files: Iterable[Path], reads: Iterable[Path]) -> None:
+    """Raise OutputError unless `files` can be written, and none of them is one of `reads`.
+
+    Whatever a command reads it never writes over, by whatever name or link it is known.
+    """
+    known: dict[tuple[int, int], Path] = {}
+    for path in reads:
+        with suppress(OSError):
+            known[_inode(path)] = path
+    for file in files:
+        check_name(file)
+        if file.is_dir():
+            raise OutputError(f"{file} is a folder, where a file is to be written: move it away")
+        with suppress(OSError):
+            if _inode(file) in known:
+                raise OutputError(
+                    f"{file} is read by this command, and would be written over: write to another "
+                    "place (folder=...)"
+                )
+
+
+def check_name(path: Path) -> None:
+    """Raise OutputError for a name that is not UTF-8, which not all that writes can write to."""
+    if not is_utf_8(path):
+        raise OutputError(
+            f"{one_line(str(path))} is not a name in UTF-8: choose another (folder=...)"
+        )
+
+
+def is_utf_8(path: Path) -> bool:
+    """Whether its name is; bytes that are not stand in Python's text as halves of pairs."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path))
+
+
+def _inode(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_dev, status.st_ino

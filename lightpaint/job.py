@@ -30,7 +30,8 @@ from lightpaint.remarks import (
     remarks_of_scene,
     remarks_of_target,
 )
-from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
+from lightpaint.result_folder import ResultFolder
+from lightpaint.results import ALWAYS, VIEW_RESULTS, view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
@@ -84,6 +85,7 @@ class Job:
         asked: Found at birth: all constraints, those of the lights file first.
         display: Found at birth: the view transform to come closest in; None for linear light.
         remarks: Found at birth: what is worth saying to a person, in plain text.
+        results: Found at birth: the folder, and what may be replaced there.
 
     Raises:
         LightpaintError: For what cannot be.
@@ -107,7 +109,7 @@ class Job:
     asked: Constraints = field(init=False, repr=False)
     display: ViewTransform | None = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
-    _relit: tuple[Path, ...] = field(init=False, repr=False)
+    results: ResultFolder = field(init=False, repr=False)
 
     __repr__ = shortly
 
@@ -137,12 +139,11 @@ class Job:
             PaintedView(*self._on_one_film(scene, target, basis), folder, basis)
             for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
         )
-        for folder in (self.folder, *folders):
-            check_writable(folder)
-        relit = check_relightable(scenes[0], self.folder / "relit.xml") if scenes else []
+        results = self._result_folder(views, scenes, targets)
+        results.check()
         # The only place that sets what was found; frozen afterwards.
         born = vars(self)
-        born.update(views=views, asked=asked, display=self._display(views), _relit=tuple(relit))
+        born.update(views=views, asked=asked, display=self._display(views), results=results)
         born.update(remarks=tuple(self._remarks(targets)))
 
     @property
@@ -150,18 +151,6 @@ class Job:
         """The light groups it is solved from, if it is from such."""
         found = content(self.basis)
         return found if isinstance(found, LightGroups) else None
-
-    @property
-    def files(self) -> list[Path]:
-        """What is about to be replaced, in `folder` and in those of the views."""
-        files = [*earlier_results(self.folder), self.folder / "lighting.json", *self._relit]
-        for view in self.views:
-            if view.folder != self.folder:
-                files += [file for pattern in RESULTS for file in view.folder.glob(pattern)]
-            names = VIEW_RESULTS if self.scenes else ALWAYS
-            files += [view.folder / name for name in names]
-            files += [view.folder / name for name in EXPORTS if self.groups is not None]
-        return files
 
     def to_json(self) -> str:
         """This job as text, to be run elsewhere; paths stay as they were given.
@@ -245,6 +234,32 @@ class Job:
                     f"the painting {target.path} is among the lights of {self.groups.path}: pass "
                     "it to read_light_groups in leave_out, or move it elsewhere"
                 )
+
+    def _result_folder(
+        self, views: Sequence[PaintedView], scenes: Sequence[Scene], targets: Sequence[Target]
+    ) -> ResultFolder:
+        """Where results go, with all that is read for them. targets: as they were read."""
+        files = [self.folder / "lighting.json"]
+        if scenes:
+            files += check_relightable(scenes[0], self.folder / "relit.xml")
+        for view in views:
+            check_writable(view.folder)
+            files += [view.folder / name for name in (VIEW_RESULTS if scenes else ALWAYS)]
+        if self.groups is not None:
+            files += [self.folder / name for name in EXPORTS]
+        reads = [file for target in targets for file in target.files]
+        reads += [file for scene in scenes for file in scene.read_files]
+        if isinstance(self.basis, BasisFile | GroupsFile):
+            reads.append(Path(self.basis.path))
+        if self.groups is not None:
+            reads += self.groups.files
+        return ResultFolder(
+            self.folder,
+            tuple(dict.fromkeys(files)),
+            tuple(dict.fromkeys(reads)),
+            tuple(target.files[0] if target.files else target.name for target in targets),
+            force=self.settings.force,
+        )
 
     def _on_one_film(
         self, scene: Scene | None, target: Target, basis: Basis | None

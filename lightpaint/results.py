@@ -30,6 +30,7 @@ from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
+from lightpaint.staging import finish
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
@@ -114,15 +115,9 @@ class Look:
         return self.solution.lighting
 
 
-def earlier_results(folder: Path) -> list[Path]:
-    """What an earlier solve left in `folder`: results of two never stand together."""
-    if not (folder / "lighting.json").is_file():
-        return []  # somebody else's files, whatever they are called
-    return [file for pattern in RESULTS for file in folder.glob(pattern)]
-
-
 def result_folders(folder: Path) -> list[Path]:
     """`folder` itself, or where it holds several views the folders of these."""
+    finish(folder)
     if (folder / "predicted.exr").is_file() or not (folder / "relit.xml").is_file():
         return [folder]
     return sorted(file.parent for file in folder.glob("*/predicted.exr")) or [folder]
@@ -193,6 +188,8 @@ def verify_result(
     Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
     """
     folder = Path(folder)
+    for one in (folder, folder.parent):
+        finish(one)
     relit_xml = folder / "relit.xml"
     if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
         relit_xml = folder.parent / "relit.xml"  # one of several views

@@ -43,6 +43,7 @@ class Settings(Fit):
         suggest: How many point lights that would help most are looked for at most; needs a scene,
             and one view only.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
+        force: Whether results of something else, or changed by hand, are replaced.
         command: The shell command that asks for this, for the report.
 
     Raises:
@@ -70,6 +71,7 @@ class Settings(Fit):
     refine: int = 0
     suggest: int = 0
     cd_per_unit: float | None = None
+    force: bool = False
     command: str = ""
 
     expected: ClassVar[Mapping[str, Check]] = {
@@ -88,6 +90,7 @@ class Settings(Fit):
         "refine": whole(0, MAX_REFINE),
         "suggest": whole(0),
         "cd_per_unit": number("cd/m²"),
+        "force": SWITCH,
         "command": a(str, "the text of a shell command"),
     }
 

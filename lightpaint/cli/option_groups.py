@@ -185,3 +185,12 @@ def add_unit(parser: argparse.ArgumentParser) -> None:
 def add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
     """Where results go."""
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """What may be given up."""
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="replace results of something else, or that were changed by hand (default: refuse)",
+    )

@@ -7,6 +7,8 @@ OPTIONS = {
     "cd_per_unit": "--unit",
     "emitters": "--emitters",
     "exact_spp": "--exact-spp",
+    "folder": "-o",
+    "force": "--force",
     "groups": "--group",
     "integrator": "--integrator",
     "layer": "--layer",

@@ -176,6 +176,19 @@ class ParsedScene:
             other.names[k] = name
         return other
 
+    def moved(self, old: Path, new: Path) -> "ParsedScene":
+        """This scene, all of whose files in the folder `old` are about to be moved to `new`."""
+        import mitsuba as mi
+
+        other = copy(self)
+        other.path = new / self.path.relative_to(old)
+        other.files = tuple(moved(file, old, new) for file in self.files)
+        other.resolver = mi.FileResolver(self.resolver)
+        other.resolver.clear()
+        for k in range(len(self.resolver)):
+            other.resolver.append(str(moved(Path(str(self.resolver[k])), old, new)))
+        return other
+
     def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
         """(file, whether its values are linear as they stand) of the image that emitter emits."""
         texture = child_named(self.state, node, parameter)
@@ -232,6 +245,17 @@ class ParsedScene:
             yield
         finally:
             mi.set_file_resolver(before)
+
+
+def moved(path: Path, old: Path, new: Path) -> Path:
+    """Where `path` leads when the folder `old` has been moved to `new`, by a way that lasts."""
+    if ".." not in path.parts and path.is_relative_to(old):
+        return new / path.relative_to(old)
+    real, gone = Path(os.path.realpath(path)), Path(os.path.realpath(old))
+    if real.is_relative_to(gone):
+        return Path(os.path.realpath(new)) / real.relative_to(gone)
+    # The way there may lead through the old folder.
+    return real if gone.name in path.parts else path
 
 
 @contextmanager

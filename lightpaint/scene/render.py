@@ -11,8 +11,9 @@ from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.estimate import Estimate
-from lightpaint.progress import Progress, interruptible_between_pieces, silent
+from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
 #: memory is taken for, so passes are short.

@@ -188,6 +188,16 @@ class Scene(Shown):
         """All files the scene consists of: XML, meshes, textures, tables."""
         return (*self.files, *self._parsed.assets())
 
+    @property
+    def read_files(self) -> tuple[Path, ...]:
+        """`originals`, and the lights file."""
+        return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
+
+    def moved(self, old: Path, new: Path) -> "Scene":
+        """This scene, when the folder `old`, in which its XML lies, has been moved to `new`."""
+        parsed = self._parsed.moved(old, new)
+        return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
+
     def load(self, emission: Mapping[str, RGB] | None = None) -> Any:
         """The `mi.Scene`, its lights set to `emission` (those not named stay as they are).
 

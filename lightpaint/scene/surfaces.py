@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.images.blocks import block_pixels
-from lightpaint.progress import Progress, interruptible_between_pieces, silent
+from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 #: Samples of a pixel, each by itself: an index of a shape must not be averaged.
 SAMPLES = 16

@@ -14,7 +14,14 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target
-from lightpaint.target.template import LIGHT, SHOWN, Template, find_template, read_template
+from lightpaint.target.template import (
+    LIGHT,
+    SHOWN,
+    Template,
+    find_template,
+    read_template,
+    template_files,
+)
 from lightpaint.target.whole import what_became_of
 
 #: What a brush puts down: how the picture is to look, or the light that is to fall there.
@@ -107,6 +114,11 @@ def read_target(
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
         transform=reading.transform,
+        files=(
+            reading.path,
+            *([] if mask is None else [Path(mask)]),
+            *([] if reading.folder is None else template_files(reading.folder)),
+        ),
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,7 @@ class Target(Shown):
         content: Of the scene that it was painted on, where a template says.
         sensor: Id of the sensor it was painted through, where a template says.
         transform: What a display showed it through when it was painted; None if nobody knows.
+        files: That it was read from: the painting first, then mask and template.
 
     Examples:
         >>> image = np.full((16, 16, 3), 0.5)
@@ -52,6 +54,7 @@ class Target(Shown):
     content: str = ""
     sensor: str = ""
     transform: ViewTransform | None = None
+    files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):

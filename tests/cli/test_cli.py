@@ -38,6 +38,7 @@ RESULTS = {
     "comparison.png",
     "report.json",
     "report.html",
+    "result.json",
 }
 
 
@@ -80,7 +81,7 @@ def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: 
     succeed(tmp_path, "relight", CORNELL, *copies, "-o", "looks", "--spp", 4)
     for name in ("one", "two"):
         made = {p.name for p in (tmp_path / "looks" / name).iterdir()}
-        assert made == {"relit.xml", "relit.exr", "relit.png"}
+        assert made == {"relit.xml", "relit.exr", "relit.png", "result.json"}
 
 
 def test_verify_tells_a_tampered_scene(solved: tuple[Path, str], tmp_path: Path) -> None:
@@ -266,7 +267,7 @@ def test_results_of_two_solves_never_stand_together(
     folder = tmp_path / "look"
     shutil.copytree(solved[0], folder)
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
-    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder)
+    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder, "--force")
     left = {p.name for p in folder.iterdir()}
     assert left == (RESULTS - {"relit.xml", "verified.exr"}) | {"notes.txt"}
     # A folder that no solve has written to is not tidied.

@@ -14,9 +14,10 @@ from lightpaint.basis.render.separate import (
     render_separately,
 )
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
+from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples that choices of emitters are learned from before any counts.
 REHEARSAL = 2**18
