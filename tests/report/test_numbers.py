@@ -133,7 +133,7 @@ def test_every_number_of_the_page_stands_in_a_file(
     make_basis: Any, tmp_path: Path, asked: Any
 ) -> None:
     look = _look(make_basis, **asked)
-    write_report(look, tmp_path, command="lightpaint solve")
+    write_report(tmp_path, look, command="lightpaint solve")
     write_lighting(tmp_path / "lighting.json", look.lighting)
     files = [json.loads((tmp_path / f"{name}.json").read_text()) for name in ("report", "lighting")]
     fit, solved = files[0]["fit"], files[1]["solve"]
@@ -174,7 +174,7 @@ def test_writing_neither_solves_nor_sums_anew(
     count(basis_module, "mix")
     count(Basis.__dict__["totals"], "func")
     # One that has kept nothing yet.
-    write_report(replace(look, basis=replace(look.basis)), tmp_path, command="")
+    write_report(tmp_path, replace(look, basis=replace(look.basis)), command="")
     # Of all lights: the present look, and what is shown of other answers.
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     others = len(re.findall(r"<strong>(Without constraints|As asked|With \d)", page))

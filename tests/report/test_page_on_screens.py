@@ -67,10 +67,11 @@ def _page(make_basis: Any, n: int, name: str = "ceiling_lamp_{}", **asked: Any) 
 
 def _errors(solution: Solution) -> Uncertainty:
     """Some of every light, since the true ones of hundreds take long."""
-    scatter, each = 0.1 * solution.weights + 1e-3, np.full(3, 1e-3)
-    return Uncertainty(
-        solution.weights, scatter, scatter, each, each, each, solution.equations.target_norm2
-    )
+    weights, each = solution.weights, np.full(3, 1e-3)
+    scatter = 0.1 * weights + 1e-3
+    interval = (np.maximum(weights - 2 * scatter, 0), weights + 2 * scatter)
+    norm2 = solution.equations.target_norm2
+    return Uncertainty(weights, scatter, scatter, interval, each, each, each, norm2)
 
 
 def _laid_out(folder: Path, page: str) -> dict[int, tuple[int, int]]:
