@@ -22,7 +22,7 @@ from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.diagnosis import maps_limit
 from lightpaint.report.pictures import brighter_than_white, residual_limit, transform_of
-from lightpaint.report.sentences import halving_spp, most_uncertain, relative_errors
+from lightpaint.report.sentences import brightness, halving_spp, most_uncertain, relative_errors
 from lightpaint.report.verdict import (
     brighter_as_allowed,
     codes_missed,
@@ -131,7 +131,9 @@ def _lights(
     shares, before = (energy_shares(basis, its) for its in (lighting, Lighting.present(basis)))
     told: dict[str, dict[str, Any]] = {}
     for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
-        now, new = (float(luminance(np.array(x.emission))) for x in (light, setting))
+        # Of the channels that reach something painted: of the others nothing is told.
+        told_of = np.array(setting.reached) | light.is_fixed
+        now, new = (float(luminance(told_of * np.array(x.emission))) for x in (light, setting))
         told[light.name] = {
             "share": float(shares[k]),
             "share_before": float(before[k]),
@@ -141,10 +143,12 @@ def _lights(
             "stops": math.log2(new / now) if now > 0 and new > 0 else None,
         }
     if uncertainty is not None:
-        errors, ends = relative_errors(uncertainty), [luminance(x) for x in uncertainty.interval]
+        errors, (solved, *ends) = relative_errors(uncertainty), brightness(uncertainty)
         for k, its in enumerate(told.values()):
             its["interval"] = [float(end[k]) for end in ends]
             its["relative_error"] = float(errors[k])
+            if solved[k] > 0:
+                its["relative_interval"] = [float(end[k] / solved[k]) - 1 for end in ends]
     return told
 
 
