@@ -242,7 +242,11 @@ def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     # 12 x 12 of 32 x 32 pixels.
     assert "warmer: 14.1 % painted: what differs from template/template.png" in done.stderr
-    assert "nothing in" in refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    itself = refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    assert "template/template.png is the template itself" in itself
+    Image.open(folder / "template.png").save(folder / "same.png")
+    same = refused(tmp_path, *command[:2], "template/same.png", *command[3:])
+    assert "nothing in template/same.png differs from template/template.png" in same
     about = folder / "template.json"
     other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
     about.write_text(other, encoding="utf-8")

@@ -59,7 +59,6 @@ class Diagnosis:
         unreachable: What no weights of any sign can reach.
         forbidden: What they can and w >= 0 cannot.
         noise: What the basis' own noise adds.
-        painting_noise: What noise of the painting adds, which is a render or a photograph then.
         ignored: Σ max(1 − D, 0)(Ψ − ΣwΦ)², where nobody said it mattered; in no other part.
         missed: What is missed relative to the painting, root mean square, in the space of the fit.
         unreachable_map: (h, w, 3), signed: what is painted and missed for that reason.
@@ -71,6 +70,7 @@ class Diagnosis:
         bounds_left_out: How many more there are, which seem to matter less.
         compromise: What the best lighting for this view alone would not miss; 0 where there is one
             view.
+        painting_noise: What noise of the painting adds, which is a render or a photograph then.
         lighting_total: `total` of all views that the lighting answers, to hold gains against.
 
     Examples:

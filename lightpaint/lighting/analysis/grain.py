@@ -32,9 +32,10 @@ BLOCK, AROUND = 8, 2
 #: lamp of a few pixels, alone on dark ground, is far beyond.
 LARGEST_PEAK = 12.0
 
-#: Most by which taps two pixels apart find more noise than neighbours do. Mitsuba's Gaussian filter
-#: relates neighbours: 2.55 times. What is painted has edges that are wider: 4 times and more.
-MOST_RELATED = 3.4
+#: Most by which taps two pixels apart find more noise than neighbours do, in all of the picture and
+#: in a block. Mitsuba's Gaussian filter relates neighbours: 2.3 to 3.7 times, and 5 in blocks. What
+#: is painted has wider edges: 4.3 times and more.
+MOST_RELATED, MOST_IN_A_BLOCK = 4.0, 6.0
 
 
 def grain(residual: Floats, counted: Bools) -> Doubles:
@@ -48,7 +49,9 @@ def grain(residual: Floats, counted: Bools) -> Doubles:
 def _variance(residual: Floats, counted: Bools) -> Doubles:
     """Of one channel, (h, w)."""
     near, far = (_seen_by_taps(residual, counted, step) for step in (1, 2))
-    return np.where(far <= MOST_RELATED * near, far, near)
+    if far[counted].sum() > MOST_RELATED * near[counted].sum():
+        return near
+    return np.where(far <= MOST_IN_A_BLOCK * near, far, near)
 
 
 def _seen_by_taps(residual: Floats, counted: Bools, step: int) -> Doubles:
