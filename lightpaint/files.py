@@ -78,7 +78,7 @@ def file_length(
     """
     article = "an" if what[0] in "aeiou" else "a"
     try:
-        status = _in_time(Path(path).stat)
+        status, hollow = _in_time(lambda: _looked_at(Path(path), limit))
     except (FileNotFoundError, NotADirectoryError):
         raise error(f"no such {what}: {path}") from None
     except (OSError, ValueError) as reason:  # a name too long, or with a NUL in it
@@ -95,15 +95,18 @@ def file_length(
         )
     if status.st_size == 0 and (_is_made_up(status) or not may_be_empty):
         raise error(f"{path} is empty, or only made up when it is read: expected {article} {what}")
-    try:
-        hollow = _in_time(lambda: _is_hollow(path, status.st_size)) if status.st_size else False
-    except OSError as reason:
-        raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     if hollow:
         raise error(
             f"{path} is {status.st_size} bytes long, and nearly all of it was never written"
         )
     return status.st_size
+
+
+def _looked_at(path: Path, limit: int) -> tuple[os.stat_result, bool]:
+    """What the system says of `path`, and whether a file of at most `limit` is hollow."""
+    status = path.stat()
+    may_be_read = stat.S_ISREG(status.st_mode) and 0 < status.st_size <= limit
+    return status, may_be_read and _is_hollow(path, status.st_size)
 
 
 def _is_made_up(status: os.stat_result) -> bool:
@@ -134,6 +137,11 @@ def _is_hollow(path: Path, size: int) -> bool:
 def _opened(path: Path) -> BinaryIO:
     # Should it have become a pipe meanwhile, nobody waits for who writes to it.
     return open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+
+
+def _first_piece(path: Path) -> tuple[BinaryIO, bytes]:
+    file = _opened(path)
+    return file, file.read(PIECE)
 
 
 def _in_time(work: Callable[[], _Made]) -> _Made:
@@ -173,9 +181,11 @@ def read_bytes(
         return b""  # and is not asked for more, which might never come
     data = bytearray()
     try:
-        with _opened(path) as file:
-            while len(data) <= limit and (piece := _in_time(lambda: file.read(PIECE))):
-                data += piece
+        file, piece = _in_time(lambda: _first_piece(path))
+        with file:
+            data += piece
+            while len(piece) == PIECE and len(data) <= limit:
+                data += (piece := _in_time(lambda: file.read(PIECE)))
     except OSError as reason:
         raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     if len(data) > limit:  # as of what is still being written
