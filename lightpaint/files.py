@@ -2,7 +2,7 @@
 
 import errno
 import os
-import shutil
+import re
 import stat
 import tempfile
 import threading
@@ -14,9 +14,6 @@ from typing import Any, BinaryIO, TypeVar, cast
 
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.screen import visible
-
-#: What the name of a folder begins with in which earlier results wait.
-ASIDE = ".earlier."
 
 #: Longest text that is read whole, in bytes; and how much of it at a time.
 MAX_TEXT, PIECE = 2**26, 2**22
@@ -81,7 +78,7 @@ def file_length(
     """
     article = "an" if what[0] in "aeiou" else "a"
     try:
-        status = _in_time(Path(path).stat)
+        status, hollow = _in_time(lambda: _looked_at(Path(path), limit))
     except (FileNotFoundError, NotADirectoryError):
         raise error(f"no such {what}: {path}") from None
     except (OSError, ValueError) as reason:  # a name too long, or with a NUL in it
@@ -98,15 +95,18 @@ def file_length(
         )
     if status.st_size == 0 and (_is_made_up(status) or not may_be_empty):
         raise error(f"{path} is empty, or only made up when it is read: expected {article} {what}")
-    try:
-        hollow = _in_time(lambda: _is_hollow(path, status.st_size)) if status.st_size else False
-    except OSError as reason:
-        raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     if hollow:
         raise error(
             f"{path} is {status.st_size} bytes long, and nearly all of it was never written"
         )
     return status.st_size
+
+
+def _looked_at(path: Path, limit: int) -> tuple[os.stat_result, bool]:
+    """What the system says of `path`, and whether a file of at most `limit` is hollow."""
+    status = path.stat()
+    may_be_read = stat.S_ISREG(status.st_mode) and 0 < status.st_size <= limit
+    return status, may_be_read and _is_hollow(path, status.st_size)
 
 
 def _is_made_up(status: os.stat_result) -> bool:
@@ -137,6 +137,11 @@ def _is_hollow(path: Path, size: int) -> bool:
 def _opened(path: Path) -> BinaryIO:
     # Should it have become a pipe meanwhile, nobody waits for who writes to it.
     return open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+
+
+def _first_piece(path: Path) -> tuple[BinaryIO, bytes]:
+    file = _opened(path)
+    return file, file.read(PIECE)
 
 
 def _in_time(work: Callable[[], _Made]) -> _Made:
@@ -176,9 +181,11 @@ def read_bytes(
         return b""  # and is not asked for more, which might never come
     data = bytearray()
     try:
-        with _opened(path) as file:
-            while len(data) <= limit and (piece := _in_time(lambda: file.read(PIECE))):
-                data += piece
+        file, piece = _in_time(lambda: _first_piece(path))
+        with file:
+            data += piece
+            while len(piece) == PIECE and len(data) <= limit:
+                data += (piece := _in_time(lambda: file.read(PIECE)))
     except OSError as reason:
         raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     if len(data) > limit:  # as of what is still being written
@@ -212,52 +219,20 @@ def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
     return text if len(text) <= limit else f"{text[:limit]} …"
 
 
-def first_line(said: str | BaseException) -> str:
-    """Of what a library says, or else that it says nothing."""
-    silent = "no reason given" if isinstance(said, str) else type(said).__name__
-    return next(iter(str(said).strip().splitlines()), silent)
+def first_line(said: str | BaseException, *, of: str | Path | None = None) -> str:
+    """Of what a library says, or else that it says nothing.
 
-
-@contextmanager
-def restoring(folder: Path, files: Iterable[Path]) -> Iterator[None]:
-    """Move `files`, all below `folder`, out of the way of those that the block writes.
-
-    If it raises or is interrupted, they are put back, and what it has made of them is deleted.
-    Moving takes no space, so that they survive a full disk.
+    of: the file that it is about, which the error names already.
     """
-    files = list(dict.fromkeys(file.relative_to(folder) for file in files))
-    there = [file for file in files if (folder / file).is_file()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=ASIDE, dir=folder))
-    except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
-    try:
-        _move(there, folder, aside)
-        yield
-    except BaseException:
-        moved = [file for file in there if (aside / file).is_file()]
-        for file in files:
-            if file in moved or file not in there:
-                (folder / file).unlink(missing_ok=True)
-        _move(moved, aside, folder)
-        shutil.rmtree(aside, ignore_errors=True)
-        with suppress(OSError):
-            folder.rmdir()  # if nothing was in it before
-        raise
-    # With what a killed process could not put back: this result takes its place as well.
-    for old in folder.glob(f"{ASIDE}*"):
-        shutil.rmtree(old, ignore_errors=True)
+    silent = "no reason given" if isinstance(said, str) else type(said).__name__
+    line = next(iter(str(said).strip().splitlines()), silent)
+    return line if of is None else unnamed(line, of)
 
 
-def _move(files: Iterable[Path], source: Path, target: Path) -> None:
-    try:
-        for file in files:
-            (target / file).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(source / file, target / file)
-    except OSError as error:
-        reason = error.strerror or error
-        raise OutputError(f"cannot move {source / file} to {target}: {reason}") from error
+def unnamed(said: str, path: str | Path) -> str:
+    """`said` with `it` for the path of a file, in quotes or not, wherever that stands whole."""
+    named = rf"""(?<![\w./\\-])(["']?){re.escape(str(path))}\1(?![\w/\\-])"""
+    return re.sub(named, "it", said)
 
 
 def check_writable(folder: Path) -> None:
@@ -265,9 +240,52 @@ def check_writable(folder: Path) -> None:
 
     Called before long work, so that an hour of rendering never ends at a closed door.
     """
+    check_name(folder)
     try:
+        if ".." in folder.parts:  # through something that is not there it leads nowhere
+            last = len(folder.parts) - folder.parts[::-1].index("..")
+            Path(*folder.parts[:last]).stat()
         there = next(f for f in (folder, *folder.absolute().parents) if f.exists())
         with tempfile.TemporaryFile(dir=there):
             pass
     except OSError as error:
         raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+
+
+def check_files(files: Iterable[Path], reads: Iterable[Path]) -> None:
+    """Raise OutputError unless `files` can be written, and none of them is one of `reads`.
+
+    Whatever a command reads it never writes over, by whatever name or link it is known.
+    """
+    known: dict[tuple[int, int], Path] = {}
+    for path in reads:
+        with suppress(OSError):
+            known[_inode(path)] = path
+    for file in files:
+        check_name(file)
+        if file.is_dir():
+            raise OutputError(f"{file} is a folder, where a file is to be written: move it away")
+        with suppress(OSError):
+            if _inode(file) in known:
+                raise OutputError(
+                    f"{file} is read by this command, and would be written over: write to another "
+                    "place (folder=...)"
+                )
+
+
+def check_name(path: Path) -> None:
+    """Raise OutputError for a name that is not UTF-8, which not all that writes can write to."""
+    if not is_utf_8(path):
+        raise OutputError(
+            f"{one_line(str(path))} is not a name in UTF-8: choose another (folder=...)"
+        )
+
+
+def is_utf_8(path: Path) -> bool:
+    """Whether its name is; bytes that are not stand in Python's text as halves of pairs."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path))
+
+
+def _inode(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_dev, status.st_ino

@@ -23,8 +23,14 @@ from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.relight import check_relightable
-from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
-from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
+from lightpaint.remarks import (
+    remarks_of_film,
+    remarks_of_memory,
+    remarks_of_scene,
+    remarks_of_target,
+)
+from lightpaint.result_folder import ResultFolder
+from lightpaint.results import ALWAYS, VIEW_RESULTS, view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
@@ -42,7 +48,7 @@ from lightpaint.sources import (
 from lightpaint.target.target import Target
 
 #: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "time_s", "quality", "resolution", "refine", "suggest")
+RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
@@ -78,6 +84,7 @@ class Job:
         asked: Found at birth: all constraints, those of the lights file first.
         fit: Found at birth: the settings, with all decided that follows from the paintings.
         remarks: Found at birth: what is worth saying to a person, in plain text.
+        results: Found at birth: the folder, and what may be replaced there.
 
     Raises:
         LightpaintError: For what cannot be.
@@ -101,7 +108,7 @@ class Job:
     asked: Constraints = field(init=False, repr=False)
     fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
-    _relit: tuple[Path, ...] = field(init=False, repr=False)
+    results: ResultFolder = field(init=False, repr=False)
 
     __repr__ = shortly
 
@@ -131,13 +138,12 @@ class Job:
             PaintedView(*self._on_one_film(scene, target, basis), folder, basis)
             for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
         )
-        for folder in (self.folder, *folders):
-            check_writable(folder)
-        relit = check_relightable(scenes[0], self.folder / "relit.xml") if scenes else []
+        results = self._result_folder(views, scenes, targets)
+        results.check()
         # The only place that sets what was found; frozen afterwards.
         born = vars(self)
         fit = meant_by(self.settings, [view.target for view in views])
-        born.update(views=views, asked=asked, fit=fit, _relit=tuple(relit))
+        born.update(views=views, asked=asked, fit=fit, results=results)
         born.update(remarks=tuple(self._remarks(targets)))
 
     @property
@@ -145,18 +151,6 @@ class Job:
         """The light groups it is solved from, if it is from such."""
         found = content(self.basis)
         return found if isinstance(found, LightGroups) else None
-
-    @property
-    def files(self) -> list[Path]:
-        """What is about to be replaced, in `folder` and in those of the views."""
-        files = [*earlier_results(self.folder), self.folder / "lighting.json", *self._relit]
-        for view in self.views:
-            if view.folder != self.folder:
-                files += [file for pattern in RESULTS for file in view.folder.glob(pattern)]
-            names = VIEW_RESULTS if self.scenes else ALWAYS
-            files += [view.folder / name for name in names]
-            files += [view.folder / name for name in EXPORTS if self.groups is not None]
-        return files
 
     def to_json(self) -> str:
         """This job as text, to be run elsewhere; paths stay as they were given.
@@ -241,6 +235,32 @@ class Job:
                     "it to read_light_groups in leave_out, or move it elsewhere"
                 )
 
+    def _result_folder(
+        self, views: Sequence[PaintedView], scenes: Sequence[Scene], targets: Sequence[Target]
+    ) -> ResultFolder:
+        """Where results go, with all that is read for them. targets: as they were read."""
+        files = [self.folder / "lighting.json"]
+        if scenes:
+            files += check_relightable(scenes[0], self.folder / "relit.xml")
+        for view in views:
+            check_writable(view.folder)
+            files += [view.folder / name for name in (VIEW_RESULTS if scenes else ALWAYS)]
+        if self.groups is not None:
+            files += [self.folder / name for name in EXPORTS]
+        reads = [file for target in targets for file in target.files]
+        reads += [file for scene in scenes for file in scene.read_files]
+        if isinstance(self.basis, BasisFile | GroupsFile):
+            reads.append(Path(self.basis.path))
+        if self.groups is not None:
+            reads += self.groups.files
+        return ResultFolder(
+            self.folder,
+            tuple(dict.fromkeys(files)),
+            tuple(dict.fromkeys(reads)),
+            tuple(target.files[0] if target.files else target.name for target in targets),
+            force=self.settings.force,
+        )
+
     def _on_one_film(
         self, scene: Scene | None, target: Target, basis: Basis | None
     ) -> tuple[Scene | None, Target]:
@@ -268,7 +288,9 @@ class Job:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))
         for target, view in zip(targets, self.views, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit)
-        return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
+        for scene in rendered:
+            remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
+        return remarks
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:

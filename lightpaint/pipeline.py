@@ -1,11 +1,12 @@
 """The corridor: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.files import restoring
+from lightpaint.basis.render.render import samples_for
 from lightpaint.images.estimate import write_estimate
 from lightpaint.job import Job, PaintedView
 from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_bounds
@@ -18,7 +19,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.placement.suggest import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
 from lightpaint.relit.export.exports import write_exports
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relight import relight, settle
 from lightpaint.relit.rounds import refine_by_rendering
 from lightpaint.relit.verify import verify
 from lightpaint.results import Look, write_predicted, write_report
@@ -50,6 +51,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         [2.0, 1.5, 1.0]
     """
     listen = listener(progress)
+    job.results.check()
     for remark in job.remarks:
         listen.say(remark)
     problem = Problem.of(
@@ -60,18 +62,20 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     )
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
-    with restoring(job.folder, job.files):
+    with job.results.filled() as folder:
         lighting = with_bounds(solution, analyses).lighting
-        write_lighting(job.folder / "lighting.json", lighting)
+        write_lighting(folder / "lighting.json", lighting)
         if job.groups is not None:
-            write_exports(job.folder, job.groups, lighting)
+            write_exports(folder, job.groups, lighting)
         relit = None
         if (scene := job.views[0].scene) is not None:
-            relit = relight(scene, lighting, job.folder / "relit.xml")
-        return [
-            _finished(job, view, analysis, relit, _hearing(job, view, listen))
+            relit = relight(scene, lighting, folder / "relit.xml")
+        looks = [
+            _finished(job, folder, view, analysis, relit, _hearing(job, view, listen))
             for view, analysis in zip(job.views, analyses, strict=True)
         ]
+        other = scene and settle(scene, lighting, folder / "relit.xml", job.folder / "relit.xml")
+    return [_loaded_anew(look) for look in looks] if other else looks
 
 
 def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int = 1) -> Basis:
@@ -84,12 +88,14 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
         is_rendered = True
         listen(label, done, total, unit)
 
+    asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
     basis = obtain_basis(
         scene,
-        spp=samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
+        spp=asked,
         time_s=None if settings.time_s is None else settings.time_s / views,
         seed=settings.seed,
         use_cache=settings.use_cache,
+        exact_spp=settings.exact_spp,
         progress=report,
     )
     if settings.use_cache and not cache.is_kept(basis):
@@ -97,11 +103,17 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
             f"the basis could not be kept in {cache.folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
-    if not is_rendered:
+    has = f"basis of {basis.origin.spp} samples per pixel"
+    wanted = scene.spp if asked is None else asked
+    if not is_rendered and basis.origin.spp > samples_for(scene, asked):
         listen.say(
-            f"basis of {basis.origin.spp} samples per pixel kept from an earlier run "
-            "(use_cache=False renders it anew)"
+            f"{has} kept from an earlier run: more than the {wanted} asked for, so the answer may "
+            "differ a little from one of these (exact_spp=True takes just them)"
         )
+    elif not is_rendered:
+        listen.say(f"{has} kept from an earlier run (use_cache=False renders it anew)")
+    elif settings.time_s is None and basis.origin.spp > wanted + 1:
+        listen.say(f"{has}, not {wanted}: it takes one in each pixel of a block for each half")
     return basis
 
 
@@ -145,13 +157,26 @@ def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
     return replace(solution, lighting=lighting)
 
 
+def _loaded_anew(look: Look) -> Look:
+    """`look` with its relit scene as it is written by now."""
+    assert look.relit is not None
+    path, sensor = look.relit.path, look.relit.sensor
+    return replace(look, relit=load_scene(path, sensor=sensor, use_lights_file=False))
+
+
 def _finished(
-    job: Job, view: PaintedView, analysis: Analysis, relit: Scene | None, listen: Listener
+    job: Job,
+    folder: Path,
+    view: PaintedView,
+    analysis: Analysis,
+    relit: Scene | None,
+    listen: Listener,
 ) -> Look:
-    """A view predicted, verified and shown in its folder."""
+    """A view predicted, verified and shown. folder: what takes the place of the job's when done."""
     settings, scene, solution = job.settings, view.scene, analysis.solution
     basis = solution.basis
-    view.folder.mkdir(exist_ok=True)
+    place = folder / view.folder.relative_to(job.folder)
+    place.mkdir(exist_ok=True)
     predicted = combine(basis, solution.lighting)
     spp = settings.spp or (basis.origin.spp if scene is None else scene.spp)
     verification, suggestions = None, None
@@ -161,10 +186,10 @@ def _finished(
         if settings.checks_as_basis:
             pixels, checked = (size[0] * size[1] for size in (basis.size, relit.size))
             spp = max(FEWEST, basis.origin.spp * pixels // checked)
-    write_predicted(view.folder / "predicted.exr", predicted, sensor=basis.origin.sensor, spp=spp)
+    write_predicted(place / "predicted.exr", predicted, origin=basis.origin, spp=spp)
     if relit is not None:
         verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=listen)
-        write_estimate(view.folder / "verified.exr", verification.verified, {})
+        write_estimate(place / "verified.exr", verification.verified, {})
     if settings.suggest and scene is not None:
         suggestions = suggest_lights(
             scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
@@ -174,12 +199,12 @@ def _finished(
         basis=basis,
         solution=solution,
         predicted=predicted,
-        relit=relit,
+        relit=None if relit is None else relit.moved(folder, job.folder),
         verification=verification,
         analysis=analysis,
         suggestions=suggestions,
     )
-    write_report(view.folder, look, command=settings.command)
+    write_report(place, look, command=settings.command)
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look

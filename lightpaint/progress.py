@@ -5,12 +5,9 @@ listen; which of them listens is the caller's choice. Who listens to the corrido
 remarks, too.
 """
 
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 
 class Progress(Protocol):
@@ -74,34 +71,3 @@ def labelled(listen: Listener, name: str) -> Listener:
         listen(f"{label} of {name}", done, total, unit)
 
     return _Split(report, listen.say)
-
-
-@contextmanager
-def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C back, and yield a function that lets it through where it does no harm.
-
-    An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded
-    loops behind; between two passes it is clean. An interrupt that is ignored, or that a
-    program around this one handles outside Python, is left alone.
-    """
-    # Signals arrive in the main thread; None stands for a handler that is not Python's.
-    elsewhere = threading.current_thread() is not threading.main_thread()
-    if elsewhere or signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None):
-        yield lambda: None
-        return
-    pending = False
-
-    def remember(_signal: int, _frame: Any) -> None:
-        nonlocal pending
-        pending = True
-
-    def let_through() -> None:
-        if pending:
-            raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, remember)
-    try:
-        yield let_through
-        let_through()
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -1,6 +1,9 @@
 """What is worth saying to a person before a job is run, in plain text."""
 
-from lightpaint.basis.render.render import memory_needed, why_not_one_pass
+from lightpaint.basis.render.integrators import remark_on_separate_renders
+from lightpaint.basis.render.render import memory_needed
+from lightpaint.images.blocks import left_over, whole_factor
+from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import some_names
@@ -21,13 +24,42 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
         remarks.append(f"left as it is: {some_names(obstacles, '; ')}")
     # Python gets the same as a warning.
-    if note := use_variant().note:
-        remarks.append(note)
-    elif is_rendered and (reason := why_not_one_pass(scene)):
+    note = use_variant().note
+    if not note and is_rendered:
+        note = remark_on_separate_renders(scene) or ""
+    return [*remarks, note] if note else remarks
+
+
+def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
+    """What of the picture a reduced film leaves out, and whether it is as small as was asked for.
+
+    scene: on that film.
+    """
+    film, remarks = scene.film, []
+    width, height = film.pixels
+    if any(film.left_out):
+        whole = "x".join(map(str, film.crop_size))
         remarks.append(
-            f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
+            f"film of {whole} reduced to {width}x{height} blocks of {film.block}x{film.block} "
+            f"pixels: {_spoken_rest(film.left_out)} left over, and nowhere counted"
+        )
+    few = None
+    if settings.quality is not None and settings.resolution is None:
+        few = PRESETS[settings.quality].pixels
+    if few is not None and width * height > few:
+        remarks.append(
+            f'the film cannot be made as small as quality="{settings.quality}" would have it: '
+            f"{width}x{height} pixels are rendered"
         )
     return remarks
+
+
+def _spoken_rest(rest: tuple[int, int]) -> str:
+    """`3 columns at the right and 1 row at the bottom are`. rest: how many of both."""
+    columns, rows = rest
+    parts = [f"{columns} column{'s' * (columns > 1)} of pixels at the right"] * bool(columns)
+    parts += [f"{rows} row{'s' * (rows > 1)} at the bottom"] * bool(rows)
+    return f"{' and '.join(parts)} {'is' if columns + rows == 1 else 'are'}"
 
 
 def remarks_of_memory(scene: Scene) -> list[str]:
@@ -50,7 +82,11 @@ def remarks_of_target(
     (height, width), (mine_h, mine_w) = size, target.size
     is_asked_for = fit.resize or fit.resolution or fit.quality
     if size != target.size and not is_asked_for:
-        remarks.append(f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}")
+        rest = left_over(target.size, whole_factor(target.size, size) or 1)
+        remark = f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}"
+        if any(rest):
+            remark += f": {_spoken_rest((rest[1], rest[0]))} left over, and nowhere counted"
+        remarks.append(remark)
     name = "srgb" if target.transform is None else target.transform.name
     if fit.space == "linear" and name not in ("srgb", "linear"):
         remarks.append(

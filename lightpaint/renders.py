@@ -5,12 +5,12 @@ from pathlib import Path
 from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.files import restoring
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.png import write_png
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.relit.relight import check_relightable, relight, settle
+from lightpaint.result_folder import ResultFolder
 from lightpaint.scene.quality import Preset
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
@@ -87,23 +87,32 @@ def render_look(
     return write_look(path, look, transform or ViewTransform("srgb", choose_exposure(look)))
 
 
+def relit_folder(
+    scene: Scene, lighting: Path, folder: Path, *, force: bool = False
+) -> ResultFolder:
+    """Where `relight_look` writes. lighting: the file whose lighting it is."""
+    files = [*check_relightable(scene, folder / "relit.xml")]
+    files += [folder / "relit.exr", folder / "relit.png"]
+    reads = (lighting, *scene.read_files)
+    return ResultFolder(folder, tuple(files), reads, (lighting,), adds_to=lighting, force=force)
+
+
 def relight_look(
     scene: Scene,
     lighting: Lighting,
-    folder: Path,
+    results: ResultFolder,
     *,
     spp: int | None = None,
     seed: int = 0,
     progress: Progress = silent,
-) -> Scene:
-    """Write relit.xml to `folder`, and its render as relit.exr and relit.png."""
-    path = folder / "relit.xml"
-    files = [*check_relightable(scene, path), folder / "relit.exr", folder / "relit.png"]
-    with restoring(folder, files):
-        relit = relight(scene, lighting, path)
+) -> None:
+    """Write relit.xml, and its render as relit.exr and relit.png."""
+    results.check()
+    with results.filled() as folder:
+        relit = relight(scene, lighting, folder / "relit.xml")
         image = render(
             relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
         )
         write_estimate(folder / "relit.exr", image, {})
         write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
-    return relit
+        settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
@@ -24,21 +24,23 @@ from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.notebook import look_html
+from lightpaint.report.numbers import report_numbers
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
+from lightpaint.staging import finish
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
 VIEW_KEY = "lightpaint.view"
 
 #: What every solve writes.
-ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html")
+ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
 
 #: What each view has where there are several.
-VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html")
+VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html", "report.json")
 
 #: What a solve and a relight write, and the next solve replaces.
 RESULTS = (
@@ -47,6 +49,7 @@ RESULTS = (
     "verified.exr",
     "comparison.png",
     "report.html",
+    "report.json",
     "relit.xml",
     "relit.png",
     "relit.exr",
@@ -112,15 +115,9 @@ class Look:
         return self.solution.lighting
 
 
-def earlier_results(folder: Path) -> list[Path]:
-    """What an earlier solve left in `folder`: results of two never stand together."""
-    if not (folder / "lighting.json").is_file():
-        return []  # somebody else's files, whatever they are called
-    return [file for pattern in RESULTS for file in folder.glob(pattern)]
-
-
 def result_folders(folder: Path) -> list[Path]:
     """`folder` itself, or where it holds several views the folders of these."""
+    finish(folder)
     if (folder / "predicted.exr").is_file() or not (folder / "relit.xml").is_file():
         return [folder]
     return sorted(file.parent for file in folder.glob("*/predicted.exr")) or [folder]
@@ -142,13 +139,17 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     return names
 
 
-def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -> None:
-    """predicted.exr, with a note of how to see the relit scene as the basis saw it."""
-    write_estimate(path, predicted, {VIEW_KEY: json.dumps({"sensor": sensor, "spp": spp})})
+def write_predicted(path: Path, predicted: Estimate, *, origin: Origin, spp: int) -> None:
+    """predicted.exr, with a note of how to see the relit scene as the basis saw it.
+
+    origin: of the basis. spp: samples per pixel of the verification.
+    """
+    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp}
+    write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
 
 
 def write_report(folder: Path, look: Look, *, command: str) -> None:
-    """Write the pictures people look at: comparison.png and report.html."""
+    """Write what people look at, comparison.png and report.html, and its numbers, report.json."""
     verified = look.verification.verified.image if look.verification else None
     sheet = comparison_image(
         basis=look.basis,
@@ -158,19 +159,20 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         verified=verified,
     )
     write_bytes(folder / "comparison.png", png_bytes(sheet))
-    page = report_page(
-        basis=look.basis,
-        target=look.target,
-        solution=look.solution,
-        predicted=look.predicted,
-        verification=look.verification,
-        command=command,
-        uncertainty=look.uncertainty,
-        diagnosis=look.diagnosis,
-        unconstrained=look.analysis.unconstrained,
-        suggestions=look.suggestions,
-    )
-    write_text(folder / "report.html", page)
+    for name, written in (("report.json", report_numbers), ("report.html", report_page)):
+        text = written(
+            basis=look.basis,
+            target=look.target,
+            solution=look.solution,
+            predicted=look.predicted,
+            verification=look.verification,
+            command=command,
+            uncertainty=look.uncertainty,
+            diagnosis=look.diagnosis,
+            unconstrained=look.analysis.unconstrained,
+            suggestions=look.suggestions,
+        )
+        write_text(folder / name, text)
 
 
 def verify_result(
@@ -186,6 +188,8 @@ def verify_result(
     Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
     """
     folder = Path(folder)
+    for one in (folder, folder.parent):
+        finish(one)
     relit_xml = folder / "relit.xml"
     if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
         relit_xml = folder.parent / "relit.xml"  # one of several views

@@ -38,6 +38,8 @@ class Settings(Fit):
         quality: Preset of spp and resolution, where these are not given. With a time or a preset
             the verification has about as many samples as the basis, whatever the resolution.
         use_cache: Whether a basis from an earlier run is taken, and this one kept.
+        exact_spp: Whether the basis has just as many samples as are asked for, even where one with
+            more is kept: then the answer does not depend on what earlier runs have left.
         noise_correction: Whether the noise's power, or part of it, is taken out of the equations;
             None for wherever it is known, unless `literal`.
         refine: How often to render the scene as solved, with as many samples as the basis, and
@@ -45,6 +47,7 @@ class Settings(Fit):
         suggest: How many point lights that would help most are looked for at most; needs a scene,
             and one view only.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
+        force: Whether results of something else, or changed by hand, are replaced.
         command: The shell command that asks for this, for the report.
 
     Raises:
@@ -66,10 +69,12 @@ class Settings(Fit):
     resolution: str | None = None
     quality: Quality | None = None
     use_cache: bool = True
+    exact_spp: bool = False
     noise_correction: bool | None = None
     refine: int = 0
     suggest: int = 0
     cd_per_unit: float | None = None
+    force: bool = False
     command: str = ""
 
     expected: ClassVar[Mapping[str, Check]] = {
@@ -82,10 +87,12 @@ class Settings(Fit):
         "resolution": a(str, "a part of the film like '1/4' or '320x180'"),
         "quality": one_of(Quality),
         "use_cache": SWITCH,
+        "exact_spp": SWITCH,
         "noise_correction": SWITCH,
         "refine": whole(0, MAX_REFINE),
         "suggest": whole(0),
         "cd_per_unit": number("cd/m²"),
+        "force": SWITCH,
         "command": a(str, "the text of a shell command"),
     }
 
@@ -95,6 +102,11 @@ class Settings(Fit):
             raise LightpaintError(
                 f"spp is {self.spp} and time_s {self.time_s:g}: expected a number of samples or a "
                 "time to render for, not both"
+            )
+        if self.exact_spp and self.time_s is not None:
+            raise LightpaintError(
+                f"exact_spp is True and time_s {self.time_s:g}: expected a number of samples, of "
+                "which a time says nothing"
             )
         if self.resolution is not None:
             check_resolution(self.resolution)

@@ -7,6 +7,7 @@ them counts one that never came as a crash or a hang. `damage_readers.py` knows 
 import os
 import pickle
 import random
+import re
 import resource
 import signal
 import struct
@@ -99,11 +100,20 @@ def cut_and_read(results: Iterable[tuple[Case, str]]) -> list[tuple[Case, str]]:
 
 
 def clear(error: BaseException, path: Path, longest: int = 2500) -> bool:
-    """Whether an error is one line, no longer than can be read, that names the file."""
+    """Whether an error is one line, no longer than can be read, that names the file once."""
     text = str(error)
-    # A template is a folder; a scene may name what it refers to, which has its name here.
-    named = path.stem in text or path.parent.name in text
-    return named and text.isprintable() and len(text) < longest
+    return named_once(text, path) and text.isprintable() and len(text) < longest
+
+
+def named_once(text: str, path: Path) -> bool:
+    """Whether a message names the file once, or another beside it instead.
+
+    A template is a folder, and named as that or as a file in it, not as both. What a scene refers
+    to may be named beside the scene: each once.
+    """
+    folder = str(path.parent)
+    named = re.findall(rf"{re.escape(folder)}(?:/[^\s/\"':,;]+)*", text)
+    return len(named) == len(set(named)) > 0 and (len(named) == 1 or folder not in named)
 
 
 def attempt(read: Callable[[Path], Any], path: Path, error: type[Exception]) -> Any:

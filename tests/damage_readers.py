@@ -24,6 +24,15 @@ class Reader:
             from lightpaint.images.picture import read_picture
 
             return Seen(read_picture(path))
+        if self.kind == "mask":
+            from lightpaint.images.picture import read_mask
+
+            return read_mask(path).tobytes()
+        if self.kind == "estimate":
+            from lightpaint.images.estimate import read_estimate
+
+            estimate, attributes = read_estimate(path)
+            return estimate.image.tobytes(), estimate.half_difference.tobytes(), dict(attributes)
         if self.kind == "lighting":
             from lightpaint.lighting.file import read_lighting
 
@@ -60,7 +69,7 @@ class Reader:
         """What is to be said of a damaged file that was read as something else than before."""
         if self.kind == "picture":
             return _second_opinion(path, read.picture)
-        if self.kind in ("scene", "groups"):
+        if self.kind in ("scene", "groups", "mask", "estimate"):
             return "read"  # a bit that is turned in a number of these nobody can know of
         return "agreed" if self.agrees(path, read) else f"misread as {read!r}"[:300]
 

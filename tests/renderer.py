@@ -103,6 +103,7 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
     import mitsuba as mi
 
     from lightpaint.basis.render.guide import Guide
+    from lightpaint.basis.render.integrators import needs_a_bounce
     from lightpaint.basis.render.one_pass import Guided, accumulate, lights_by_instance
 
     names = [light.name for light in scene.lights]
@@ -121,6 +122,8 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
         seed=seed,
         spp=spp,
         guided=None if plain else Guided(seed, 0, guide),
+        block=scene.film.block,
+        must_bounce=needs_a_bounce(scene),
     )
     del loaded
     gc.collect()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.files import ASIDE, check_writable, replacing, restoring, write_bytes, write_text
+from lightpaint.files import check_files, check_writable, replacing, write_bytes, write_text
 
 
 @pytest.fixture
@@ -98,39 +98,32 @@ def test_check_writable_leaves_nothing_behind(tmp_path: Path):
     assert os.listdir(tmp_path) == []
 
 
-def write_until(trouble: BaseException, folder: Path, files: list[Path]) -> None:
-    """Replace `files` together, until trouble comes."""
-    with restoring(folder, files):
-        assert not any(file.exists() for file in files)
-        for file in files:
-            file.write_text("later", encoding="utf-8")
-        raise trouble
+def test_what_is_read_is_not_written_over_under_any_name(tmp_path: Path) -> None:
+    painting = tmp_path / "painting.exr"
+    painting.touch()
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "symbolic").symlink_to(painting)
+    os.link(painting, tmp_path / "hard")
+    for name in ("painting.exr", "symbolic", "hard", "folder/../painting.exr"):
+        with pytest.raises(OutputError, match="is read by this command, and would be written over"):
+            check_files([tmp_path / "other", tmp_path / name], [tmp_path / "none", painting])
+    check_files([tmp_path / "other"], [painting])
 
 
-def test_what_is_replaced_together_comes_back_together(tmp_path: Path) -> None:
-    folder = tmp_path / "look"
-    (folder / "deep").mkdir(parents=True)
-    for name in ("a", "deep/b", "mine"):
-        (folder / name).write_text(f"earlier {name}", encoding="utf-8")
-    files = [folder / name for name in ("a", "deep/b", "c", "a")]
-    for trouble in (OutputError("full"), KeyboardInterrupt()):
-        with pytest.raises(type(trouble)):
-            write_until(trouble, folder, files)
-        left = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
-        assert left == {"a", "deep/b", "mine"}
-        for name in left:
-            assert (folder / name).read_text(encoding="utf-8") == f"earlier {name}"
-        assert list(folder.glob(".*")) == []
+def test_a_folder_where_a_file_should_go(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="is a folder, where a file is to be written"):
+        check_files([tmp_path], [])
 
 
-def test_what_a_killed_process_left_goes_with_the_next_success(tmp_path: Path) -> None:
-    (tmp_path / f"{ASIDE}killed").mkdir()
-    with restoring(tmp_path, [tmp_path / "a"]):
-        (tmp_path / "a").write_text("later", encoding="utf-8")
-    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+def test_names_that_are_not_utf_8(tmp_path: Path) -> None:
+    name = Path(os.fsdecode(b"evening\xff"))
+    for check in (lambda: check_files([tmp_path / name], []), lambda: check_writable(name)):
+        with pytest.raises(OutputError, match=r"evening\\udcff is not a name in UTF-8: choose"):
+            check()
 
 
-def test_a_folder_that_was_not_there_is_not_left(tmp_path: Path) -> None:
-    with pytest.raises(OutputError):
-        write_until(OutputError("full"), tmp_path / "new", [tmp_path / "new" / "a"])
-    assert list(tmp_path.iterdir()) == []
+def test_a_way_through_nothing_leads_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "look").mkdir()
+    with pytest.raises(OutputError, match="No such file"):
+        check_writable(tmp_path / "nothing" / ".." / "look")
+    check_writable(tmp_path / "look" / ".." / "new" / "look")

@@ -117,7 +117,13 @@ def test_from_the_command_line(
     assert told["target"] == "camera + close"
     assert told["lights"]["bulb"]["emission"] == pytest.approx([0.5, 0.6, 0.7])
     for name in ("camera", "close"):
-        for file in ("predicted.exr", "verified.exr", "comparison.png", "report.html"):
+        for file in (
+            "predicted.exr",
+            "verified.exr",
+            "comparison.png",
+            "report.html",
+            "report.json",
+        ):
             assert (tmp_path / "out" / name / file).is_file()
     assert main(["verify", "out"]) == 0
     assert main(["verify", "out/close"]) == 0

@@ -5,10 +5,10 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
-from types import FrameType, SimpleNamespace
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -135,6 +135,17 @@ def test_beside_the_scene_and_in_a_template(folder: Path) -> None:
     assert "template.json" in said
 
 
+class HalfWay:
+    """A file of which the beginning has been read."""
+
+    def __init__(self, read: Callable[..., Any]) -> None:
+        self.read = read
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+
 def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither where it is asked what there is, nor where it is read, at once or half-way."""
     room = folder / "room.xml"
@@ -146,15 +157,18 @@ def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPa
         open_again.wait(AT_ONCE)
         return nullcontext()
 
-    half_way = SimpleNamespace(read=sleeps)
+    half_way = HalfWay(sleeps)
 
-    for name, stub in (
-        ("_opened", sleeps),
-        ("_is_hollow", sleeps),
-        ("_opened", lambda _: nullcontext(half_way)),
+    for stubs in (
+        {"_looked_at": sleeps},
+        {"_is_hollow": sleeps},
+        {"_opened": sleeps},
+        {"_is_hollow": lambda *_: False, "_opened": sleeps},
+        {"_is_hollow": lambda *_: False, "_first_piece": lambda _: (half_way, bytes(files.PIECE))},
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(files, name, stub)
+            for name, stub in stubs.items():
+                patch.setattr(files, name, stub)
             began = time.monotonic()
             with pytest.raises(SceneError, match=r"cannot read .*room\.xml: no answer within"):
                 files.read_text(room, "scene file", SceneError)

@@ -186,6 +186,11 @@ class Basis(Shown):
         return _kept(np.array([light.emission for light in self.lights], dtype=np.float64))
 
     @cached_property
+    def present_look(self) -> npt.NDArray[np.float32]:
+        """The scene as it is, (h, w, 3)."""
+        return _kept(self.mix(self.present_weights))
+
+    @cached_property
     def is_fixed(self) -> Bools:
         """(n,), which lights stay as they are, with weight 1."""
         return _kept(np.array([light.is_fixed for light in self.lights], dtype=bool))

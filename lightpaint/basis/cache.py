@@ -82,9 +82,10 @@ def keep(basis: Basis) -> bool:
 
 
 def is_kept(basis: Basis) -> bool:
-    """Whether `basis` is kept, with all its samples."""
+    """Whether `basis` is kept, with all its samples, or one of the same with more."""
     path = _path_of(basis)
-    return path.is_file() and _entry(path).origin == basis.origin
+    kept = _entry(path).origin if path.is_file() else None
+    return kept is not None and (kept == basis.origin or kept.spp > basis.origin.spp)
 
 
 def _prune(path: Path) -> None:

@@ -2,53 +2,27 @@
 """The command line: one sub-command per room. Parses, calls, prints; no more.
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: `verify` found
-a disagreement; 2: something the user can mend, said in one line; 130: interrupted.
+a disagreement; 2: something the user can mend, said in one line; 130: interrupted, 143: told to
+end, 129: its terminal has closed.
 """
 
-import io
-import os
-import sys
-import traceback
-import warnings
 from collections.abc import Sequence
-
-from lightpaint.cli import lines
-from lightpaint.cli.parser import command_parser
-from lightpaint.cli.words import spoken
-from lightpaint.errors import LightpaintError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal that lacks a character shows another, and loses no result over it.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
-    parser = command_parser()
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks what could be typed
-        from lightpaint.cli.completion import complete
-
-        complete(parser)
-    options = parser.parse_args(given)
+    came: list[int] = []
     try:
-        # What a command needs is imported when it runs: --help answers at once.
-        from lightpaint.cli import commands
-        from lightpaint.cli.options import values_of
-        from lightpaint.scene.variant import SlowBackendWarning
+        # What takes time to import is imported where an interrupt is heard, and waits.
+        from lightpaint.signals import hearing, interruptible_between_pieces
 
-        # The commands say it in their own words.
-        warnings.simplefilter("ignore", SlowBackendWarning)
-        return int(getattr(commands, options.command)(**values_of(options, given)))
-    except LightpaintError as error:
-        lines.err(f"lightpaint {options.command}: {spoken(str(error))}")
-        return 2
-    except KeyboardInterrupt as interrupt:
-        how_to_go_on = f": {interrupt}" if str(interrupt) else ""
-        lines.err(f"lightpaint {options.command}: interrupted{how_to_go_on}")
-        return 130
-    except Exception:
-        # A mistake of lightpaint's own, told whole; its text may repeat what a file says.
-        for line in traceback.format_exc().splitlines():
-            lines.err(line)
-        return 1
+        with hearing(came):
+            with interruptible_between_pieces():
+                from lightpaint.cli.command import run_command
+            code = run_command(arguments, came)
+    except KeyboardInterrupt:
+        import sys
+
+        sys.stderr.write("lightpaint: interrupted\n")
+        code = 130
+    return 128 + came[0] if came and code == 130 else code

@@ -15,14 +15,14 @@ from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import BasisError, OutputError
-from lightpaint.files import check_writable
+from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
 from lightpaint.pipeline import obtain, run
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import scene_of
-from lightpaint.remarks import remarks_of_memory, remarks_of_scene
-from lightpaint.renders import relight_look, render_look, render_template
+from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+from lightpaint.renders import relight_look, relit_folder, render_look, render_template
 from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
@@ -30,7 +30,8 @@ from lightpaint.scene.variant import use_variant
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
-from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
+from lightpaint.staging import finish
+from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
 
 
 def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int:
@@ -55,8 +56,10 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> int:
         raise OutputError(f"{output} must end in .exr, the format that is written")
     check_writable(output.parent)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
+    check_files([output], loaded.read_files)
     with terminal.Listener() as listen:
-        for remark in (*remarks_of_scene(loaded), *remarks_of_memory(loaded)):
+        of_film = remarks_of_film(loaded, settings)
+        for remark in (*remarks_of_scene(loaded), *of_film, *remarks_of_memory(loaded)):
             listen.say(remark)
         made = obtain(loaded, settings, listen)
     write_basis(output, made)
@@ -77,8 +80,14 @@ def template(
     """`lightpaint template SCENE -o DIR`"""
     _check_template(output, force=force)
     loaded = _loaded(scene)
+    replaced = (
+        files_in_the_way(output) if is_folder(output) else [output, output.with_suffix(".png")]
+    )
+    check_files(replaced, loaded.read_files)
     if settings.resolution:
         loaded = loaded.reduced(settings.resolution)
+        for remark in remarks_of_film(loaded, settings):
+            terminal.say(remark)
     how: dict[str, Any] = {"transform": transform, "spp": settings.spp, "seed": settings.seed}
     linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:
@@ -142,18 +151,25 @@ def relight(
     *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
 ) -> int:
     """`lightpaint relight SCENE lighting.json...`"""
+    for path in lightings:
+        finish(path.parent)
     answers = [read_lighting(path) for path in lightings]
     names = [a.target or path.stem for a, path in zip(answers, lightings, strict=True)]
     folders = folders_of(output, names)
     loaded = _loaded(scene)
-    for folder in folders:
-        check_writable(folder)
-    for lighting, folder in zip(answers, folders, strict=True):
+    results = [
+        relit_folder(loaded, path, folder, force=settings.force)
+        for path, folder in zip(lightings, folders, strict=True)
+    ]
+    for place in results:
+        place.check()
+    for lighting, place in zip(answers, results, strict=True):
+        folder = place.folder
         if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
             terminal.say(f"{folder}: the lighting was solved for another state of the scene")
         with terminal.Listener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            relight_look(loaded, lighting, folder, progress=listen, **how)
+            relight_look(loaded, lighting, place, progress=listen, **how)
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
     return 0
 
@@ -224,8 +240,9 @@ def doctor(*, variant: str | None) -> int:
 def _check_template(output: Path, *, force: bool) -> None:
     """Raise OutputError for a place that a template cannot or should not go to."""
     is_tree = is_folder(output)
-    painted_on = earlier_files(output) if is_tree else [output, output.with_suffix(".png")]
-    for file in painted_on:
+    check_name(output)
+    check_files(_replaced(output), ())
+    for file in _replaced(output):
         if file.exists() and not force:
             raise OutputError(
                 f"{file} exists and may have been painted on: choose another name with -o, or "
@@ -239,6 +256,14 @@ def _check_template(output: Path, *, force: bool) -> None:
     if is_tree and output.is_file():
         raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
     check_writable(output if is_tree else output.parent)
+
+
+def _replaced(output: Path) -> list[Path]:
+    """What a template at `output` may take the place of."""
+    if not is_folder(output):
+        return [output, output.with_suffix(".png")]
+    finish(output)
+    return files_in_the_way(output)
 
 
 def _loaded(scene: SceneFile) -> Scene:

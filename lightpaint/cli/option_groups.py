@@ -115,8 +115,8 @@ def add_budget(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quality",
         choices=("preview", "final"),
-        help="preview: 64 samples per pixel on a film of some 30,000 pixels; final: 512 on the "
-        "whole film; --spp, --time and --resolution go before",
+        help="preview: 64 samples per pixel on some 30,000 pixels, each a block of the film's; "
+        "final: 512 on the whole film; --spp, --time and --resolution go before",
     )
     add_resolution(parser)
     add_seed(parser)
@@ -148,8 +148,9 @@ def add_resolution(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resolution",
         metavar="1/N|WxH",
-        help="render on a film reduced by a whole factor, like 1/4 or 320x180; the verification "
-        "of solve keeps the whole film (default: the whole film)",
+        help="render with a pixel for each square block of the film's pixels, like 1/4 or 320x180; "
+        "what makes no whole block at the right and at the bottom is left out; the verification of "
+        "solve keeps the whole film (default: the whole film)",
     )
 
 
@@ -160,6 +161,12 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
         dest="use_cache",
         action="store_false",
         help="neither take nor keep the basis for later runs (default: do both)",
+    )
+    parser.add_argument(
+        "--exact-spp",
+        action="store_true",
+        help="take just as many samples per pixel as are asked for, even where a basis with more "
+        "is kept, and leave that one kept (default: take what is kept)",
     )
 
 
@@ -178,3 +185,12 @@ def add_unit(parser: argparse.ArgumentParser) -> None:
 def add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
     """Where results go."""
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """What may be given up."""
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="replace results of something else, or that were changed by hand (default: refuse)",
+    )

@@ -16,7 +16,7 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
-from lightpaint.files import is_name, one_line
+from lightpaint.files import check_files, is_name, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -131,10 +131,14 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
     # One scene, which is loaded once for all.
     source = () if basis is not None else (scene_of(options),)
     folders = folders_of(options.output and Path(options.output), [Path(p).stem for p in paths])
-    return [
+    jobs = [
         Job(source, (painting,), folder, basis, asked, settings)
         for painting, folder in zip(paintings, folders, strict=True)
     ]
+    if options.lights_file:
+        for job in jobs:  # where there is no scene to have read it
+            check_files(job.results.files, [Path(options.lights_file)])
+    return jobs
 
 
 def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
@@ -236,8 +240,11 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
         if not is_name(name):
             how = "choose one with -o" if len(names) == 1 else "take it alone, with -o"
             raise OutputError(f"{one_line(repr(name))} is no name for a folder: {how}")
-    if len(set(names)) < len(names):
-        raise OutputError(f"results would overwrite each other: {some_names(names)}")
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise OutputError(
+            f"results would overwrite each other in {some_names(twice)}: give those of one name "
+            "a command each, with another -o"
+        )
     return [(output or Path()) / name for name in names]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from lightpaint.cli.option_groups import (
     add_budget,
     add_cache,
+    add_force,
     add_lights,
     add_output,
     add_resolution,
@@ -82,6 +83,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     )
     add_paintings(parser)
     add_output(parser, "DIR", "result folder (default: named after the target)")
+    add_force(parser)
     add_method(parser)
     add_unit(parser)
     add_lights(parser)
@@ -102,6 +104,7 @@ def _relight(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("lightings", metavar="lighting.json", nargs="+", help="as solve left them")
     add_sampling(parser)
     add_output(parser, "DIR", "result folder (default: named after the lighting's target)")
+    add_force(parser)
 
 
 def _verify(parser: argparse.ArgumentParser) -> None:

@@ -116,8 +116,9 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
             config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
         config.validate()
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+        said = first_line(error, of=source or None)
         named = f"OCIO={source}" if source else "the built-in configuration"
-        raise ViewError(f"{named} is no OpenColorIO configuration: {first_line(error)}") from error
+        raise ViewError(f"{named} is no OpenColorIO configuration: {said}") from error
     finally:
         ocio.SetLoggingLevel(loudness)
     return ocio, config

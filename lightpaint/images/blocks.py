@@ -1,4 +1,8 @@
-"""Images of one picture at two sizes, one a whole multiple of the other."""
+"""Images of one picture at two sizes: a pixel of the smaller is a block of pixels of the larger.
+
+Blocks are squares, laid side by side from the top left corner on. What is left at the right and at
+the bottom, always less than a block, belongs to none. So sizes alone tell which pixel is which.
+"""
 
 from typing import Any
 
@@ -11,25 +15,52 @@ Size = tuple[int, int]
 
 
 def whole_factor(larger: Size, smaller: Size) -> int | None:
-    """By which whole number both sides of `larger` exceed those of `smaller`; None if by none.
+    """Side of the largest blocks of which `larger` has as many as `smaller` has pixels.
 
-    Both are (height, width) or both (width, height).
+    Both are (height, width) or both (width, height). None if no blocks are that many.
     """
-    factor = larger[0] // smaller[0]
-    return factor if factor >= 1 and larger == (smaller[0] * factor, smaller[1] * factor) else None
+    factor = min(larger[0] // smaller[0], larger[1] // smaller[1])
+    return factor if factor >= 1 and blocks_in(larger, factor) == smaller else None
+
+
+def blocks_in(size: Size, factor: int) -> Size:
+    """How many blocks of factor x factor pixels fit into an image of that size, on each side."""
+    return size[0] // factor, size[1] // factor
+
+
+def left_over(size: Size, factor: int) -> Size:
+    """How many pixels on each side are in no block of factor x factor."""
+    return size[0] % factor, size[1] % factor
+
+
+def covered(image: Floats, smaller: Size) -> Floats:
+    """What of `image` the pixels of one of the size `smaller` show, a whole number of blocks."""
+    factor = whole_factor(image.shape[:2], smaller) or 1
+    return image[: smaller[0] * factor, : smaller[1] * factor]
 
 
 def block_mean(image: Floats, factor: int) -> Floats:
-    """Means over blocks of factor x factor pixels, in the precision of `image`.
+    """Means over blocks of factor x factor pixels, in the precision of `image`, (h, w, …).
 
-    image: (h, w, …), both sides divisible by `factor`. A box-filtered render at 1/factor of
-    the size estimates just that.
+    A box-filtered render with a pixel for each block estimates just that.
     """
     if factor == 1:
         return image
-    height, width, *rest = image.shape
-    blocks = image.reshape(height // factor, factor, width // factor, factor, *rest)
+    blocks = _in_blocks(image, factor)
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64).astype(image.dtype))
+
+
+def block_pixels(image: Floats, factor: int) -> Floats:
+    """The pixels of each block apart, (factor², h', w', …), of an image (h, w, …)."""
+    blocks = np.moveaxis(_in_blocks(image, factor), (1, 3), (0, 1))
+    return blocks.reshape(factor * factor, *blocks.shape[2:])
+
+
+def _in_blocks(image: Floats, factor: int) -> Floats:
+    """(h', factor, w', factor, …), of an image (h, w, …)."""
+    (height, width), rest = blocks_in(image.shape[:2], factor), image.shape[2:]
+    whole = image[: height * factor, : width * factor]
+    return whole.reshape(height, factor, width, factor, *rest)
 
 
 def enlarged(image: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
+from lightpaint.files import one_line
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
 from lightpaint.screen import shortly, some_names
@@ -100,4 +101,7 @@ def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
             f"{path} carries no {HALF_DIFFERENCE} layer, so its noise is unknown: "
             "give an image that lightpaint rendered"
         )
-    return Estimate(part.rgb(), part.rgb(HALF_DIFFERENCE)), part.attributes
+    try:
+        return Estimate(part.rgb(), part.rgb(HALF_DIFFERENCE)), part.attributes
+    except ImageError as error:
+        raise ImageError(f"{path} is damaged: {one_line(str(error))}") from None

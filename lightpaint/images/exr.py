@@ -124,7 +124,7 @@ def read_parts(path: Path) -> list[Part]:
         try:
             parts = OpenEXR.File(str(path), separate_channels=True).parts
         except Exception as error:
-            raise ImageError(f"{path} is damaged: {first_line(error)}") from error
+            raise ImageError(f"{path} is damaged: {first_line(error, of=path)}") from error
     if len(parts) != len(declared):
         raise ImageError(
             f"{path} is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
@@ -140,7 +140,7 @@ def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
         declared = [(part.name(), dict(part.header)) for part in header.parts]
         _windows(declared[0][1])
     except Exception as error:
-        raise ImageError(_why_unreadable(path, first_line(error))) from error
+        raise ImageError(_why_unreadable(path, first_line(error, of=path))) from error
     return declared
 
 
@@ -239,7 +239,7 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
         try:
             OpenEXR.File(exr_parts).write(str(beside))
         except RuntimeError as error:  # the library's word for a full disk and the like
-            raise OutputError(f"cannot write {path}: {first_line(error)}") from error
+            raise OutputError(f"cannot write {path}: {first_line(error, of=beside)}") from error
 
 
 def rgb_channels(image: Floats, layer: str = "") -> dict[str, Floats]:

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from lightpaint.errors import ImageError
-from lightpaint.files import file_length
+from lightpaint.files import file_length, is_utf_8, one_line
 
 #: How files begin, what people call them, and the kind as which they are read; "" if they are not.
 BEGINNINGS = (
@@ -29,6 +29,8 @@ BEGINNINGS = (
 
 def head_of(path: Path, length: int) -> bytes:
     """How an image file begins. Raises ImageError if there is none that can be read."""
+    if not is_utf_8(path):  # as all libraries want it that read pixels
+        raise ImageError(f"{one_line(str(path))} is not a name in UTF-8: rename the file")
     file_length(path, "image file", ImageError, limit=sys.maxsize)
     try:
         with path.open("rb") as file:

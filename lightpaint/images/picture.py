@@ -1,5 +1,7 @@
 """A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,7 +18,6 @@ from lightpaint.images.exr import Part, read_parts
 from lightpaint.images.exr_layers import ALPHA_NAMES, Layer, choose_layer
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.layered import LAYERED, layered_kind, read_merged
-from lightpaint.screen import some_names
 
 Mask = npt.NDArray[np.bool_]
 
@@ -79,12 +80,13 @@ def read_picture(
     kind = file_kind(path)
     try:
         if kind == "exr":
-            return _of_layer(choose_layer(read_parts(path), layer))
-        if layer is not None:
-            raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
-        return _of_bitmap(_bitmap(path, kind), TransformChoice.of(transform), otherwise)
-    except ImageError as error:
-        raise ImageError(_naming(path, error)) from error
+            parts = read_parts(path)
+            with _naming(f"{path}"):
+                return _of_layer(choose_layer(parts, layer))
+        with _naming(f"{path}"):
+            if layer is not None:
+                raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
+            return _of_bitmap(_bitmap(path, kind), TransformChoice.of(transform), otherwise)
     except MemoryError:
         raise ImageError(f"{path} takes more memory than there is") from None
     except OSError as error:
@@ -100,21 +102,11 @@ def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
     path = Path(path)
     kind = file_kind(path)
     try:
-        if kind != "exr":
-            return _mask_of(_bitmap(path, kind))
-        parts = read_parts(path)
-        if len(parts) > 1:
-            raise ImageError(
-                f"has {len(parts)} parts ({some_names(p.name for p in parts)}), and which of them "
-                "is the mask cannot be told: export a single image"
-            )
-        part = parts[0].in_display_window()
-        for name in ("Y", "W", "A", "R"):
-            if name in part.channels:
-                return part.channels[name].astype(np.float32)
-        raise ImageError(f"has none of the channels Y, W, A, R: it has {some_names(part.channels)}")
-    except ImageError as error:
-        raise ImageError(f"mask {_naming(path, error)}") from error
+        parts = read_parts(path) if kind == "exr" else []
+        with _naming(f"mask {path}"):
+            return _mask_in(parts) if parts else _mask_of(_bitmap(path, kind))
+    except MemoryError:
+        raise ImageError(f"{path} takes more memory than there is") from None
     except OSError as error:
         raise ImageError(f"cannot read mask {path}: {error.strerror or error}") from error
 
@@ -219,6 +211,19 @@ def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
     return np.where(partial, np.float32(0), alpha), (note,)
 
 
+def _mask_in(parts: Sequence[Part]) -> npt.NDArray[np.float32]:
+    if len(parts) > 1:
+        raise ImageError(
+            f"has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of them is "
+            "the mask cannot be told: export a single image"
+        )
+    part = parts[0].in_display_window()
+    for name in ("Y", "W", "A", "R"):
+        if name in part.channels:
+            return part.channels[name].astype(np.float32)
+    raise ImageError(f"has none of the channels Y, W, A, R: it has {', '.join(part.channels)}")
+
+
 def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
     scale = np.float32(bitmap.codes or 1)
     mask = bitmap.values.max(axis=-1) / scale
@@ -241,9 +246,13 @@ def _looks_straight(image: Floats, alpha: Floats) -> bool:
     return bool((image.any(axis=-1) & clear).sum() > clear.sum() / 2)
 
 
-def _naming(path: Path, error: ImageError) -> str:
-    """The message, beginning with the file unless it is named already.
+@contextmanager
+def _naming(file: str) -> Iterator[None]:
+    """Begin what is said of a file, `is damaged`, with its name.
 
     It may say names of the file's own, which may hold what a terminal obeys.
     """
-    return str(error) if str(path) in str(error) else f"{path} {one_line(str(error), limit=2000)}"
+    try:
+        yield
+    except ImageError as error:
+        raise ImageError(f"{file} {one_line(str(error), limit=2000)}") from error

@@ -36,6 +36,8 @@ class Certificate:
         colors: How free lamps were to change their colour: `free`, `gentle` or `white`.
         noise_removed: Share of the noise that was taken out of the equations.
         software: What it was computed with, where that is known.
+        basis_spp: Samples per pixel of the basis it was solved with, of the first of several views;
+            None where nobody knows of any.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -60,6 +62,7 @@ class Certificate:
     colors: str = "free"
     noise_removed: float = 0.0
     software: Software | None = None
+    basis_spp: int | None = None
 
     __repr__ = shortly
 

@@ -20,7 +20,7 @@ FORMAT = "lightpaint-lighting 1"
 READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
 
 #: Fields of a certificate that say how the lighting was found, where it is not the paper's way.
-FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software")
+FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
 
 
 def write_lighting(path: str | Path, lighting: Lighting) -> None:

@@ -202,6 +202,7 @@ def _solution(
         colors=problem.fit.colors or "free",
         noise_removed=problem.noise_removed,
         software=Software.here(),
+        basis_spp=problem.basis.origin.spp if problem.basis.knows_noise else None,
     ).of(problem.objective(weights), problem.norm2)
     asked = [(label, False) for label in labels]
     if any(labels):

@@ -41,7 +41,7 @@ class Candidates:
 
     @classmethod
     def of(cls, basis: Basis, solution: Solution, added: Basis) -> "Candidates":
-        """added: images of candidates, at the size of `basis` or a whole part of it.
+        """added: images of candidates, of the size of `basis`, or of blocks of its pixels.
 
         Lights in it that are fixed are no candidates. Raises SizeError for other sizes.
         """
@@ -50,7 +50,7 @@ class Candidates:
         if factor is None:
             raise SizeError(
                 f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
-                f"{basis.size[0]}: render them at a whole part of its size"
+                f"{basis.size[0]}: render them on blocks of its pixels"
             )
         image, importance = _reduced(solution.image, solution.weight, factor)
         free = ~added.is_fixed

@@ -107,8 +107,7 @@ def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, fl
     except RuntimeError:
         return [None] * len(places)
     inside = np.broadcast_to(np.array(seen.pdf) > 0, len(places))
-    height, width = scene.size
-    uv = np.array(seen.uv).reshape(2, -1).T / (width, height)
+    uv = np.array(seen.uv).reshape(2, -1).T / np.array(camera.film().crop_size())
     return [
         (float(x), float(y)) if ok and 0 <= x <= 1 and 0 <= y <= 1 else None
         for (x, y), ok in zip(uv, inside, strict=True)

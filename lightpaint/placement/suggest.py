@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Floats, Position, as_rgb
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.render import render_basis, why_not_one_pass
+from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.lighting.solution import Solution
@@ -22,7 +23,7 @@ from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, f
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.xml_edit import tag
-from lightpaint.scene.film import reductions
+from lightpaint.scene.film import reduction_to
 from lightpaint.scene.lights import free_names
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
@@ -37,8 +38,8 @@ TRIED, FEWEST = (96, 48, 24, 0), 8
 #: How many more than are asked for are looked at closer: the best of few is not near the best.
 BESIDE = 5
 
-#: Pixels of the film that candidates are rendered on, where it can be reduced; values of all
-#: their images; camera samples of a pass.
+#: Pixels that candidates are rendered on, where it can be so few; values of all their images;
+#: camera samples of a pass.
 PIXELS, VALUES, SAMPLES = 2**14, 2**24, 2**19
 
 #: What is missed of a painting, RMS, below which its lights can do it.
@@ -123,20 +124,15 @@ def suggest_lights(
 
 
 def _on_small_film(scene: Scene, basis: Basis) -> Scene:
-    """`scene` on a film that is a whole part of that of `basis`, as near to PIXELS as can be."""
-    height, width = scene.size
-    fitting = [
-        k
-        for k in reductions(scene.film)
-        if whole_factor(basis.size, (height // k, width // k)) is not None
-    ]
-    if not fitting:
+    """`scene` on a film whose pixels are blocks of those of `basis`, PIXELS or fewer."""
+    (height, width), (mine_h, mine_w) = scene.size, basis.size
+    if whole_factor(scene.size, basis.size) is None:
         raise SceneError(
-            f"the basis is {basis.size[1]}x{basis.size[0]}, which is no whole part of the film "
+            f"the basis is {mine_w}x{mine_h}, whose pixels are no blocks of those of the film "
             f"of {scene.path}, {width}x{height}: make it again"
         )
-    enough = (k for k in fitting if height * width <= PIXELS * k * k)
-    return scene.reduced(f"1/{next(enough, fitting[-1])}")
+    on_its_film = scene.reduced(f"{mine_w}x{mine_h}")
+    return on_its_film.reduced(f"1/{reduction_to(on_its_film.film, PIXELS)}")
 
 
 def _most(small: Scene, tried: int) -> int:

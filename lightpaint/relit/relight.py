@@ -69,6 +69,25 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     return relit
 
 
+def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
+    """Make the relit XML at `path` right for `home`, where it is to be moved, with all beside it.
+
+    Only relative paths change, and only where the two do not have the same place among folders.
+    Returns whether they do.
+    """
+
+    def ways(to: Path) -> list[str]:
+        folder = Path(os.path.realpath(to.parent))
+        return [os.path.relpath(file.resolve(), folder) for file in scene.files]
+
+    if ways(path) == ways(home):
+        return False
+    for file, content in relit_files(scene_of(scene, lighting), lighting.emission, home).items():
+        if isinstance(content, bytes):
+            write_bytes(path.parent / file.relative_to(home.parent), content)
+    return True
+
+
 def check_relightable(scene: Scene, path: Path) -> list[Path]:
     """Raise what `relight` would raise for some lighting, before a render is paid for.
 

@@ -32,7 +32,7 @@ class Verification(Shown):
     """How far prediction and verification are apart.
 
     Attributes:
-        verified: The independent render. Where the prediction is smaller by a whole factor, all
+        verified: The independent render. Where pixels of the prediction are blocks of its own, all
             else is about its block means, at the size (h, w) of the prediction.
         z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
         z_rms: Root mean square of the differences of 8x8 blocks in their own standard errors. About
@@ -84,7 +84,8 @@ class Verification(Shown):
 def compare(predicted: Estimate, verified: Estimate) -> Verification:
     """Judge the difference of two independent estimates of one picture.
 
-    verified: of the size of `predicted`, or larger by a whole factor. Raises SizeError else.
+    verified: of the size of `predicted`, or with a block of pixels for each of its. Raises
+    SizeError else.
     """
     factor = whole_factor(verified.size, predicted.size)
     if factor is None:

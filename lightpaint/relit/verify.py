@@ -21,7 +21,7 @@ def verify(
     """Render the relit scene with samples no basis ever uses, and compare.
 
     Args:
-        predicted: Of the size of `relit`, or smaller by a whole factor.
+        predicted: Of the size of `relit`, or on a reduced film of it.
         relit: What `relight` returns.
         spp: Samples per pixel of `relit` (the scene's own number by default).
         seed: Any number >= 0.

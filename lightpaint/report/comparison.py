@@ -10,8 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display import to_8_bit
-from lightpaint.images.blocks import block_mean, enlarged
-from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.images.blocks import block_mean, enlarged, whole_factor
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.pictures import (
     diverging,
@@ -54,13 +53,13 @@ def comparison_image(
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
-    predicted, verified: (h, w, 3) linear, the latter possibly larger by a whole factor; what
+    predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target; pixels that do not
     count are grey, dim and hatched. Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    current = combine(basis, Lighting.present(basis)).image
+    current = basis.present_look
     transform = transform_of(target, predicted, verified)
     share = float(painted(target, solution).mean())
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
@@ -77,7 +76,8 @@ def comparison_image(
         ),
     ]
     if verified is not None:
-        factor = verified.shape[0] // predicted.shape[0]
+        factor = whole_factor(verified.shape[:2], predicted.shape[:2])
+        assert factor is not None
         gap = predicted.astype(np.float64) - block_mean(verified, factor)
         rmse = float(np.sqrt(np.square(gap).mean()))
         tiles.append(
@@ -96,51 +96,57 @@ def comparison_image(
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     """Tiles in a row on neutral grey, captions below. Returns (H, W, 3).
 
-    The size of the largest tile is a whole multiple of the others'.
+    Pixels of the others are whole blocks of those of the largest tile.
     """
     height, width = max(tile.picture.shape[:2] for tile in tiles)
     zoom = max(1, -(-NARROWEST // width))
     height, width = height * zoom, width * zoom
-    text = min(max(width // 24, 12), 28)
-    gap = text
-    size = (gap + len(tiles) * (width + gap), gap + height + 4 * text)
+    # As large beside any picture, but for panoramas, that are low, and what could not be read.
+    text = gap = max(12, min(width // 24, height // 6))
+    lines = 5.5 if any(tile.limit is not None for tile in tiles) else 4
+    size = (gap + len(tiles) * (width + gap), gap + height + round(lines * text))
     sheet = Image.new("RGB", size, SURROUND)
     for k, tile in enumerate(tiles):
         x = gap + k * (width + gap)
-        picture = enlarged(to_8_bit(tile.picture), width // tile.picture.shape[1])
+        factor = whole_factor((height, width), tile.picture.shape[:2])
+        picture = enlarged(to_8_bit(tile.picture), factor or zoom)
         sheet.paste(Image.fromarray(picture), (x, gap))
-        _caption(ImageDraw.Draw(sheet), tile, (x, gap + height + text // 2), width, text)
-        if tile.limit is not None:
-            _scale_bar(sheet, tile.limit, (x, gap + height + text // 2), width, text)
+        _caption(sheet, tile, (x, gap + height + text // 2), width, text)
     return np.asarray(sheet)
 
 
 def _caption(
-    draw: ImageDraw.ImageDraw, tile: Tile, corner: tuple[int, int], width: int, text: int
+    sheet: Image.Image, tile: Tile, corner: tuple[int, int], width: int, text: int
 ) -> None:
-    x, y = corner
+    """A line of title, a smaller one of detail and, for a false-colour picture, one of scale."""
+    (x, y), draw = corner, ImageDraw.Draw(sheet)
     title, small = ImageFont.load_default(text), ImageFont.load_default(round(0.8 * text))
-    # The residual's upper line leaves its right half to the scale bar.
-    room = width if tile.limit is None else width // 3
-    draw.text((x, y), fitted(tile.title, title, room), TEXT, title)
+    draw.text((x, y), fitted(tile.title, title, width), TEXT, title)
     draw.text((x, y + round(1.5 * text)), fitted(tile.detail, small, width), FAINT, small)
+    if tile.limit is not None:
+        _scale_bar(sheet, tile.limit, (x, y + round(2.9 * text)), width, small)
 
 
 def _scale_bar(
-    sheet: Image.Image, limit: float, corner: tuple[int, int], width: int, text: int
+    sheet: Image.Image, limit: float, corner: tuple[int, int], width: int, font: Any
 ) -> None:
-    """A bar from −limit to +limit in the right part of the caption, its ends in numbers."""
-    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(round(0.8 * text))
-    low, high = f"too dark -{limit:g}", f"+{limit:g} too bright"
-    right = corner[0] + width
-    x = right - round(draw.textlength(high, font))
-    draw.text((x, corner[1] + text // 5), high, FAINT, font)
-    length = width // 6
-    bar = to_8_bit(diverging(np.linspace(-1, 1, length)))[None].repeat(round(0.7 * text), axis=0)
-    x -= length + text // 3
-    sheet.paste(Image.fromarray(bar), (x, corner[1] + round(0.3 * text)))
-    x -= round(draw.textlength(low, font)) + text // 3
-    draw.text((x, corner[1] + text // 5), low, FAINT, font)
+    """A bar from −limit to +limit between its ends in words, or in numbers where there is no room.
+
+    corner: the upper left one of the line, which is `width` long.
+    """
+    (x, y), draw, gap = corner, ImageDraw.Draw(sheet), round(font.size / 2)
+    for low, high in (
+        (f"too dark -{limit:g}", f"+{limit:g} too bright"),
+        (f"-{limit:g}", f"+{limit:g}"),
+    ):
+        ends = [round(font.getlength(end)) for end in (low, high)]
+        length = min(width - sum(ends) - 2 * gap, width // 3)
+        if length >= width // 6:
+            break
+    bar = to_8_bit(diverging(np.linspace(-1, 1, length)))[None].repeat(round(0.9 * font.size), 0)
+    draw.text((x, y), low, FAINT, font)
+    sheet.paste(Image.fromarray(bar), (x + ends[0] + gap, y + round(0.2 * font.size)))
+    draw.text((x + ends[0] + length + 2 * gap, y), high, FAINT, font)
 
 
 def fitted(words: str, font: Any, width: int) -> str:

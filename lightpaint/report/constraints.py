@@ -8,7 +8,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure
-from lightpaint.report.html import row, share_cell, table
+from lightpaint.report.html import SHOWN, SPARE, row, share_cell, table
 from lightpaint.report.sentences import spoken_percent
 from lightpaint.report.verdict import relative_residual
 
@@ -50,14 +50,17 @@ def _curve(solution: Solution, free: Solution) -> str:
     curve = solution.certificate.curve
     if not curve:
         return ""
-    used = _used(solution)
+    used, near = _used(solution), list(curve)
+    if len(curve) > SHOWN + SPARE:
+        near = sorted(sorted(curve, key=lambda point: abs(point[0] - used))[: SHOWN - 1])
     told = [
-        (f"{_lights(count)}{', as asked' if count == used else ''}", missed)
-        for count, missed in curve
+        *((_lights(count) + ", as asked" * (count == used), missed) for count, missed in near),
+        ("without constraints", relative_residual(free)),
+        *((_lights(count), missed) for count, missed in curve if (count, missed) not in near),
     ]
-    told.append(("without constraints", relative_residual(free)))
     rows = [row(what, share_cell(spoken_percent(x), min(x, 1.0))) for what, x in told]
-    return table(("lights on, the best that were found", "missed"), rows)
+    heads = ("lights on, the best that were found", "missed")
+    return f"<div>{table(heads, rows, shown=len(near) + 1)}</div>"
 
 
 def _numbers(basis: Basis, solution: Solution, transform: ViewTransform) -> str:
@@ -75,13 +78,10 @@ def _figures(
     basis: Basis, pictures: list[tuple[Doubles, str, str]], transform: ViewTransform
 ) -> str:
     """Pictures of weights (n, 3), each with its name and a caption."""
-    height, width = basis.size
-    factor = max(1, width // WIDTH)
-    whole = (slice(height // factor * factor), slice(width // factor * factor))
+    factor = max(1, min(basis.size[1] // WIDTH, *basis.size))
     figures = []
     for weights, name, caption in pictures:
-        # What does not make a whole block at the border is left out; it is for looking at.
-        image = block_mean(basis.mix(weights)[whole], factor)
+        image = block_mean(basis.mix(weights), factor)
         pixels = transform.encode(np.asarray(image, np.float32))
         figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
     return "".join(figures)

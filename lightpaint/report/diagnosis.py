@@ -13,8 +13,8 @@ from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure, signed_scale
-from lightpaint.report.html import row, share_cell, table
-from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
+from lightpaint.report.html import folded, listed, name_of, row, share_cell, table
+from lightpaint.report.pictures import FINEST_SCALE, coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
     brightness,
     how_sure,
@@ -26,8 +26,11 @@ from lightpaint.report.sentences import (
 )
 from lightpaint.report.verdict import energy_shares
 
-#: Rows of a table, beyond which only those that matter most are shown.
-ROWS = 8
+#: Headings of the table of errors, and rows of it and of that of bounds that are not folded.
+SURE, ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6
+
+#: Headings of the table of what holds lights back.
+BOUNDS = ("light", "held by", "less missed<br>without that", "at first")
 
 #: Bounds with a smaller share of the miss are not worth a row.
 SMALLEST_GAIN = 0.002
@@ -45,27 +48,27 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
     rows = [
         row(
-            escape(basis.names[k]),
+            name_of(basis.names[k]),
             f"{solved[k]:.3g}",
             f"{low[k]:.3g} … {high[k]:.3g}",
             spoken[k] if np.isfinite(errors[k]) else "–",
             f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
         )
-        for k in order[:ROWS]
+        for k in order
         if errors[k] > 0
     ]
-    more = int((errors > 0).sum()) - len(rows)
-    others = f" {more} lights that matter less are left out." if more > 0 else ""
+    meaning = (
+        "<p>The table shows the brightness of each light, and between which values many samples "
+        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
+        "yet make up for each other in the picture.</p>"
+    )
     return (
         '<section><h2>How sure</h2><div class="explained">'
         f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
-        "<p>The table shows the brightness of each light, and between which values many samples "
-        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
-        "yet make up for each other in the picture: together these errors miss about "
-        f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).{others}</p>"
-        f"{_steps(solution)}</div>"
-        f"{table(('light', 'solved', '95 % between', 'of it', 'of the picture'), rows)}"
-        "</div></section>"
+        "<p>Together these errors miss about "
+        f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).</p>"
+        f"{_steps(solution)}{folded('How to read the table', meaning)}</div>"
+        f"<div>{table(SURE, rows, kind='sure', shown=ROWS)}</div></div></section>"
     )
 
 
@@ -108,6 +111,7 @@ def _shares(diagnosis: Diagnosis) -> str:
         ("out of reach of any mix", d.unreachable),
         (f"forbidden: {by_what}", d.forbidden),
         *([("noise of the basis", d.noise)] if d.noise > 0 else []),
+        *([("noise of the painting", d.painting_noise)] if d.painting_noise > 0 else []),
     ]
     if d.compromise > 0:
         parts.insert(2, ("given up for the other views", d.compromise))
@@ -117,7 +121,7 @@ def _shares(diagnosis: Diagnosis) -> str:
         times = d.ignored / d.total if d.total > 0 else np.inf
         told = f"{times:.2g} times as much" if np.isfinite(times) else "all"
         rows.append(row("besides, where it does not count", told))
-    return f"<table><tbody>{''.join(rows)}</tbody></table>"
+    return f'<table class="shares"><tbody>{"".join(rows)}</tbody></table>'
 
 
 def _maps(
@@ -136,11 +140,7 @@ def _maps(
             + " So is what other views ask for." * (diagnosis.compromise > 0),
         ),
     ]
-    counted = solution.importance > 0
-    sizes = [np.abs(luminance(image))[counted] for _, image, _ in parts]
-    limit = round_up(
-        max(float(np.percentile(np.concatenate(sizes), 99)), 0.01 * 2.0**-transform.stops)
-    )
+    limit = maps_limit(solution, diagnosis, transform=transform)
     share = coverage(solution.importance)[..., None]
     grey = unpainted_look(current, transform=transform)
     figures = []
@@ -168,10 +168,18 @@ def _maps(
     return "".join(figures)
 
 
+def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTransform) -> float:
+    """The end of the scale of all maps of what is missed."""
+    counted = solution.importance > 0
+    maps = (diagnosis.unreachable_map, diagnosis.forbidden_map)
+    sizes = np.concatenate([np.abs(luminance(image))[counted] for image in maps])
+    return round_up(max(float(np.percentile(sizes, 99)), FINEST_SCALE * 2.0**-transform.stops))
+
+
 def _bounds(diagnosis: Diagnosis) -> str:
     rows = [
         row(
-            escape(", ".join(bound.lights)),
+            listed(bound.lights),
             escape(_held_by(bound)),
             spoken_percent(diagnosis.gained(bound)),
             f'<td class="rgb">{_multiplier(bound)}</td>',
@@ -182,16 +190,18 @@ def _bounds(diagnosis: Diagnosis) -> str:
     if not rows:
         return ""
     more = diagnosis.bounds_left_out
-    others = f" {more} more seem to matter less, and were not looked into." if more else ""
+    others = f"<p>{more} more seem to matter less, and were not looked into.</p>" if more else ""
+    meaning = (
+        "<p>What would be gained if one of these alone were let go, and all others stayed. "
+        "A light that is kept, locked, limited, coloured or tied would then have any emission; one "
+        "that is off for no other reason would go below zero and so take light away: a hint at "
+        "which other lights spill where they should not.</p><p>At first: how the objective would "
+        "change, per unit, if that which holds were raised a little.</p>"
+    )
     return (
         '<div class="explained" style="margin-top: 32px"><div><h3>What holds the lights back</h3>'
-        "<p>What would be gained if one of these alone were let go, and all others stayed. "
-        "A light that is kept, locked, "
-        "limited, coloured or tied would then have any emission; one that is off for no other "
-        "reason would go below zero and so take light away: a hint at which other lights spill "
-        f"where they should not.{others}</p><p>At first: how the objective would change, per unit, "
-        "if that which holds were raised a little.</p></div>"
-        f"{table(('light', 'held by', 'less missed<br>without that', 'at first'), rows)}</div>"
+        f"{others}{folded('How to read the table', meaning)}</div>"
+        f"<div>{table(BOUNDS, rows, kind='bounds', shown=ROWS)}</div></div>"
     )
 
 
@@ -204,4 +214,4 @@ def _held_by(bound: Bound) -> str:
 def _multiplier(bound: Bound) -> str:
     numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
     per = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
-    return f"{', '.join(numbers)}<small>per {per.get(bound.per, 'present brightness')}</small>"
+    return f"{', '.join(numbers)} <small>per {per.get(bound.per, 'present brightness')}</small>"

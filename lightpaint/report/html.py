@@ -1,14 +1,58 @@
 """Pieces of HTML that several parts of the report are made of. What goes in is escaped before."""
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
 
-def table(headings: Iterable[str], rows: Iterable[str]) -> str:
-    """A table under its headings."""
+class Html(str):
+    """What is HTML already, where text is escaped."""
+
+
+#: Rows of a table, or names of a list, that are shown of many, and how many more are not worth a
+#: fold.
+SHOWN, SPARE = 10, 3
+
+
+def table(
+    headings: Iterable[str], rows: Sequence[str], *, kind: str = "", shown: int = SHOWN
+) -> str:
+    """A table under its headings, those rows first that matter most; of many the rest is folded.
+
+    kind: its class. It scrolls by itself where it is wider than the page.
+    """
     heads = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
-    return f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+    def part(rows: Iterable[str]) -> str:
+        return (
+            f'<div class="scroll" tabindex="0"><table class="{kind}"><thead><tr>{heads}</tr>'
+            f"</thead><tbody>{''.join(rows)}</tbody></table></div>"
+        )
+
+    if len(rows) <= shown + SPARE:
+        return part(rows)
+    return part(rows[:shown]) + folded(f"{len(rows) - shown} more", part(rows[shown:]))
+
+
+def folded(summary: str, content: str) -> str:
+    """Content that opens if it is asked for, or if the browser's search finds something in it."""
+    return f'<details class="more"><summary>{summary}</summary>{content}</details>'
+
+
+def name_of(name: str) -> Html:
+    """A name, escaped here, that may break behind what joins its words, and in very long ones."""
+    words = re.findall(r"[^_./-]{1,14}[_./-]*|[_./-]+", name, re.DOTALL)
+    return Html("<wbr>".join(map(escape, words)))
+
+
+def listed(names: Sequence[str]) -> Html:
+    """Names with commas, escaped here; of many the rest is folded."""
+    first, more = names, ""
+    if len(names) > SHOWN + SPARE:
+        first, rest = names[:SHOWN], names[SHOWN:]
+        more = folded(f"and {len(rest)} more", ", ".join(map(name_of, rest)))
+    return Html(", ".join(map(name_of, first)) + more)
 
 
 def row(name: str, *cells: str) -> str:
@@ -30,5 +74,6 @@ def share_cell(text: str, share: float) -> str:
 
 
 def facts(told: Iterable[tuple[str, Any]]) -> str:
-    """Terms and what they are, escaped here."""
-    return "".join(f"<dt>{escape(k)}</dt><dd>{escape(str(v))}</dd>" for k, v in told)
+    """Terms and what they are, escaped here unless it is HTML."""
+    texts = ((k, v if isinstance(v, Html) else escape(str(v))) for k, v in told)
+    return "".join(f"<dt>{escape(k)}</dt><dd>{v}</dd>" for k, v in texts)

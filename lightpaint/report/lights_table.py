@@ -14,56 +14,99 @@ from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.photometry import Photometry
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
-from lightpaint.report.html import share_cell
-from lightpaint.report.sentences import spoken_errors, unreached_channels
+from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
+from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
 from lightpaint.report.verdict import energy_shares
+
+#: Headings of the columns, with the classes of their cells.
+COLUMNS = (
+    ("thumb", "alone"),
+    ("name", "light"),
+    ("colour", "colour"),
+    ("rgb now", "emission now<br>R, G, B"),
+    ("rgb new", "solved<br>R, G, B"),
+    ("unit", "parameter"),
+    ("rgb amount", "{amounts}"),
+    ("change", "luminance"),
+    ("share", "share of the<br>picture’s energy"),
+)
 
 
 def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:
-    """One row per light, in document order."""
+    """One row per light, in document order; of many those that do most, and the rest folded.
+
+    What a light does is its part of the picture's energy, now or as solved, whichever is more.
+    """
+    rows = _rows(basis, solution, uncertainty)
+    if len(rows) <= SHOWN + SPARE:
+        return _table(rows, solution)
+    shares = np.maximum(
+        energy_shares(basis, solution.lighting), energy_shares(basis, Lighting.present(basis))
+    )
+    most = np.sort(np.argsort(-shares, kind="stable")[:SHOWN])
+    rest = np.setdiff1d(np.arange(len(rows)), most)
+    told = (
+        f"{len(rest)} more lights, none of which is more than "
+        f"{spoken_percent(float(shares[rest].max()))} of the picture, now or as solved"
+    )
+    return (
+        f"<p>The {len(most)} that do most in the picture, now or as solved.</p>"
+        + _table([rows[k] for k in most], solution)
+        + folded(told, _table([rows[k] for k in rest], solution))
+    )
+
+
+def _table(rows: list[str], solution: Solution) -> str:
+    amounts = "flux<br>(relative)" if solution.lighting.cd_per_unit is None else "output"
+    heads = "".join(
+        f'<th scope="col" class="{kind}">{heading.format(amounts=amounts)}</th>'
+        for kind, heading in COLUMNS
+    )
+    return (
+        '<div class="scroll" role="region" aria-labelledby="lights" tabindex="0">'
+        f'<table class="lights"><thead><tr>{heads}</tr></thead><tbody>{"".join(rows)}</tbody>'
+        "</table></div>"
+    )
+
+
+def _rows(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> list[str]:
     shares = energy_shares(basis, solution.lighting)
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in solution.lighting.lights}
     rows = []
     for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
-        share = shares[k]
         picture, stops = thumbnail(image, basis.emitters_seen)
         name, setting = escape(light.name), settings[light.name]
-        error = f"<small>{errors[k]}</small>" if errors[k] else ""
+        error = f" <small>{errors[k]}</small>" if errors[k] else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
             f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
             f'width="{picture.shape[1]}" height="{picture.shape[0]}" alt="{what}" '
             f'title="{what}"></td>'
-            f'<th scope="row">{name}<small>{escape(light.plugin)}'
+            f'<th scope="row" class="name">{name_of(light.name)}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
-            f"{_emission_cells(light, setting, solution.lighting.photometry(setting))}"
-            f"<td>{change(light, setting)}{error}{_asked(setting)}</td>"
-            f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
+            f"{_emission_cells(light, setting, solution.lighting)}"
+            f'<td class="change">{change(light, setting)}{error}{_asked(setting)}</td>'
+            f"{share_cell(f'{100 * shares[k]:.1f} %', shares[k])}</tr>"
         )
-    return "".join(rows)
+    return rows
 
 
-def amounts_heading(solution: Solution) -> str:
-    """What stands in the column of fluxes: lumen where the scene has a scale, else no unit."""
-    if solution.lighting.cd_per_unit is None:
-        return "flux<br>(relative)"
-    return "output"
-
-
-def _emission_cells(light: BasisLight, setting: LightSetting, seen: Photometry) -> str:
+def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:
     """Colour, emission before and after, their unit, and what an eye makes of it."""
+    seen = lighting.photometry(setting)
     if light.is_fixed:
-        return '<td></td><td class="rgb"></td><td class="rgb"></td><td class="unit"></td><td></td>'
+        return "".join(f'<td class="{kind}"></td>' for kind, _ in COLUMNS[2:7])
     return (
         f'<td class="colour">{_swatch(setting, seen)}</td>'
-        f'<td class="rgb">{_rgb(light.emission)}</td>'
-        f'<td class="rgb">{_rgb(setting.emission, setting.reached)}</td>'
-        f'<td class="unit">{escape(light.parameter)}<small>{escape(light.unit)}</small></td>'
-        f'<td class="rgb">{_amounts(seen)}</td>'
+        f'<td class="rgb now">{_rgb(light.emission)}</td>'
+        f'<td class="rgb new">{_rgb(setting.emission, setting.reached)}</td>'
+        f'<td class="unit">{escape(light.parameter)} <small>{escape(light.unit)}</small></td>'
+        f'<td class="rgb amount{" flux" * (lighting.cd_per_unit is None)}">{_amounts(seen)}</td>'
     )
 
 
@@ -86,13 +129,13 @@ def _changed(light: BasisLight, setting: LightSetting) -> str:
     if before == 0:
         return "was off, now on"
     stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
-    return f"×{after / before:.3g}<small>{stops}</small>"
+    return f"×{after / before:.3g} <small>{stops}</small>"
 
 
 def _asked(setting: LightSetting) -> str:
     """What was asked of a light, and whether that holds it."""
     holds = " (holds it)" if setting.is_active else ""
-    return f"<small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
+    return f" <small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
 
 
 def hex_color(emission: RGB) -> str | None:
@@ -107,19 +150,19 @@ def _swatch(setting: LightSetting, seen: Photometry) -> str:
     emission = setting.emission
     color = seen.hex or hex_color(emission)
     if color is None or not any(emission):
-        return '<span class="swatch none"></span><small>off</small>'
+        return '<span class="swatch none"></span> <small>off</small>'
     kelvin = "" if seen.kelvin is None else f"{seen.kelvin:.0f} K"
     away = "" if seen.duv is None else f"Duv {seen.duv:+.3f}".replace("-", "−")
     return (
         f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
-        f"{f'<small>{kelvin}</small><small>{away}</small>' if kelvin else ''}"
+        f"{f' <small>{kelvin}</small> <small>{away}</small>' if kelvin else ''}"
     )
 
 
 def _amounts(seen: Photometry) -> str:
     """Luminous quantity and flux; without a scale, the flux in proportion."""
     if seen.luminous is not None or seen.flux_lm is not None:
-        return "<br>".join(filter(None, seen.amounts))
+        return " <br>".join(filter(None, seen.amounts))
     return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
 
 
@@ -128,4 +171,4 @@ def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
     if not any(emission):
         return "off"
     told = zip(emission, reached, strict=True)
-    return "<br>".join(f"{v:.4g}" if tells else f"({v:.4g})" for v, tells in told)
+    return " <br>".join(f"{v:.4g}" if tells else f"({v:.4g})" for v, tells in told)

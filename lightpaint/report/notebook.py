@@ -18,7 +18,7 @@ from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.colour.display import choose_exposure, to_8_bit
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import enlarged
+from lightpaint.images.blocks import covered, enlarged
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.lighting import Lighting
@@ -124,7 +124,7 @@ def look_html(
     images = [_on_grey(target.image, target.importance), predicted.image]
     names = ["target", "predicted"]
     if verification is not None:
-        images.append(verification.verified.image)
+        images.append(covered(verification.verified.image, predicted.size))
         names.append("verified")
     transform = target.transform or _transform(images[-1])
     said = verdict(solution, predicted, verification)

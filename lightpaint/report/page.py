@@ -12,10 +12,10 @@ from string import Template
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import covered
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
@@ -23,8 +23,8 @@ from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.figures import Picture, maps, wipe
-from lightpaint.report.lights_table import amounts_heading, lights_table
-from lightpaint.report.pictures import target_picture, transform_of
+from lightpaint.report.lights_table import lights_table
+from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.verdict import verdict
@@ -54,7 +54,7 @@ def report_page(
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    current = combine(basis, Lighting.present(basis)).image
+    current = basis.present_look
     verified = None if verification is None else verification.verified.image
     transform = transform_of(target, predicted.image, verified)
     looks = _looks(target, solution, current, predicted.image, verified, transform=transform)
@@ -77,7 +77,6 @@ def report_page(
         ),
         sure=sure_section(basis, solution, uncertainty),
         lights=lights_table(basis, solution, uncertainty),
-        amounts=amounts_heading(solution),
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, predicted, verification),
@@ -111,7 +110,7 @@ def _looks(
         ),
     ]
     if verified is not None:
-        shown = transform.encode(verified)
+        shown = transform.encode(covered(verified, predicted.shape[:2]))
         looks.append(Picture("verified", "An independent render of the relit scene.", shown))
     return looks
 
@@ -140,7 +139,7 @@ def _notes(remarks: list[str]) -> str:
 def _exposure(transform: ViewTransform, predicted: Floats) -> str:
     """How linear light became these pictures, and what of it they cannot show."""
     at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
-    clipped = float((predicted.max(axis=-1) > transform.white).mean())
+    clipped = brighter_than_white(predicted, transform)
     text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."

@@ -42,6 +42,11 @@ def transform_of(target: Target, predicted: Floats, verified: Floats | None) -> 
     )
 
 
+def brighter_than_white(image: Floats, transform: ViewTransform) -> float:
+    """Share of the pixels of a linear picture that a display cannot show."""
+    return float((image.max(axis=-1) > transform.white).mean())
+
+
 def coverage(importance: Floats) -> Floats:
     """How much of a pixel to show as painted, (h, w) in [0, 1].
 

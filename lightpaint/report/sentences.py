@@ -1,5 +1,8 @@
 """In plain sentences: how sure the answer is, and why it does not look like the painting."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 
 from lightpaint.arrays import Doubles
@@ -12,7 +15,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.verdict import energy_shares
-from lightpaint.screen import some_names, some_of
+from lightpaint.screen import some_of
 
 CHANNELS = ("red", "green", "blue")
 
@@ -21,6 +24,9 @@ SMALL = 0.05
 
 #: The same of a light that is switched off: it is easily switched on.
 SMALLER = 0.01
+
+#: Characters of names in a sentence.
+NAMES = 120
 
 #: What the painting and the light there must differ by to be called another colour.
 SEEN = 0.06
@@ -89,20 +95,27 @@ def unreached_channels(light: LightSetting) -> str:
 
 def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     """What more samples would change, of the light whose error changes the picture most."""
-    shares = energy_shares(basis, solution.lighting)
-    errors = relative_errors(uncertainty)
-    effect = np.where(np.isfinite(errors), errors, 0) * shares
-    if not effect.any():
+    k = most_uncertain(basis, solution, uncertainty)
+    if k is None:
         has_noise = bool(basis.half_differences.any())
         why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
         return f"More samples would change no light: {why}."
-    k = int(np.argmax(effect))
-    light = f"light {solution.lighting.lights[k].name}, {spoken_percent(shares[k])} of the picture"
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
+    name = solution.lighting.lights[k].name
+    light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
     return (
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
     )
+
+
+def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:
+    """The light whose error changes the picture most; None where none does."""
+    errors = relative_errors(uncertainty)
+    effect = np.where(np.isfinite(errors), errors, 0) * energy_shares(basis, solution.lighting)
+    return int(np.argmax(effect)) if effect.any() else None
 
 
 def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
@@ -133,6 +146,7 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
         else "what is asked of the lights, or zero, forbids": d.forbidden,
         "is given up for the other views": d.compromise,
         "is noise of the basis": d.noise,
+        noise_of_painting(d): d.painting_noise,
     }
     told = [
         (d.share(energy), what)
@@ -152,10 +166,29 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     return sentences
 
 
+def noise_of_painting(diagnosis: Diagnosis) -> str:
+    """Whose that noise is: where nothing is known of the basis' own, it may be its as well."""
+    if diagnosis.noise > 0:
+        return "is noise of the painting, as renders have"
+    return "is noise of the painting or of the lights' images"
+
+
+def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
+    """`light key`, `lights key, fill`, or `light_3` alone where that says what it is.
+
+    start: of a sentence. Of very many the first are named, and how many there are.
+    """
+    listed = some_of([name or "without a name" for name in names], room=NAMES)
+    if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
+        return listed
+    word = "light" if len(names) == 1 else "lights"
+    return f"{word.capitalize() if start else word} {listed}"
+
+
 def spoken_bound(bound: Bound, share: float) -> str:
     """What holds a light, and which share of the miss that is."""
     is_one = len(bound.lights) == 1
-    lights = f"Light {bound.lights[0]} is" if is_one else f"Lights {some_names(bound.lights)} are"
+    lights = spoken_lights(bound.lights, start=True) + (" is" if is_one else " are")
     if bound.kind == "zero":
         return (
             f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "

@@ -9,14 +9,14 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.painting import left_out
 from lightpaint.lighting.software import Software, version
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
-from lightpaint.report.html import facts, row
+from lightpaint.report.html import facts, listed, row
 from lightpaint.report.sentences import partly_reached
 from lightpaint.report.verdict import (
+    brighter_as_allowed,
     codes_missed,
     linear_residual,
     relative_residual,
@@ -81,7 +81,7 @@ def render_table(
     seen = int(basis.emitters_seen.sum())
     out = int(left_out(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
     adjusted = int((~basis.is_fixed).sum())
-    told = [
+    told: list[tuple[str, str]] = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
@@ -92,9 +92,9 @@ def render_table(
     told += _fitted(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:
-            told.append(("Kept as they are", ", ".join(light.members)))
+            told.append(("Kept as they are", listed(light.members)))
     if q.unreached:
-        told.append(("Reach nothing painted", f"{', '.join(q.unreached)} (kept as they are)"))
+        told.append(("Reach nothing painted, so kept", listed(q.unreached)))
     for channels in partly_reached(solution.lighting):
         told.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
@@ -121,17 +121,10 @@ def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
                 f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
             ),
         ]
-    loss = solution.problem.loss
-    if isinstance(loss, PaintingLoss) and loss.at_least[solution.importance > 0].any():
-        its = loss.at_least & (solution.importance > 0)[..., None]
-        brighter = its & (predicted.image > loss.painted)
-        told.append(
-            (
-                "Painted as at least so bright",
-                f"{its.any(axis=-1).sum()} pixels, {brighter.any(axis=-1).sum()} of which are "
-                "brighter now",
-            )
-        )
+    if (at_least := brighter_as_allowed(solution, predicted.image)) is not None:
+        pixels, brighter = at_least
+        text = f"{pixels} pixels, {brighter} of which are brighter now"
+        told.append(("Painted as at least so bright", text))
     return [*told, ("Linear problems solved", f"{q.rounds}, each certified")]
 
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 
@@ -68,6 +69,17 @@ def codes_missed(solution: Solution) -> float:
     """What is missed in display space, RMS over pixels and channels, in codes of 255."""
     mean = sum(solution.certificate.objective) / (3 * float(solution.importance.sum()))
     return 255 * float(np.sqrt(mean))
+
+
+def brighter_as_allowed(solution: Solution, predicted: Floats) -> tuple[int, int] | None:
+    """Pixels painted as at least so bright, and how many of them are brighter; None if none are."""
+    loss = solution.problem.loss
+    if not isinstance(loss, PaintingLoss):
+        return None
+    its = loss.at_least & (solution.importance > 0)[..., None]
+    brighter = its & (predicted > loss.painted)
+    pixels = int(its.any(axis=-1).sum())
+    return (pixels, int(brighter.any(axis=-1).sum())) if pixels else None
 
 
 def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:

@@ -1,7 +1,9 @@
-"""The film of a sensor, whole or reduced by a factor so that each pixel is a block of the whole's.
+"""The film of a sensor, whole or reduced so that each pixel is a block of the whole's pixels.
 
 Only then is a box-filtered render on the small film the block mean of one on the large, and a
-painting or a verification of full size can be compared with it exactly.
+painting or a verification of full size can be compared with it exactly. Where film, crop window
+and offset are whole multiples of the blocks, Mitsuba's own film is made smaller. Any other stays
+as it is, its crop window cut down to whole blocks, and a pixel is what is rendered in a block.
 """
 
 import math
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
-from lightpaint.images.blocks import whole_factor
+from lightpaint.images.blocks import blocks_in, left_over, whole_factor
 from lightpaint.screen import some_names
 
 #: Pixels of a film and its samples per pixel beyond which each is a mistake.
@@ -27,13 +29,15 @@ NAMED = 8
 class Film:
     """The film of a sensor: size of the whole and of the crop window within, in pixels.
 
-    sensor: its index among the scene's own. All pairs are (x, y).
+    sensor: its index among the scene's own. block: side of the blocks of its pixels that are the
+    pixels of the picture. All pairs are (x, y).
     """
 
     sensor: int
     size: tuple[int, int]
     crop_size: tuple[int, int]
     crop_offset: tuple[int, int]
+    block: int = 1
 
     @classmethod
     def of(cls, camera: Any, sensor: int) -> "Film":
@@ -45,17 +49,33 @@ class Film:
         )
         return cls(sensor, size, crop_size, offset)
 
+    @property
+    def pixels(self) -> tuple[int, int]:
+        """Size of the picture."""
+        return blocks_in(self.crop_size, self.block)
+
+    @property
+    def left_out(self) -> tuple[int, int]:
+        """Columns at the right and rows at the bottom that make no whole block."""
+        return left_over(self.crop_size, self.block)
+
+    @property
+    def block_pixels(self) -> int:
+        """Pixels of Mitsuba's film in a pixel of the picture: so many samples it takes at least."""
+        return self.block**2
+
     def load(self) -> Any:
-        """A box-filtered RGB float32 film of this size, as Mitsuba has it."""
+        """A box-filtered RGB float32 film of all blocks, as Mitsuba has it."""
         import mitsuba as mi
 
+        width, height = (side * self.block for side in self.pixels)
         return mi.load_dict(
             {
                 "type": "hdrfilm",
                 "width": self.size[0],
                 "height": self.size[1],
-                "crop_width": self.crop_size[0],
-                "crop_height": self.crop_size[1],
+                "crop_width": width,
+                "crop_height": height,
                 "crop_offset_x": self.crop_offset[0],
                 "crop_offset_y": self.crop_offset[1],
                 "pixel_format": "rgb",
@@ -65,10 +85,19 @@ class Film:
         )
 
 
-def reductions(film: Film) -> list[int]:
-    """The factors that divide film and crop window, ascending from 1."""
+def even_reductions(film: Film) -> list[int]:
+    """The factors that leave nothing of film and crop window over, ascending from 1."""
     common = math.gcd(*film.size, *film.crop_size, *film.crop_offset)
     return [factor for factor in range(1, common + 1) if common % factor == 0]
+
+
+def reduction_to(film: Film, pixels: int) -> int:
+    """The smallest factor that brings `film` to so many pixels, or one near that leaves no rest."""
+    width, height = film.pixels
+    enough = math.isqrt(max(width * height - 1, 0) // pixels) + 1
+    smallest = min(enough, width, height)
+    even = (k for k in even_reductions(film) if smallest <= k < 2 * smallest)
+    return next(even, smallest)
 
 
 def check_resolution(resolution: str) -> re.Match[str]:
@@ -82,41 +111,46 @@ def check_resolution(resolution: str) -> re.Match[str]:
 def reduction(film: Film, resolution: str) -> int:
     """The factor that `resolution`, `1/4` or `320x180`, means for `film`.
 
-    A size is that of the image, so of the crop window. Raises SceneError if it is neither,
-    or if film or crop window are not whole multiples of it.
+    A size is that of the picture. Raises SceneError if no blocks of pixels are that many.
     """
     given = check_resolution(resolution)
     part, width, height = (int(number or 0) for number in given.groups())
     factor = part if given[1] else None
     if width and height:
-        factor = whole_factor(film.crop_size, (width, height))
-    possible = reductions(film)
-    if factor not in possible:
-        whole = "x".join(map(str, film.crop_size))
-        sizes = [f"{_size(film, k)} (1/{k})" for k in possible[1 : NAMED + 1]]
+        factor = whole_factor(film.pixels, (width, height))
+    if not factor or factor > min(film.pixels):
+        whole = "x".join(map(str, film.pixels))
         raise SceneError(
-            f"a film of {whole} cannot be reduced to {resolution}, since its parts must be whole "
-            f"blocks of pixels: {', '.join(sizes) or 'only its full size'} will do"
+            f"a film of {whole} cannot be reduced to {resolution}, since its parts must be square "
+            f"blocks of pixels: {_possible(film, width)} will do"
         )
     return factor
 
 
+def _possible(film: Film, width: int) -> str:
+    """Sizes that `film` can be reduced to: near a `width` if it is not 0, and without a rest."""
+    near = film.pixels[0] // width if width else 2
+    factors = [*range(max(near, 2), near + 3), *even_reductions(film)[1 : NAMED + 1]]
+    sizes = {
+        k: f"{'x'.join(map(str, blocks_in(film.pixels, k)))} (1/{k})"
+        for k in factors
+        if k <= min(film.pixels)
+    }
+    return ", ".join(sizes[k] for k in sorted(sizes)) or "only its full size"
+
+
 def reduced(film: Film, factor: int) -> Film:
-    """`film` on a film that is smaller by one of its `reductions`."""
-
-    def part(pair: tuple[int, int]) -> tuple[int, int]:
-        return pair[0] // factor, pair[1] // factor
-
+    """`film` in blocks of factor x factor pixels, or in the largest that are as many."""
+    small = blocks_in(film.pixels, factor)
+    factor = whole_factor(film.pixels, small) or factor
+    if film.block > 1 or factor not in even_reductions(film):
+        return replace(film, block=film.block * factor)
     return replace(
         film,
-        size=part(film.size),
-        crop_size=part(film.crop_size),
-        crop_offset=part(film.crop_offset),
+        size=blocks_in(film.size, factor),
+        crop_size=small,
+        crop_offset=blocks_in(film.crop_offset, factor),
     )
-
-
-def _size(film: Film, factor: int) -> str:
-    return "x".join(str(side // factor) for side in film.crop_size)
 
 
 def check_film(path: Path, film: Film, spp: int) -> None:

@@ -18,6 +18,9 @@ KEPT = {
 #: Integrators that only hand on what others render, which stand inside them.
 WRAPPERS = ("aov", "moment")
 
+#: How long paths are where nobody says, if not without end.
+DEPTHS = {"prb": 6, "prb_basic": 6, "prb_projective": 6, "prbvolpath": 6}
+
 _CHOICE = re.compile(r"([a-z]\w*)(?::(.*))?", re.DOTALL)
 _OPTION = re.compile(r"([a-z]\w*)=(\S+)")
 
@@ -95,7 +98,7 @@ def read_integrator(state: Any, path: Any) -> Integrator:
     samples = (props.get("emitter_samples", shading), props.get("bsdf_samples", shading))
     return Integrator(
         props.plugin_name(),
-        int(props.get("max_depth", -1)),
+        int(props.get("max_depth", DEPTHS.get(props.plugin_name(), -1))),
         int(props.get("rr_depth", 5)),
         bool(props.get("hide_emitters", False)),
         (int(samples[0]), int(samples[1])),

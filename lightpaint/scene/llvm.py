@@ -112,6 +112,7 @@ def _probe(path: Path, origin: str) -> Llvm:
             text=True,
             timeout=60,
             check=False,
+            start_new_session=True,  # or Ctrl-C would say that it cannot be used
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return Llvm(path, origin, None, f"cannot be tried: {error}")

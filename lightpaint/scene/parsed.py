@@ -15,7 +15,7 @@ from typing import Any
 
 from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
-from lightpaint.files import one_line
+from lightpaint.files import one_line, unnamed
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.xml import check_nodes, check_xml
 from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
@@ -176,6 +176,19 @@ class ParsedScene:
             other.names[k] = name
         return other
 
+    def moved(self, old: Path, new: Path) -> "ParsedScene":
+        """This scene, all of whose files in the folder `old` are about to be moved to `new`."""
+        import mitsuba as mi
+
+        other = copy(self)
+        other.path = new / self.path.relative_to(old)
+        other.files = tuple(moved(file, old, new) for file in self.files)
+        other.resolver = mi.FileResolver(self.resolver)
+        other.resolver.clear()
+        for k in range(len(self.resolver)):
+            other.resolver.append(str(moved(Path(str(self.resolver[k])), old, new)))
+        return other
+
     def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
         """(file, whether its values are linear as they stand) of the image that emitter emits."""
         texture = child_named(self.state, node, parameter)
@@ -234,6 +247,17 @@ class ParsedScene:
             mi.set_file_resolver(before)
 
 
+def moved(path: Path, old: Path, new: Path) -> Path:
+    """Where `path` leads when the folder `old` has been moved to `new`, by a way that lasts."""
+    if ".." not in path.parts and path.is_relative_to(old):
+        return new / path.relative_to(old)
+    real, gone = Path(os.path.realpath(path)), Path(os.path.realpath(old))
+    if real.is_relative_to(gone):
+        return Path(os.path.realpath(new)) / real.relative_to(gone)
+    # The way there may lead through the old folder.
+    return real if gone.name in path.parts else path
+
+
 @contextmanager
 def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Iterator[None]:
     """Turn what Mitsuba throws into one line: its own words, without its source places.
@@ -249,13 +273,22 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
             f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
         ) from None
     except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
-        text = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", str(error))
-        if "str_from_cstr" in text:  # the binding's word for it
-            text = "it, or a file that it refers to, has a name that is not UTF-8"
-        text = one_line(text, limit=MAX_SAID)
+        text = one_line(_without_places(str(error), path), limit=MAX_SAID)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
         hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
         if "integrator plugin" in text:
             hint = f"; that is the integrator that was asked for, {instead}"
             hint = hint if instead else '; integrator="path" renders it with another'
         raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error
+
+
+def _without_places(said: str, path: Path) -> str:
+    """Mitsuba's words without places in its source, and without the file where that is `path`."""
+    if "str_from_cstr" in said:  # the binding's word for it
+        return "it, or a file that it refers to, has a name that is not UTF-8"
+    said = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", said)
+    file = re.escape(str(path))
+    said = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", said)
+    said = re.sub(rf'Error while loading XML file "{file}": ', "", said)
+    said = re.sub(rf'Parsing of XML file "{file}" failed', "it is no XML", said)
+    return unnamed(said, path)

@@ -8,7 +8,7 @@ preview saves pixels before it saves samples.
 from dataclasses import dataclass
 from typing import Literal
 
-from lightpaint.scene.film import Film, reductions
+from lightpaint.scene.film import Film, reduction_to
 from lightpaint.scene.scene import Scene
 
 Quality = Literal["preview", "final"]
@@ -16,19 +16,14 @@ Quality = Literal["preview", "final"]
 
 @dataclass(frozen=True)
 class Preset:
-    """spp: samples per pixel. pixels: what the film is reduced to, where it divides so."""
+    """spp: samples per pixel. pixels: how many a film is reduced to at most, where it can be."""
 
     spp: int
     pixels: int | None = None
 
     def reduction(self, film: Film) -> int:
-        """The smallest factor that brings `film` to `pixels`, else the largest there is."""
-        if self.pixels is None:
-            return 1
-        width, height = film.crop_size
-        possible = reductions(film)
-        small = (k for k in possible if width * height <= self.pixels * k * k)
-        return next(small, possible[-1])
+        """The factor that brings `film` to `pixels`."""
+        return 1 if self.pixels is None else reduction_to(film, self.pixels)
 
 
 PRESETS: dict[Quality, Preset] = {"preview": Preset(64, 2**15), "final": Preset(512)}
@@ -37,7 +32,7 @@ PRESETS: dict[Quality, Preset] = {"preview": Preset(64, 2**15), "final": Preset(
 def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Scene:
     """`scene` on the film that a basis is rendered on: `resolution`, else the preset's.
 
-    Raises SceneError for a resolution that does not divide the film.
+    Raises SceneError for a resolution that the film cannot be reduced to.
     """
     if resolution is None and quality is not None:
         resolution = f"1/{PRESETS[quality].reduction(scene.film)}"

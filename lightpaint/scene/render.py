@@ -9,9 +9,11 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
+from lightpaint.images.blocks import block_mean
 from lightpaint.images.estimate import Estimate
-from lightpaint.progress import Progress, interruptible_between_pieces, silent
+from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
 #: memory is taken for, so passes are short.
@@ -48,22 +50,22 @@ def largest_pass(pixels: int, *, shorter: int = 1) -> int:
 
 
 def plan_passes(
-    pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1
+    pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1, step: int = 1
 ) -> list[tuple[int, int]]:
     """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
 
-    spp: what both halves come to together, or one more to make them equal.
-    done: samples per pixel that each half has already.
+    spp: what both halves come to together, or a little more to make them equal.
+    done: samples per pixel that each half has already. step: they come in multiples of this.
     """
     if spp < 2:
         raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
-    largest = largest_pass(pixels, shorter=shorter)
+    largest = max(1, largest_pass(pixels, shorter=shorter) // step)
     lists = []
     # An interrupt may have left the second half behind: its turn is next.
     for half in (0, 1) if done[0] <= done[1] else (1, 0):
-        left = max(0, -(-spp // 2) - done[half])
+        left = -(-max(0, -(-spp // 2) - done[half]) // step)
         sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
-        lists.append([(half, size) for size in sizes])
+        lists.append([(half, size * step) for size in sizes])
     return [one for pair in zip_longest(*lists) for one in pair if one is not None]
 
 
@@ -103,7 +105,8 @@ def render_loaded(
 ) -> Estimate:
     """As `render`, for a scene that is already loaded."""
     height, width = scene.size
-    passes = plan_passes(height * width, scene.spp if spp is None else spp)
+    step = scene.film.block_pixels
+    passes = plan_passes(height * width, scene.spp if spp is None else spp, step=step)
     halves = np.zeros((2, height, width, 3), np.float64)
     progress(label, 0, len(passes))
     with interruptible_between_pieces() as let_interrupts_through:
@@ -117,12 +120,17 @@ def render_loaded(
 
 
 def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
-    """What the scene's own integrator makes of so many samples per pixel, (h, w, 3)."""
+    """What the scene's own integrator makes of so many samples per pixel, (h, w, 3).
+
+    spp: a multiple of the pixels of a block of the film.
+    """
     import mitsuba as mi
 
+    film = scene.film
+    spp //= film.block_pixels
     image = mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp)
     # Integrators that wrap another add channels of their own behind R, G and B.
-    return np.array(image)[..., :3]
+    return block_mean(np.array(image)[..., :3], film.block)
 
 
 def as_float32(image: Floats) -> Floats:

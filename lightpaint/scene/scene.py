@@ -131,8 +131,8 @@ class Scene(Shown):
 
     @property
     def size(self) -> tuple[int, int]:
-        """(height, width) in pixels of the sensor's film, or of its crop window."""
-        width, height = self.film.crop_size
+        """(height, width) in pixels of the picture: of the sensor's film, or its crop window."""
+        width, height = self.film.pixels
         return height, width
 
     def light(self, name: str) -> Light:
@@ -140,10 +140,10 @@ class Scene(Shown):
         return light_named(name, self.lights, scene=str(self.path))
 
     def reduced(self, resolution: str) -> "Scene":
-        """This scene on a smaller film of the same field of view.
+        """This scene on a smaller film: each pixel is the mean of a square block of pixels.
 
-        resolution: `1/4`, or `320x180`: a part of the film that cuts it into whole blocks of
-        pixels. Raises SceneError, with sizes that would do, for any other.
+        resolution: `1/4`, or `320x180`. What makes no whole block at the right and at the bottom
+        is left out. Raises SceneError, with sizes that would do, for sizes that no blocks have.
         """
         return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 
@@ -187,6 +187,16 @@ class Scene(Shown):
     def originals(self) -> tuple[Path, ...]:
         """All files the scene consists of: XML, meshes, textures, tables."""
         return (*self.files, *self._parsed.assets())
+
+    @property
+    def read_files(self) -> tuple[Path, ...]:
+        """`originals`, and the lights file."""
+        return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
+
+    def moved(self, old: Path, new: Path) -> "Scene":
+        """This scene, when the folder `old`, in which its XML lies, has been moved to `new`."""
+        parsed = self._parsed.moved(old, new)
+        return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
 
     def load(self, emission: Mapping[str, RGB] | None = None) -> Any:
         """The `mi.Scene`, its lights set to `emission` (those not named stay as they are).

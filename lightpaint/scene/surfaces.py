@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.progress import Progress, interruptible_between_pieces, silent
+from lightpaint.images.blocks import block_pixels
+from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 #: Samples of a pixel, each by itself: an index of a shape must not be averaged.
 SAMPLES = 16
@@ -44,19 +46,20 @@ def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent)
 def _surfaces(scene: Scene, loaded: Any, seed: int, progress: Progress) -> Surfaces:
     import mitsuba as mi
 
-    camera, samples = scene.camera(loaded), []
+    camera, block, samples = scene.camera(loaded), scene.film.block, []
+    count = -(-SAMPLES // scene.film.block_pixels)
     integrator = mi.load_dict(
         {"type": "aov", "aovs": "a:albedo,n:sh_normal,p:position,i:shape_index"}
     )
     with interruptible_between_pieces() as let_interrupts_through:
-        for k in range(SAMPLES):
+        for k in range(count):
             seed_k = pass_seed(seed, Stream.SURFACES, k)
             image = mi.render(loaded, sensor=camera, integrator=integrator, spp=1, seed=seed_k)
-            samples.append(np.array(image))
-            progress("surfaces", k + 1, SAMPLES)
+            samples.append(block_pixels(np.array(image), block))
+            progress("surfaces", k + 1, count)
             let_interrupts_through()
     to_world = np.array(camera.world_transform().matrix).reshape(4, 4)
-    return _averaged(np.stack(samples), np.linalg.inv(to_world), _names_by_index(loaded))
+    return _averaged(np.concatenate(samples), np.linalg.inv(to_world), _names_by_index(loaded))
 
 
 def _averaged(

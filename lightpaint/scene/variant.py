@@ -9,6 +9,7 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.scene.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
+from lightpaint.signals import interruptible_between_pieces
 
 FAST_VARIANT = "llvm_ad_rgb"
 PLAIN_VARIANT = "scalar_rgb"
@@ -61,6 +62,13 @@ def use_variant(wanted: str | None = None) -> Backend:
             )
         return _current
 
+    # An interrupt while modules in C++ begin ends the process otherwise than it should.
+    with interruptible_between_pieces():
+        _current = _begun(wanted)
+    return _current
+
+
+def _begun(wanted: str | None) -> Backend:
     needs_llvm = wanted is None or wanted.startswith("llvm")
     llvm = prepare_llvm() if needs_llvm else None
     try:
@@ -76,13 +84,13 @@ def use_variant(wanted: str | None = None) -> Backend:
             import drjit as dr
 
             _check_llvm_in_use(dr, present)
-        _current = Backend(present)
+        backend = Backend(present)
     elif wanted is None:
-        _current = _choose(mi, llvm)
+        backend = _choose(mi, llvm)
     else:
-        _current = _set(mi, wanted, llvm)
+        backend = _set(mi, wanted, llvm)
     mi.set_log_level(mi.LogLevel.Error)
-    return _current
+    return backend
 
 
 def _check_still(backend: Backend) -> None:
@@ -105,7 +113,7 @@ def _choose(mi: Any, llvm: Llvm | None) -> Backend:
         problem = f"no usable LLVM {OLDEST_LLVM} or newer"
     backend = _set(mi, PLAIN_VARIANT, None)
     note = f"{problem}: rendering with {PLAIN_VARIANT}, many times slower; {INSTALL_LLVM}"
-    warnings.warn(note, SlowBackendWarning, stacklevel=4)
+    warnings.warn(note, SlowBackendWarning, stacklevel=5)
     return Backend(backend.variant, note=note)
 
 

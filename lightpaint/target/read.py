@@ -10,15 +10,24 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
+from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
-from lightpaint.target.painted import painted_where
+from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target
-from lightpaint.target.template import Template, find_template, read_template
+from lightpaint.target.template import (
+    LIGHT,
+    SHOWN,
+    Template,
+    find_template,
+    read_template,
+    template_files,
+)
+from lightpaint.target.whole import what_became_of
 
 #: What a brush puts down: how the picture is to look, or the light that is to fall there.
 Paint = Literal["look", "light"]
 
-#: Beyond this share of the picture, a comparison more likely found a conversion than paint.
+#: Share of the picture beyond which it is asked whether that is paint or a conversion.
 NEARLY_ALL = 0.97
 
 #: Times the light of the brightest parts of the template that no lamp is meant to give, and the
@@ -39,6 +48,12 @@ class _Reading:
     folder: Path | None
     transform: ViewTransform | None
     notes: tuple[str, ...]
+
+    @property
+    def painted_on(self) -> str:
+        """How messages call the template: by the file in it that the painting is like."""
+        name = LIGHT if self.picture.codes is None else SHOWN
+        return name if self.folder is None else str(self.folder / name)
 
 
 def read_target(
@@ -103,6 +118,11 @@ def read_target(
         # A layer that was saved alone lay over something; what a mask leaves out does not count.
         over_look=made is not None
         or (picture.transform is not None and picture.alpha is not None and mask is None),
+        files=(
+            reading.path,
+            *([] if mask is None else [Path(mask)]),
+            *([] if reading.folder is None else template_files(reading.folder)),
+        ),
     )
 
 
@@ -127,13 +147,13 @@ def _opened(
         made = read_template(folder)
     otherwise = None if made is None else made.transform
     picture = read_picture(path, layer=layer, transform=asked, otherwise=otherwise)
-    if made is not None and made.size != picture.size:
+    if made is not None and folder is not None and made.size != picture.size:
         if template is not None:
             raise SizeError(
-                f"{path} is {picture.size[1]}x{picture.size[0]} but the template in {folder} is "
-                f"{made.size[1]}x{made.size[0]}: give the one it was painted on"
+                f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN} is "
+                f"{made.size[1]}x{made.size[0]}: give the template it was painted on"
             )
-        notes = (f"not compared with {folder}, which has another size",)
+        notes = (f"not compared with {folder / SHOWN}, which has another size",)
         # It was painted on something else, and so was not shown through its transform either.
         made, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=asked)
@@ -166,17 +186,25 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     importance = painted_where(path, picture, template)
     share = float((importance > 0).mean())
     if share == 0:
+        if path.resolve() == Path(reading.painted_on).resolve():
+            raise TargetError(f"{path} is the template itself: give what was painted over it")
         raise TargetError(
-            f"nothing in {path} differs from the template in {reading.folder}: paint over it, or "
-            "pass find=False if all of it counts"
+            f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
+            "find=False if all of it counts"
         )
-    note = f"{100 * share:.3g} % painted: what differs from the template in {reading.folder}"
-    if share > NEARLY_ALL:
-        note += (
-            "; if you painted less, it was saved through another view or profile (transform=..., "
-            "mask=...), or moved, cropped or flipped"
-        )
+    note = f"{100 * share:.3g} % painted: what differs from {reading.painted_on}"
+    if share > NEARLY_ALL and (said := _of_all(picture, template)):
+        note += f"; {said}"
     return importance, [note]
+
+
+def _of_all(picture: Picture, template: Template) -> str:
+    """What was done to a template of which next to nothing is left, but for painting over it."""
+    transform = picture.transform or template.transform
+    mine, its = (transform.encode(x) for x in (picture.image, template.image))
+    if picture.lossy:  # which leaves the means of a few pixels as they are
+        mine, its = (box_mean(x, SHARP_RADIUS) for x in (mine, its))
+    return what_became_of(mine, its)
 
 
 def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:

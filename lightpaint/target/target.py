@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,7 @@ class Target(Shown):
         transform: What a display showed it through when it was painted; None if nobody knows.
         through_view: Whether its values are those of a display, and not light.
         over_look: Whether it was painted over the current look, which what it leaves is to keep.
+        files: That it was read from: the painting first, then mask and template.
 
     Examples:
         >>> image = np.full((16, 16, 3), 0.5)
@@ -56,6 +58,7 @@ class Target(Shown):
     transform: ViewTransform | None = None
     through_view: bool = False
     over_look: bool = False
+    files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
@@ -190,8 +193,8 @@ class Target(Shown):
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """This target at `size` (height, width) of the basis.
 
-        A whole multiple of that is reduced: so is one that was painted at full size, for a
-        basis on a reduced film. Raises SizeError if it has another size and may not be
+        One that has as many square blocks of pixels is reduced: so is one that was painted at full
+        size, for a basis on a reduced film. Raises SizeError if it has another size and may not be
         resampled.
         """
         if factor := whole_factor(self.size, size):

@@ -1,9 +1,10 @@
 """Something to paint on: the current look, what helps to select in it, and what it was made of."""
 
 import json
+import os
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,16 +14,11 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
-from lightpaint.files import (
-    one_line,
-    read_text,
-    restoring,
-    write_bytes,
-    write_text,
-)
+from lightpaint.files import one_line, read_text, write_bytes, write_text
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
 from lightpaint.images.png import TRANSFORM_KEY, png_bytes, write_png_16
-from lightpaint.records import read_record, strict_json
+from lightpaint.records import fields_of, read_record, strict_json
+from lightpaint.staging import is_below, staged
 
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
@@ -71,7 +67,7 @@ class _Shown:
 
 @dataclass(frozen=True)
 class _About:
-    """What template.json says. size: (width, height)."""
+    """What template.json says. size: (width, height); files: of the template, relative to it."""
 
     format: Literal["lightpaint-template 1"]
     scene: str
@@ -79,6 +75,7 @@ class _About:
     sensor: str
     size: tuple[int, int]
     view: _Shown
+    files: tuple[str, ...] = ()
 
 
 def write_template(
@@ -95,23 +92,22 @@ def write_template(
     Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
     [0, 1]; lights: by name, (h', w', 3) linear, what each does alone.
     """
-    matte_files = [folder / MATTES / f"{name}.png" for name in file_names(mattes)]
-    light_files = [folder / LIGHTS / f"{name}.png" for name in file_names(lights)]
-    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
-    written = [*plain, *matte_files, *light_files]
-    with restoring(folder, [*written, *earlier_files(folder)]):
-        write_look(folder / LIGHT, template.image, template.transform)
+    matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
+    light_files = [f"{LIGHTS}/{name}.png" for name in file_names(lights)]
+    albedo = [] if template.albedo is None else [ALBEDO]
+    written = [LIGHT, SHOWN, *albedo, NORMALS, DEPTH, ABOUT, *matte_files, *light_files]
+    with staged(folder, earlier_files(folder)) as stage:
+        write_look(stage / LIGHT, template.image, template.transform)
         if template.albedo is not None:
-            write_rgb(folder / ALBEDO, template.albedo)
-        write_rgb(folder / NORMALS, normals)
-        write_parts(folder / DEPTH, [Part("depth", {"Y": depth.astype(np.float32)})])
+            write_rgb(stage / ALBEDO, template.albedo)
+        write_rgb(stage / NORMALS, normals)
+        write_parts(stage / DEPTH, [Part("depth", {"Y": depth.astype(np.float32)})])
         for file, matte in zip(matte_files, mattes.values(), strict=True):
-            write_bytes(file, png_bytes(to_8_bit(matte)))
+            write_bytes(stage / file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
-            write_bytes(file, _thumbnail(look, template.transform.name))
-        # Last: a folder without it is no template.
-        write_text(folder / ABOUT, _about(template))
-    return written
+            write_bytes(stage / file, _thumbnail(look, template.transform.name))
+        write_text(stage / ABOUT, _about(template, written))
+    return [folder / name for name in written]
 
 
 def _thumbnail(look: Floats, transform: str) -> bytes:
@@ -121,11 +117,11 @@ def _thumbnail(look: Floats, transform: str) -> bytes:
     return png_bytes(to_8_bit(shown.encode(look)))
 
 
-def _about(template: Template) -> str:
+def _about(template: Template, files: Iterable[str]) -> str:
     height, width = template.size
     shown = _Shown(template.transform.name, template.transform.stops)
     of = (template.scene, template.content, template.sensor)
-    about = asdict(_About(FORMAT, *of, (width, height), shown))
+    about = fields_of(_About(FORMAT, *of, (width, height), shown, tuple(files)))
     return json.dumps(about, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -133,8 +129,28 @@ def earlier_files(folder: Path) -> list[Path]:
     """Those of a template that stands in `folder`; none if it is somebody else's."""
     if not (folder / ABOUT).is_file():
         return []
+    try:
+        named = _read_about(folder).files
+    except (ValueError, LightpaintError):
+        named = ()
+    if named:
+        return [folder / name for name in named if is_below(name)]
     plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
     return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
+
+
+def files_in_the_way(folder: Path) -> list[Path]:
+    """What a template in `folder` may take the place of, an earlier one's files and others'."""
+    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    # What things and lights are called is not known yet.
+    pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
+    there = [*earlier_files(folder), *plain, *pictures]
+    return list(dict.fromkeys(file for file in there if os.path.lexists(file)))
+
+
+def template_files(folder: Path) -> list[Path]:
+    """What is read of the template in `folder`."""
+    return [folder / name for name in (ABOUT, LIGHT, ALBEDO)]
 
 
 def write_look(path: Path, image: Floats, transform: ViewTransform) -> Path:
@@ -148,19 +164,25 @@ def write_look(path: Path, image: Floats, transform: ViewTransform) -> Path:
 def read_template(folder: Path) -> Template:
     """Read what `write_template` wrote. Raises TargetError for anything else."""
     try:
-        text = read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT)
-        about = read_record(_About, strict_json(text), others=True)
+        about = _read_about(folder)
         transform = ViewTransform(about.view.name, about.view.stops)
         image = _read_picture(folder / LIGHT, about.size)
         albedo = None
         if (folder / ALBEDO).exists():
             albedo = _read_picture(folder / ALBEDO, about.size)
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
-        said = one_line(str(error) or type(error).__name__)
+        # Its files are named as they are called in it.
+        said = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
         raise TargetError(
-            f"{folder} is no template: {said}; make one with lightpaint template"
+            f"{folder} is no template: {one_line(said)}; make one with lightpaint template"
         ) from None
     return Template(image, transform, about.scene, about.content, about.sensor, albedo)
+
+
+def _read_about(folder: Path) -> _About:
+    """Raises TargetError where there is none, ValueError for what is none."""
+    text = read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT)
+    return read_record(_About, strict_json(text), others=True)
 
 
 def _read_picture(path: Path, size: tuple[int, int]) -> Floats:

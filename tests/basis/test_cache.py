@@ -1,6 +1,7 @@
 """The cache of bases: found again, gone on with, never mixed, never in the way."""
 
 import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,12 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run
-from renderer import write_room
+from renderer import LIGHTS, same_basis, write_room
 
 from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.basis.render.render import is_on_the_way
+from lightpaint.errors import LightpaintError, SceneError
+from lightpaint.pipeline import obtain
+from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.settings import Settings
 
 
 @pytest.fixture(autouse=True)
@@ -47,6 +54,108 @@ def test_more_samples_are_added(scene: Scene) -> None:
     assert obtain_basis(scene, spp=20).origin.spp == 20
     assert obtain_basis(scene, spp=20).origin.passes == (2, 2)
     assert [entry.origin.spp for entry in cache.entries() if entry.origin] == [20]
+
+
+def _said(scene: Scene, **settings: object) -> tuple[Basis, list[str]]:
+    """The basis that a job with these settings obtains, and what it says."""
+    said: list[str] = []
+
+    class Hears:
+        def __call__(self, *_: object) -> None: ...
+
+        def say(self, text: str) -> None:
+            said.append(text)
+
+    return obtain(scene, Settings(**settings), Hears()), said  # type: ignore[arg-type]
+
+
+def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
+    obtain_basis(scene, spp=32)
+    basis, said = _said(scene, spp=16)
+    assert basis.origin.spp == 32
+    assert said == [
+        "basis of 32 samples per pixel kept from an earlier run: more than the 16 asked for, so "
+        "the answer may differ a little from one of these (exact_spp=True takes just them)"
+    ]
+    # One more than an odd number makes the halves equal, and is no news.
+    for spp in (31, 32):
+        assert "renders it anew" in "".join(_said(scene, spp=spp)[1])
+
+
+def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
+    fresh = obtain_basis(scene, spp=16, use_cache=False)
+    obtain_basis(scene, spp=32)
+    before = [entry.path.read_bytes() for entry in cache.entries()]
+    exact, said = _said(scene, spp=16, exact_spp=True)
+    assert said == []
+    same_basis(exact, fresh)
+    # The one with more samples is not thrown away.
+    assert [entry.path.read_bytes() for entry in cache.entries()] == before
+    cache.clear()
+    obtain_basis(scene, spp=8)
+    same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
+    [entry] = cache.entries()
+    assert entry.origin == fresh.origin
+    log: list[int] = []
+    same_basis(obtain_basis(scene, spp=16, exact_spp=True, progress=passes(log)), fresh)
+    assert log == []
+
+
+@pytest.mark.parametrize("integrator", ["path", "volpathmis"])
+def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
+) -> None:
+    monkeypatch.setattr("lightpaint.scene.render.SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
+    path = write_room(
+        tmp_path, integrator=f'<integrator type="{integrator}"/>', lights=LIGHTS["bulb"]
+    )
+    scene = load_scene(path)
+    whole: list[int] = []
+    fresh = obtain_basis(scene, spp=64, use_cache=False, progress=passes(whole))
+    for after in (2, 3):
+        done = 0
+
+        def press_ctrl_c(_label: str, now: int, _total: int) -> None:
+            nonlocal done
+            done += now > 0
+            if done == after:  # noqa: B023 (called in this round)
+                os.kill(os.getpid(), signal.SIGINT)
+
+        with pytest.raises(Interrupted):
+            obtain_basis(scene, spp=64, exact_spp=True, progress=press_ctrl_c)
+        assert is_on_the_way(scene, *_kept(), 64)
+        log: list[int] = []
+        same_basis(obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log)), fresh)
+        assert 0 < sum(now > 0 for now in log) < max(whole)
+        cache.clear()
+    # One that fewer samples ended has other passes.
+    assert not is_on_the_way(scene, obtain_basis(scene, spp=6, use_cache=False), 64)
+
+
+def _kept() -> list[Basis]:
+    return [read_basis(entry.path) for entry in cache.entries()]
+
+
+def test_exact_samples_and_a_time_go_ill_together(scene: Scene) -> None:
+    with pytest.raises(SceneError, match="not with time_s"):
+        obtain_basis(scene, time_s=1, exact_spp=True)
+    with pytest.raises(LightpaintError, match="exact_spp is True and time_s 1"):
+        Settings(time_s=1, exact_spp=True)
+
+
+def test_a_basis_of_blocks_says_when_it_takes_more(tmp_path: Path) -> None:
+    path = write_room(tmp_path, integrator='<integrator type="volpathmis"/>', lights=LIGHTS["bulb"])
+    small = load_scene(path).reduced("1/3")
+    assert _said(small, spp=4)[1] == [
+        "basis of 18 samples per pixel, not 4: it takes one in each pixel of a block for each half"
+    ]
+    # No fewer can be had.
+    again = (
+        "basis of 18 samples per pixel kept from an earlier run (use_cache=False renders it anew)"
+    )
+    assert _said(small, spp=4)[1] == [again]
+    assert _said(small, spp=36)[1] == []
+    assert "more than the 4 asked for" in _said(small, spp=4)[1][0]
 
 
 def test_another_scene_sensor_or_seed_is_another_basis(scene: Scene, tmp_path: Path) -> None:
@@ -102,7 +211,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
 
 def test_separate_renders_are_kept_as_well(tmp_path: Path) -> None:
     log: list[int] = []
-    path = write_room(tmp_path, integrator='<integrator type="volpath"/>')
+    path = write_room(tmp_path, integrator='<integrator type="volpathmis"/>')
     scene = load_scene(path)
     obtain_basis(scene, spp=4)
     assert obtain_basis(scene, spp=4, progress=passes(log)).origin.spp == 4

@@ -18,6 +18,7 @@ from renderer import LIGHTS, REPOSITORY, write_room
 from lightpaint import paint_with_light
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
+from lightpaint.images.estimate import read_estimate
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
 from lightpaint.results import verify_result
 from lightpaint.scene.scene import load_scene
@@ -35,7 +36,9 @@ RESULTS = {
     "predicted.exr",
     "verified.exr",
     "comparison.png",
+    "report.json",
     "report.html",
+    "result.json",
 }
 
 
@@ -78,7 +81,7 @@ def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: 
     succeed(tmp_path, "relight", CORNELL, *copies, "-o", "looks", "--spp", 4)
     for name in ("one", "two"):
         made = {p.name for p in (tmp_path / "looks" / name).iterdir()}
-        assert made == {"relit.xml", "relit.exr", "relit.png"}
+        assert made == {"relit.xml", "relit.exr", "relit.png", "result.json"}
 
 
 def test_verify_tells_a_tampered_scene(solved: tuple[Path, str], tmp_path: Path) -> None:
@@ -238,8 +241,12 @@ def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
     done = run(tmp_path, *command, "-o", "out")
     assert done.returncode == 0, done.stderr
     # 12 x 12 of 32 x 32 pixels.
-    assert "warmer: 14.1 % painted: what differs from the template in template" in done.stderr
-    assert "nothing in" in refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    assert "warmer: 14.1 % painted: what differs from template/template.png" in done.stderr
+    itself = refused(tmp_path, *command[:2], "template/template.png", *command[3:])
+    assert "template/template.png is the template itself" in itself
+    Image.open(folder / "template.png").save(folder / "same.png")
+    same = refused(tmp_path, *command[:2], "template/same.png", *command[3:])
+    assert "nothing in template/same.png differs from template/template.png" in same
     about = folder / "template.json"
     other = about.read_text(encoding="utf-8").replace('"camera"', '"balcony"')
     about.write_text(other, encoding="utf-8")
@@ -264,7 +271,7 @@ def test_results_of_two_solves_never_stand_together(
     folder = tmp_path / "look"
     shutil.copytree(solved[0], folder)
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
-    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder)
+    succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", folder, "--force")
     left = {p.name for p in folder.iterdir()}
     assert left == (RESULTS - {"relit.xml", "verified.exr"}) | {"notes.txt"}
     # A folder that no solve has written to is not tidied.
@@ -321,7 +328,7 @@ def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
     room = write_room(tmp_path)
     done = spawn(tmp_path, "basis", room, "-m", "scalar_rgb", "--spp", 4, "-D", "width=8")
     assert done.returncode == 0, done.stderr
-    assert "separately" in done.stderr
+    assert "5 times the work; a variant like llvm_ad_rgb renders all in one" in done.stderr
     assert (tmp_path / "room.basis.exr").is_file()
 
 
@@ -607,7 +614,40 @@ def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_pa
     assert "not allowed with" in refused(*refuse, "--time", 3, "--spp", 4)
     assert "not a number of seconds" in refused(*refuse, "--time", 0)
     assert "invalid choice" in refused(*refuse, "--quality", "good")
-    assert "will do" in refused(*refuse, "--resolution", "1/3")
+    assert "will do" in refused(*refuse, "--resolution", "100x100")
     for option in (("--time", 3), ("--quality", "final"), ("--resolution", "1/2")):
         told = refused(tmp_path, "solve", basis_file, WARM, *option)
         assert f"{option[0]} cannot change a saved basis" in told
+
+
+def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(tmp_path: Path):
+    """A painting and its mask of full size, on a film whose sides have no common factor."""
+    write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["beam"])
+    room = (
+        (tmp_path / "room.xml").read_text().replace('"height" value="20"', '"height" value="512"')
+    )
+    (tmp_path / "room.xml").write_text(room)
+    size = ("-D", "width=683")
+    succeed(tmp_path, "template", "room.xml", *size, "-o", "look.exr", "--spp", 2)
+    mask = np.zeros((512, 683), np.float32)
+    mask[200:] = 1
+    write_parts(tmp_path / "mask.exr", [Part("mask", {"Y": mask})])
+    solve = ("solve", "room.xml", "look.exr", "--mask", "mask.exr", *size, "--quality", "preview")
+    done = run(tmp_path, *solve, "--spp", 8)
+    assert done.returncode == 0, done.stderr
+    assert (
+        "film of 683x512 reduced to 170x128 blocks of 4x4 pixels: 3 columns of pixels at the right "
+        "are left over, and nowhere counted" in done.stderr
+    )
+    assert "agree within noise" in done.stdout
+    assert read_estimate(tmp_path / "look" / "predicted.exr")[0].size == (128, 170)
+    assert read_estimate(tmp_path / "look" / "verified.exr")[0].size == (512, 683)
+    # Fewer samples, of what is kept or exactly; both say what they used.
+    for option, spp in ((), 8), (("--exact-spp",), 4):
+        done = run(tmp_path, *solve, "--spp", 4, *option)
+        assert ("more than the 4 asked for" in done.stderr) == (spp == 8)
+        answer = json.loads((tmp_path / "look" / "lighting.json").read_text())
+        assert answer["solve"]["basis_spp"] == spp
+        _, attributes = read_estimate(tmp_path / "look" / "predicted.exr")
+        assert json.loads(attributes["lightpaint.view"])["basis_spp"] == spp
+        assert f"{spp} samples per pixel" in (tmp_path / "look" / "report.html").read_text()

@@ -99,7 +99,8 @@ def test_a_full_disk_leaves_earlier_results_as_they_were(
             (folder / name).write_text(f"the earlier {name}", encoding="utf-8")
         (folder / "notes.txt").write_text("mine", encoding="utf-8")
     was = contents(disk)
-    code, output, errors = run(tmp_path, before, *SMALL_SOLVE, "-o", folder, LIGHTPAINT_CACHE=cache)
+    how = ("-o", folder, "--force")
+    code, output, errors = run(tmp_path, before, *SMALL_SOLVE, *how, LIGHTPAINT_CACHE=cache)
     assert code == 2, output + errors
     [line] = [x for x in errors.splitlines() if x.startswith("lightpaint solve: ")]
     assert f"cannot write {folder}" in line

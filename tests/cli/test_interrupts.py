@@ -16,8 +16,8 @@ from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.scene.scene import load_scene
 
-VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
-INTEGRATORS = {"one pass": PATH, "separate renders": VOLPATH}
+SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
+INTEGRATORS = {"one pass": PATH, "separate renders": SEPARATELY}
 
 #: Samples per pixel: seconds of work, where it goes slowly.
 SPP = {"one pass": 10_000, "separate renders": 1000}
@@ -123,9 +123,15 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     assert len(kept(tmp_path, "stopped")) == 1
 
 
-@pytest.mark.parametrize("delay_s", [0, 0.1])
+@pytest.mark.parametrize(
+    ("number", "delay_s"),
+    [(signal.SIGINT, 0), (signal.SIGINT, 0.1), (signal.SIGTERM, 0.1), (signal.SIGHUP, 0.1)],
+)
 def test_interrupted_before_much_is_done(
-    tmp_path: Path, never_stopped: tuple[str, Path, Basis], delay_s: float
+    tmp_path: Path,
+    never_stopped: tuple[str, Path, Basis],
+    number: signal.Signals,
+    delay_s: float,
 ) -> None:
     _, room, _ = never_stopped
     with start(tmp_path, room, 1_000_000, "cache") as process:
@@ -133,13 +139,79 @@ def test_interrupted_before_much_is_done(
         while not process.stderr.readline().startswith("basis"):
             assert process.poll() is None
         time.sleep(delay_s)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         errors = process.stderr.read()
-        assert process.wait(timeout=60) == 130
+        assert process.wait(timeout=60) == 128 + number
     assert errors.startswith("lightpaint basis: interrupted")
     assert errors.count("\n") == 1
     assert len(kept(tmp_path, "cache")) == ("are kept" in errors)
     assert {p.name for p in tmp_path.iterdir()} <= {"cache"}
+
+
+#: `lightpaint …` that gets a signal just when it imports a module for the first time.
+AT_IMPORT = """
+import os, sys
+module, number = sys.argv.pop(1), int(sys.argv.pop(1))
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), number)
+sys.meta_path.insert(0, Finder())
+from lightpaint.cli import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "number"),
+    [
+        ("lightpaint.cli.parser", signal.SIGINT),
+        ("lightpaint.cli.commands", signal.SIGTERM),
+        ("numpy", signal.SIGINT),
+        ("mitsuba", signal.SIGINT),
+    ],
+)
+def test_interrupted_while_it_imports(tmp_path: Path, module: str, number: signal.Signals) -> None:
+    arguments = [module, str(int(number)), "lights", str(CORNELL)]
+    done = subprocess.run(
+        [sys.executable, "-c", AT_IMPORT, *arguments],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 128 + number
+    assert done.stderr in ("lightpaint: interrupted\n", "lightpaint lights: interrupted\n")
+    assert done.stdout == ""
+
+
+def _ignoring(*numbers: signal.Signals) -> None:
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> None:
+    """Its shell has it ignored; what `nohup` has ignored stays ignored."""
+    room = write_room(tmp_path, lights=LIGHTS["bulb"])
+    command = [sys.executable, "-m", "lightpaint", "basis", str(room), "--spp", "100000000"]
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "LIGHTPAINT_CACHE": str(tmp_path / "cache")},
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: _ignoring(signal.SIGINT, signal.SIGHUP),
+    ) as process:
+        assert process.stderr is not None
+        while not process.stderr.readline().startswith("basis"):
+            assert process.poll() is None
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.5)
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        assert "lightpaint basis: interrupted" in process.stderr.read()
+        assert process.wait(timeout=60) == 130
 
 
 @pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])

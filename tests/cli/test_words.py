@@ -108,6 +108,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     known = {*inspect.signature(Settings).parameters, *inspect.signature(read_target).parameters}
     known |= {*inspect.signature(lightpaint.load_scene).parameters}
     known |= {*inspect.signature(lightpaint.read_light_groups).parameters}
+    known |= {*inspect.signature(lightpaint.paint_with_light).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
     assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= known
 

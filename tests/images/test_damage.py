@@ -20,6 +20,7 @@ from picture_files import P3, SRGB_CURVE, icc, layered, luminance_chroma, para, 
 from PIL import Image
 
 from lightpaint.errors import ImageError
+from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.picture import read_mask, read_picture
 
 RNG = np.random.default_rng(0)
@@ -130,6 +131,50 @@ def test_exr(tmp_path: Path):
     # The other reader has none of luminance and chroma.
     alone = [case for case, said in results if said == "alone" and case.file != "chroma.exr"]
     assert len(alone) < len(results) / 50
+
+
+def test_masks(tmp_path: Path):
+    samples = {**_checked(), **{k: v for k, v in _exrs().items() if k in ("ZIP.exr", "parts.exr")}}
+    masks = {name: content for name, content in samples.items() if name != "parts.exr"}
+    cases = [
+        case
+        for k, (name, content) in enumerate(samples.items())
+        for case in damaged(name, content, k, 60, 60)
+    ]
+    results = outcomes("mask", masks, cases, tmp_path)
+    assert wrong(results) == []
+    assert cut_and_read(results) == []
+
+
+def test_estimates(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    estimate = Estimate(*(rng.random((2, 6, 5, 3), np.float32)))
+    write_estimate(tmp_path / "predicted.exr", estimate, {"lightpaint.view": "{}"})
+    content = (tmp_path / "predicted.exr").read_bytes()
+    cases = list(damaged("predicted.exr", content, 1, 150, 150))
+    renamed = content.replace(b"half_difference.G", b"half_difference.X")
+    cases += [
+        Case("predicted.exr", "no green", content.replace(b"\0G\0", b"\0Q\0")),
+        Case("predicted.exr", "no noise in green", renamed),
+    ]
+    results = outcomes("estimate", {"predicted.exr": content}, cases, tmp_path)
+    assert wrong(results) == []
+    assert [said for case, said in results if case.done.startswith("no ")] == ["refused"] * 2
+
+
+@pytest.mark.parametrize("name", ["is", "a", "damaged", "it"])
+def test_a_name_that_is_a_word_of_the_message(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+):
+    """The file is named all the same, and first."""
+    monkeypatch.chdir(tmp_path)
+    plain = {"type": OpenEXR.scanlineimage}
+    broken = (png(BYTES)[:-20], _tiff(FLOATS)[:-40], _exr((plain, _channels(), "x"))[:-40])
+    for content in (*broken, _exr((plain, {"Z": FLOATS[..., 0].copy()}, "x"))):
+        Path(name).write_bytes(content)
+        for read in (read_picture, read_mask):
+            with pytest.raises(ImageError, match=rf"^(mask )?{name} (is|has) "):
+                read(name)
 
 
 def test_names_in_a_file_that_a_terminal_would_obey(tmp_path: Path):

@@ -219,7 +219,7 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
         half_differences=basis.half_differences[:, :7],
         emitters_seen=basis.emitters_seen[:7],
     )
-    with pytest.raises(SceneError, match="no whole part of the film"):
+    with pytest.raises(SceneError, match="no blocks of those of the film"):
         suggest_lights(scene, other, solution, count=1)
 
 
@@ -236,11 +236,11 @@ def test_what_one_pass_cannot_do_is_refused(
     tmp_path: Path, small_room: Scene, small_room_basis: Any
 ):
     scene = load_scene(write_room(tmp_path, integrator='<integrator type="ptracer"/>'))
-    with pytest.raises(SceneError, match=r"suggesting lights .* the integrator is 'ptracer'"):
+    with pytest.raises(SceneError, match=r"suggesting lights .* the integrator is ptracer"):
         check_suggestible(scene)
     basis = small_room_basis(spp=4)
     solution = solve(basis, _target(np.ones((20, 24, 3))))
-    with pytest.raises(SceneError, match="the integrator is 'ptracer'"):
+    with pytest.raises(SceneError, match="the integrator is ptracer"):
         suggest_lights(scene, basis, solution)
     with pytest.raises(SceneError, match="0 lights cannot be suggested: ask for one or more"):
         suggest_lights(small_room, basis, solution, count=0)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
@@ -16,7 +16,7 @@ from lightpaint.files import write_bytes
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.comparison import SURROUND, comparison_image
+from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
 from lightpaint.report.pictures import (
     DIVERGING,
     coverage,
@@ -100,6 +100,60 @@ def test_a_long_name_stays_below_its_own_picture(make_basis: Any):
     second = int(np.flatnonzero(pictures[1:] & ~pictures[:-1])[1])
     np.testing.assert_array_equal(short[:, second:], long[:, second:])
     assert (short[:, :second] != long[:, :second]).any()
+
+
+FILMS = [(16, 16), (9, 16), (16, 9), (256, 320), (2160, 3840)]
+
+
+@pytest.mark.parametrize(
+    ("size", "limit"),
+    [
+        *((film, limit) for film in FILMS[:4] for limit in (0.2, 0.0002, 1e-12, 5e15)),
+        *((film, 0.002) for film in (FILMS[4], (40, 1000), (1000, 40), (20, 4000))),
+    ],
+)
+def test_captions_do_not_meet(monkeypatch: pytest.MonkeyPatch, size: tuple[int, int], limit: float):
+    drawn: list[tuple[float, float, float, float]] = []
+    text, paste = ImageDraw.ImageDraw.text, Image.Image.paste
+
+    def drawing(draw: Any, xy: Any, words: str, fill: Any, font: Any) -> None:
+        left, top, right, bottom = font.getbbox(words)
+        drawn.append((xy[0] + left, xy[1] + top, xy[0] + right, xy[1] + bottom))
+        text(draw, xy, words, fill, font)
+
+    def pasting(sheet: Any, picture: Any, xy: Any) -> None:
+        drawn.append((*xy, xy[0] + picture.width, xy[1] + picture.height))
+        paste(sheet, picture, xy)
+
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", drawing)
+    monkeypatch.setattr(Image.Image, "paste", pasting)
+    flat = np.broadcast_to(np.float32(0.5), (*size, 3))
+    long = "over the old harbour, version 12, final"
+    tiles = [
+        Tile(f"target: evening {long}", f"31 % painted, the rest hatched {long}", flat),
+        Tile("predicted (agx, exposure +1.5 stops)", "misses 46 % of the target (RMS)", flat),
+        Tile("residual", "luminance, predicted - target", flat, limit),
+    ]
+    height, width, _ = compose(tiles).shape
+    assert len(drawn) == 3 * 3 + 3
+    for k, (left, top, right, bottom) in enumerate(drawn):
+        assert 0 <= left < right <= width
+        assert 0 <= top < bottom <= height
+        # What is of one tile stays below it, but for the pixel that is round a letter.
+        assert any(tile[0] - 1 <= left and right <= tile[2] + 1 for tile in drawn[0:9:3])
+        for other in drawn[:k]:
+            apart = (right <= other[0], other[2] <= left, bottom <= other[1], other[3] <= top)
+            assert any(apart)
+
+
+@pytest.mark.parametrize("size", FILMS)
+def test_text_is_as_large_beside_any_picture(size: tuple[int, int]):
+    """A sheet that is fitted to a screen can be read, however many pixels it has."""
+    flat = np.broadcast_to(np.float32(0.5), (*size, 3))
+    height, width, _ = compose([Tile("a", "b", flat, 0.2)] * 4).shape
+    tile = (width - 5 * max(12, width // 100)) / 4
+    below = height - tile * size[0] / size[1]
+    assert 0.2 < below / tile < 0.45
 
 
 def test_the_exposure_stands_in_the_caption(make_basis: Any):

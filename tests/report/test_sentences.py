@@ -1,5 +1,6 @@
 """What is said in words about noise and about what is missed."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from lightpaint.report.sentences import (
     spoken_bound,
     spoken_difference,
     spoken_hold,
+    spoken_lights,
     spoken_percent,
     spoken_place,
     what_is_missed,
@@ -162,11 +164,41 @@ def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
     page = missed_section(
         solution, replace(found, bounds=(bound,)), current, transform=ViewTransform()
     )
-    assert "−2.5<small>per unit of luminance" in page
+    assert "−2.5 <small>per unit of luminance" in page
     assert "not looked into" not in page
     found = replace(found, bounds=(bound,), bounds_left_out=7)
     page = missed_section(solution, found, current, transform=ViewTransform())
     assert "7 more seem to matter less, and were not looked into" in page
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["key"], "Light key"),
+        (["key", "fill"], "Lights key, fill"),
+        (["light_3"], "light_3"),
+        (["Skylight", "annex_lamp"], "Skylight, annex_lamp"),
+        (["light_3", "key"], "Lights light_3, key"),
+        ([""], "Light without a name"),
+    ],
+)
+def test_lights_are_called_lights_once(names: list[str], words: str):
+    assert spoken_lights(names, start=True) == words
+    if words.startswith("Light"):
+        assert spoken_lights(names) == f"l{words[1:]}"
+    assert spoken_bound(_bound("tie", *names), 0.5).startswith(words)
+
+
+def test_of_hundreds_of_names_the_first_are_said(make_basis: Any):
+    names = [f"spot_{k}" for k in range(302)]
+    said = spoken_bound(_bound("tie", *names), 0.5)
+    assert re.match(r"Lights spot_0, spot_1, .*… and 2\d\d more are on one dimmer", said)
+    assert len(said) < 300
+
+
+def test_a_light_that_is_called_so_is_not_called_twice(make_basis: Any):
+    basis, solution, found, _ = _solved(make_basis, names=["light_1", "light_2", "light_3"])
+    assert re.match(r"More samples would change light_\d, ", how_sure(basis, solution, found))
 
 
 def test_names_are_escaped(make_basis: Any):

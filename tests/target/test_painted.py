@@ -95,7 +95,7 @@ def test_a_file_that_was_only_saved_again_is_no_painting(tmp_path: Path) -> None
     write(tmp_path, template)
     for name in ("p16.png", "p8.png", "p8.tif", "p.jpg", "half.exr", "float.exr"):
         save(tmp_path / name, template.shown, template.transform)
-        with pytest.raises(TargetError, match=r"nothing in .* differs from the template"):
+        with pytest.raises(TargetError, match=r"nothing in .* differs from .*template\.(png|exr):"):
             read_target(tmp_path / name)
         assert read_target(tmp_path / name, find=False).everything
 
@@ -140,7 +140,7 @@ def test_of_another_size(tmp_path: Path) -> None:
     assert target.everything
     assert "another size" in target.notes[0]
     assert "no template is known" in target.notes[1]
-    with pytest.raises(SizeError, match=r"31x17 but the template in .* is 80x60"):
+    with pytest.raises(SizeError, match=r"31x17 but .*template\.png is 80x60"):
         read_target(tmp_path / "p.png", template=tmp_path / "template")
     alpha = np.full((17, 31, 4), 128, np.uint8)
     Image.fromarray(alpha).save(tmp_path / "layer.png")
@@ -266,11 +266,86 @@ def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> Non
         read_target(tmp_path / "crop.exr")
 
 
-def test_nearly_all_painted_is_doubted(tmp_path: Path) -> None:
-    template = template_of()
+def _room() -> Template:
+    """Walls of several colours with light on them that falls off, and the noise of a render."""
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[:90, :120] / 90
+    walls = np.array([(0.6, 0.1, 0.08), (0.7, 0.7, 0.7), (0.1, 0.5, 0.2), (0.3, 0.25, 0.2)])
+    albedo = walls[(x > 0.6).astype(int) + 2 * (y > 0.45 + 0.2 * x)]
+    light = 0.05 + 1.2 / (1 + 6 * np.hypot(x - 0.4, y - 0.3) ** 2)
+    image = albedo * light[..., None] * rng.gamma(60, 1 / 60, (90, 120, 3))
+    return Template(image.astype(np.float32), ViewTransform("srgb"))
+
+
+P3 = np.array([(0.8225, 0.1774, 0), (0.0332, 0.9669, 0), (0.0171, 0.0724, 0.9108)])
+SRGB = ViewTransform("srgb")
+CONVERTED = {
+    "darker": lambda shown, light: 0.8 * shown,
+    "agx": lambda shown, light: ViewTransform("agx", 1.0).encode(light),
+    "filmic": lambda shown, light: ViewTransform("filmic", 1.0).encode(light),
+    "another gamma": lambda shown, light: shown ** (2.2 / 1.8),
+    "linear": lambda shown, light: np.clip(light, 0, 1),
+    "exposure": lambda shown, light: SRGB.encode(2 * light),
+    "a profile": lambda shown, light: SRGB.encode(1.3 * light @ P3.T),
+}
+
+
+@pytest.mark.parametrize("how", CONVERTED)
+@pytest.mark.parametrize("name", ["p8.png", "p.jpg", "half.exr"])
+def test_a_conversion_of_all_of_it_is_doubted(tmp_path: Path, how: str, name: str) -> None:
+    template = _room()
     write(tmp_path, template)
-    save(tmp_path / "p16.png", 0.8 * template.shown, template.transform)
-    assert "another view or profile" in read_target(tmp_path / "p16.png").notes[0]
+    save(tmp_path / name, np.clip(CONVERTED[how](template.shown, template.image), 0, 1), SRGB)
+    [note] = read_target(tmp_path / name).notes
+    assert "through another view or profile (transform=..., mask=...)" in note
+
+
+def _repainted(how: str, shown: np.ndarray) -> np.ndarray:
+    y, x = np.mgrid[: shown.shape[0], : shown.shape[1]]
+    if how == "light from the other side":
+        return shown * (0.2 + 0.6 * x / x.max())[..., None]
+    if how == "a warm glaze on the left":
+        return 0.1 + shown * (1 - 0.9 * np.array([0.1, 0.4, 0.9]) * (1 - x / x.max())[..., None])
+    waves = [0.5 + 0.4 * np.sin(x / 17 + k) * np.cos(y / 11 - k) for k in range(3)]
+    free = np.stack(waves, axis=-1)
+    return free if how == "freely" else 0.4 * shown + 0.6 * free
+
+
+@pytest.mark.parametrize(
+    "how", ["light from the other side", "a warm glaze on the left", "freely", "translucently"]
+)
+@pytest.mark.parametrize("name", ["p8.png", "p.jpg", "half.exr"])
+def test_a_repaint_of_all_of_it_is_not(tmp_path: Path, how: str, name: str) -> None:
+    template = _room()
+    write(tmp_path, template)
+    save(tmp_path / name, np.clip(_repainted(how, template.shown), 0, 1), SRGB)
+    [note] = read_target(tmp_path / name).notes
+    compared = "template.exr" if name.endswith("exr") else "template.png"
+    share, _, rest = note.partition(" % painted: ")
+    assert float(share) > 97
+    assert rest == f"what differs from {tmp_path / compared}"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda shown: shown[:, ::-1], "it is the template mirrored: turn it back"),
+        (lambda shown: shown[::-1, ::-1], "it is the template upside down: turn it back"),
+        (lambda shown: np.roll(shown, (4, -9), (0, 1)), "moved by -9 pixels to the right and 4 d"),
+    ],
+)
+def test_a_template_that_was_moved_is_told(tmp_path: Path, change: object, words: str) -> None:
+    template = _room()
+    write(tmp_path, template)
+    save(tmp_path / "p8.png", change(template.shown), SRGB)  # type: ignore[operator]
+    assert words in read_target(tmp_path / "p8.png").notes[0]
+
+
+def test_the_template_itself_is_no_painting(tmp_path: Path) -> None:
+    write(tmp_path, template_of())
+    for name in ("template.png", "template.exr"):
+        with pytest.raises(TargetError, match=rf"{name} is the template itself: give what was"):
+            read_target(tmp_path / name)
 
 
 def test_paint_as_light_is_multiplied_by_albedo(tmp_path: Path) -> None:

@@ -70,6 +70,12 @@ class LightGroups:
         return len(self.basis.lights) > len(self.layers)
 
     @property
+    def files(self) -> list[Path]:
+        """That they were read from."""
+        read = self.layers if self.beauty is None else (*self.layers, self.beauty)
+        return list(dict.fromkeys(layer.file for layer in read))
+
+    @property
     def is_half(self) -> bool:
         """Whether the file holds no more than float16."""
         return all(layer.is_half for layer in self.layers)

@@ -81,10 +81,15 @@ def passes(
             clock.report()
 
 
-def next_pair(pixels: int, done: tuple[int, int], pairs: int = 1) -> list[tuple[int, int]]:
-    """The passes that bring both halves `pairs` short passes beyond the fuller one of them."""
+def next_pair(
+    pixels: int, done: tuple[int, int], pairs: int = 1, *, step: int = 1
+) -> list[tuple[int, int]]:
+    """The passes that bring both halves `pairs` short passes beyond the fuller one of them.
+
+    step: samples of a pixel come in multiples of this.
+    """
     spp = max(done) + pairs * largest_pass(pixels, shorter=SHORTER)
-    return plan_passes(pixels, 2 * spp, done=done, shorter=SHORTER)
+    return plan_passes(pixels, 2 * spp, done=done, shorter=SHORTER, step=step)
 
 
 class Keeper:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.render import basis_lights, is_of, render_basis
-from lightpaint.errors import BasisError
+from lightpaint.basis.render.render import basis_lights, is_of, is_on_the_way, render_basis
+from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
@@ -19,18 +19,32 @@ def obtain_basis(
     time_s: float | None = None,
     seed: int = 0,
     use_cache: bool = True,
+    exact_spp: bool = False,
     progress: Progress = silent,
 ) -> Basis:
     """The basis of `scene`: what an earlier run kept, with the samples that are missing.
 
     time_s: instead of spp, seconds of rendering to add to what was kept.
     use_cache: False neither looks for one nor keeps it.
+    exact_spp: whether it has just as many samples as are asked for, and the same ones, whatever
+    was kept. One with more samples stays kept.
+
+    Raises SceneError for exact_spp with a time, which asks for no number.
     """
+    if exact_spp and time_s is not None:
+        raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
     if not use_cache:
         return render_basis(scene, spp=spp, time_s=time_s, seed=seed, progress=progress)
-    start = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
-    if start is not None and not is_of(scene, start, seed):
+    kept = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
+    if kept is not None and not is_of(scene, kept, seed):
+        kept = None
+    start = kept
+    if start is not None and exact_spp and not is_on_the_way(scene, start, spp):
         start = None
+
+    def keep(basis: Basis) -> bool:
+        return (kept is None or basis.origin.spp >= kept.origin.spp) and cache.keep(basis)
+
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
         start = replace(start, lights=basis_lights(scene), asked=scene.asked)
@@ -40,11 +54,11 @@ def obtain_basis(
         time_s=time_s,
         seed=seed,
         start=start,
-        keep=cache.keep,
+        keep=keep,
         progress=progress,
     )
-    if start is None or (basis is not start and basis.origin.spp >= start.origin.spp):
-        cache.keep(basis)
+    if basis is not start:
+        keep(basis)
     return basis
 
 
@@ -67,5 +81,5 @@ def check_same_view(scene: Scene, basis: Basis) -> None:
     if whole_factor(scene.size, basis.size) is None:
         raise BasisError(
             f"the basis is {basis.size[1]}x{basis.size[0]} but {scene.path} renders "
-            f"{scene.size[1]}x{scene.size[0]}, which is no whole multiple: make it again"
+            f"{scene.size[1]}x{scene.size[0]}, of which no square blocks are as many: make it again"
         )

@@ -26,6 +26,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.guide import Guide
 from lightpaint.basis.render.half_sums import HalfSums
+from lightpaint.basis.render.integrators import depth_limit, needs_a_bounce
 from lightpaint.basis.render.paths import Planes, camera_rays, trace
 from lightpaint.basis.render.sobol import SobolPairs
 from lightpaint.scene.integrator import Integrator
@@ -74,6 +75,8 @@ class Tracer:
             seen=seen,
             spp=spp,
             guided=numbers,
+            block=self.scene.film.block,
+            must_bounce=needs_a_bounce(self.scene),
         )
         # A running kernel cannot be interrupted, and what is not waited for is still running.
         dr.sync_thread()
@@ -116,6 +119,8 @@ def accumulate(
     spp: int,
     seed: int = 0,
     guided: Guided | None = None,
+    block: int = 1,
+    must_bounce: bool = False,
 ) -> int:
     """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.
 
@@ -124,9 +129,11 @@ def accumulate(
     planes: Float array of n·h·w·3 values, laid out (n, h, w, 3).
     seen: Float array of h·w values; counts the camera rays that see an emitter.
     guided: None draws all numbers at random, from `seed`, in Mitsuba's order.
+    block: side of the blocks of the film's pixels that are pixels here.
+    must_bounce: whether paths that only pass surfaces carry nothing (see integrators.py).
     Returns the number of paths per pixel, which some samplers round up.
     """
-    width, height = (int(v) for v in camera.film().crop_size())
+    width, height = (int(v) // block for v in camera.film().crop_size())
     sampler = None
     if guided is None:
         sampler = camera.sampler().clone()
@@ -152,15 +159,11 @@ def accumulate(
         weight,
         Planes(planes, seen, light_of, pixel, dr.opaque(mi.UInt32, width * height)),
         hide_emitters=integrator.hide_emitters,
-        max_depth=mi.UInt32(_depth_limit(integrator)),
+        must_bounce=must_bounce,
+        max_depth=mi.UInt32(depth_limit(integrator)),
         rr_depth=mi.UInt32(integrator.rr_depth),
     )
     dr.eval(planes, seen)
     if guide is not None:
         guide.update()
     return spp
-
-
-def _depth_limit(integrator: Integrator) -> int:
-    """Longest path in vertices behind the camera. Mitsuba's −1 means none."""
-    return 2 if integrator.plugin == "direct" else integrator.max_depth % 2**32

@@ -20,7 +20,10 @@ from lightpaint.basis.render.sobol import APERTURE, FILM, TIME
 
 
 def camera_rays(sensor, sampler, numbers, pixel, width, height):
-    """One ray per sample, drawing random numbers as Mitsuba's SamplingIntegrator does."""
+    """One ray per sample, drawing random numbers as Mitsuba's SamplingIntegrator does.
+
+    width, height: pixels into which the film's crop window is divided, its own or larger ones.
+    """
     film = sensor.film()
     corner = mi.Vector2f(pixel % width, pixel // width) + mi.Vector2f(film.crop_offset())
     position = corner + (sampler.next_2d() if numbers is None else numbers.pair(FILM))
@@ -74,11 +77,24 @@ class Planes:
 
 
 @dr.syntax
-def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, max_depth, rr_depth):
+def trace(
+    scene,
+    sampler,
+    numbers,
+    guide,
+    ray,
+    weight,
+    planes,
+    hide_emitters,
+    must_bounce,
+    max_depth,
+    rr_depth,
+):
     """Follow paths from the camera on, and leave what they carry in `planes`.
 
-    ray, weight: of the camera. max_depth, rr_depth: vertices behind the camera of the longest
-    path, and after how many Russian roulette begins.
+    ray, weight: of the camera. must_bounce: whether paths that only pass surfaces carry nothing.
+    max_depth, rr_depth: vertices behind the camera of the longest path, and after how many
+    Russian roulette begins.
     """
     # fmt: off
     ray = mi.Ray3f(ray)                         # Ray that is followed
@@ -92,6 +108,9 @@ def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, ma
     previous_delta = mi.Bool(True)              # Whether nothing but the surface could choose it
     previous_cell = mi.UInt32(0)                # Cell of the guide that the vertex lies in
     # fmt: on
+
+    if dr.hint(must_bounce, mode="scalar"):
+        active = _will_bounce(scene, sampler, numbers, ray, pi, active, max_depth, rr_depth)
 
     while active:
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
@@ -133,6 +152,43 @@ def trace(scene, sampler, numbers, guide, ray, weight, planes, hide_emitters, ma
         depth[si.is_valid()] += 1
         active = _roulette(throughput, eta, depth >= rr_depth, fate, active_next)
         pi = scene.ray_intersect_preliminary(ray, False, active)
+
+
+@dr.syntax
+def _will_bounce(scene, sampler, numbers, ray, pi, active, max_depth, rr_depth):
+    """Which of the paths that are about to be followed meet more than what lets them pass.
+
+    Whether a path counts is known only after it has gathered light, from lights of any number, so
+    it is looked ahead with the same numbers, as far as the first surface that does not let it pass.
+    """
+    # fmt: off
+    sampler = None if sampler is None else sampler.clone()
+    ray = mi.Ray3f(ray)              # Ray that is followed
+    throughput = mi.Spectrum(1)      # Share of the light at its end that comes back
+    eta = mi.Float(1)                # Product of the indices of refraction passed
+    depth = mi.UInt32(0)             # Vertices behind the camera so far
+    active = mi.Bool(active)         # Paths that have only passed surfaces so far
+    bounces = mi.Bool(False)         # Paths that have met another
+    # fmt: on
+
+    while active:
+        si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
+        bsdf = si.bsdf(ray)
+        if dr.hint(sampler is not None, mode="scalar"):
+            sampler.next_2d()  # what chooses an emitter
+        lobe, direction, fate = _numbers_of_surface(sampler, numbers, depth)
+        sample, weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction, active)
+        passes = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
+        bounces |= active & si.is_valid() & ~passes
+
+        ray = si.spawn_ray(si.to_world(sample.wo))
+        throughput *= weight
+        eta *= sample.eta
+        goes_on = active & (depth + 1 < max_depth) & si.is_valid() & passes
+        depth[si.is_valid()] += 1
+        active = _roulette(throughput, eta, depth >= rr_depth, fate, goes_on)
+        pi = scene.ray_intersect_preliminary(ray, False, active)
+    return bounces
 
 
 def _pdf_of_choice(scene, guide, si, emitter, previous, previous_cell, active):

@@ -6,37 +6,24 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.basis.render.budget import Budget, Keeper, passes
-from lightpaint.basis.render.separate import LightSums, emitters_seen, render_separately
+from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.separate import (
+    LightSums,
+    emitters_seen,
+    plan_of_light,
+    render_separately,
+)
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces, silent
-from lightpaint.scene.emission import ENVIRONMENTS
-from lightpaint.scene.render import SAMPLES_PER_PASS, view_seed
+from lightpaint.progress import Interrupted, Progress, silent
+from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.variant import use_variant
+from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples that choices of emitters are learned from before any counts.
 REHEARSAL = 2**18
 
 ONE_PASS = "one pass"
 SEPARATE = "separate renders"
-
-
-def why_not_one_pass(scene: Scene) -> str | None:
-    """What keeps `scene` from the one-pass basis, in a few words; None if nothing does."""
-    variant = use_variant()
-    integrator = scene.integrator
-    if not variant.is_jit:
-        return f"the variant is {variant.variant}"
-    if integrator.plugin not in ("path", "direct"):
-        return f"the integrator is {integrator.plugin!r}"
-    if integrator.plugin == "direct" and integrator.samples != (1, 1):
-        return "the direct integrator draws other than one sample of emitters and BSDF"
-    backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
-    if scene.has_null and (integrator.hide_emitters or not backdrop):
-        return "rays may pass surfaces and leave, which Mitsuba counts as black"
-    if scene.has_media:
-        return "the scene has participating media"
-    return None
 
 
 def render_basis(
@@ -84,7 +71,7 @@ def render_basis(
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
         return start.asking(scene.asked)
-    method = ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
+    method = _method(scene)
     if start is not None and start.origin.method != method:
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
@@ -127,6 +114,45 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     of = basis.origin
     mine = _origin(scene, seed, of.method, of.halves, of.passes)
     return of == replace(mine, each_light=of.each_light) and basis.size == scene.size
+
+
+def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
+    """Whether a render from nothing to `spp` samples per pixel comes by just those of `basis`.
+
+    So does one that an interrupt ended, and not one that was made for fewer samples: its passes
+    end elsewhere. spp: the scene's own number if None.
+    """
+    origin = basis.origin
+    if origin.method != _method(scene):
+        return False
+    plan = _plan(scene, spp)
+    sizes = [[size for half, size in plan if half == h] for h in range(2)]
+    return all(
+        count <= len(its) and sum(its[:count]) == done
+        for a, b, first, second in origin.each_light or ((*origin.halves, *origin.passes),)
+        for its, done, count in zip(sizes, (a, b), (first, second), strict=True)
+    )
+
+
+def samples_for(scene: Scene, spp: int | None) -> int:
+    """Samples per pixel that a basis comes to for which `spp` are asked.
+
+    One more where that makes the halves equal, and some where a pixel is a block of pixels that
+    ordinary renders take one sample of each in.
+    """
+    return sum(size for _, size in _plan(scene, spp))
+
+
+def _plan(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
+    """The passes of all lights, or of each, up to `spp`, the scene's own number if None."""
+    (height, width), spp = scene.size, scene.spp if spp is None else spp
+    if _method(scene) == ONE_PASS:
+        return plan_passes(height * width, spp)
+    return plan_of_light(scene, spp)
+
+
+def _method(scene: Scene) -> str:
+    return ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
 
 
 def _origin(

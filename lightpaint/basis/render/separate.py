@@ -14,9 +14,11 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.budget import SHORTER, Budget, Clock, Keeper, next_pair
-from lightpaint.progress import Interrupted, Progress, interruptible_between_pieces
+from lightpaint.images.blocks import block_mean
+from lightpaint.progress import Interrupted, Progress
 from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_pass
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)
@@ -111,6 +113,16 @@ def render_separately(
         ) from None
 
 
+def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> Plan:
+    """The passes that bring one light from `done` samples per pixel of each half to `spp` in all.
+
+    On a film of blocks those are a little more: each pixel of a block takes one sample at least.
+    """
+    height, width = scene.size
+    step = scene.film.block_pixels
+    return plan_passes(height * width, spp, done=done, shorter=SHORTER, step=step)
+
+
 def _turns(
     scene: Scene, budget: Budget, sums: LightSums, progress: Progress
 ) -> Iterator[tuple[int, Plan, Callable[[], None]]]:
@@ -120,7 +132,7 @@ def _turns(
     if budget.time_s is None:
         # One light after the other: a large scene takes long to load.
         for light in range(lights):
-            plan = plan_passes(pixels, budget.spp, done=sums.done(light), shorter=SHORTER)
+            plan = plan_of_light(scene, budget.spp, done=sums.done(light))
             if plan:
                 yield light, plan, _count(f"basis: {scene.lights[light].name}", plan, progress)
         return
@@ -131,10 +143,10 @@ def _turns(
     while pairs > 0:
         fullest = int(sums.spp.max())
         begin_s, rendered = clock.left_s, 0
-        goal = next_pair(pixels, (fullest, fullest), pairs)
+        goal = next_pair(pixels, (fullest, fullest), pairs, step=scene.film.block_pixels)
         spp = 2 * fullest + sum(size for _, size in goal)
         for light in range(lights):
-            plan = plan_passes(pixels, spp, done=sums.done(light), shorter=SHORTER)
+            plan = plan_of_light(scene, spp, done=sums.done(light))
             rendered += len(plan)
             yield light, plan, clock.report
         pair_of_all_s = (begin_s - clock.left_s) / rendered * 2 * lights
@@ -178,9 +190,10 @@ def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
         return np.zeros(scene.size, dtype=bool)
     loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
     direct = mi.load_dict({"type": "path", "max_depth": 1})
+    spp = -(-16 // scene.film.block_pixels)
     image = as_float32(
-        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=16))
+        np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=spp))
     )
     del loaded
     gc.collect()
-    return np.asarray(image.max(axis=-1) > 0)
+    return np.asarray(block_mean(image, scene.film.block).max(axis=-1) > 0)

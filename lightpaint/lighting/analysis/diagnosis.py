@@ -4,8 +4,9 @@ With the weights u of any sign that come closest, Ψ − ΣuΦ is orthogonal to 
 
     ‖Ψ − ΣwΦ‖² = ‖Ψ − ΣuΦ‖² + ‖Σ(u − w)Φ‖²
 
-exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. What the
-noise of the prediction adds to the first is taken out of it. Where the lighting answers several
+exactly: the first part no mix of the lights can reach, the second w >= 0 forbids. Noise is taken
+out of the first: what that of the prediction adds, and what that of the painting does, if it is a
+render or a photograph (`grain.py`). Where the lighting answers several
 views, part of the second is what the best lighting for this view alone would not have missed.
 After reweighting, all of it is of the last linear problem: without what a display clips, and on
 a scale of its own.
@@ -19,6 +20,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.lighting.analysis.directions import all_columns
+from lightpaint.lighting.analysis.grain import grain
 from lightpaint.lighting.analysis.noise import pseudo_inverse
 from lightpaint.lighting.analysis.release import bounds_of
 from lightpaint.lighting.bound import Bound
@@ -53,7 +55,7 @@ class Diagnosis:
     """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and where it comes from.
 
     Attributes:
-        total: The whole of it, the sum of the four parts.
+        total: The whole of it, the sum of the five parts.
         unreachable: What no weights of any sign can reach.
         forbidden: What they can and w >= 0 cannot.
         noise: What the basis' own noise adds.
@@ -68,6 +70,7 @@ class Diagnosis:
         bounds_left_out: How many more there are, which seem to matter less.
         compromise: What the best lighting for this view alone would not miss; 0 where there is one
             view.
+        painting_noise: What noise of the painting adds, which is a render or a photograph then.
         lighting_total: `total` of all views that the lighting answers, to hold gains against.
 
     Examples:
@@ -90,6 +93,7 @@ class Diagnosis:
     is_constrained: bool = False
     bounds_left_out: int = 0
     compromise: float = 0.0
+    painting_noise: float = 0.0
     lighting_total: float = 0.0
 
     __repr__ = shortly
@@ -132,8 +136,16 @@ def diagnose(solution: Solution) -> Diagnosis:
     unreachable = missed - forbidden
     total = float((D * np.square(missed)).sum())
     out_of_reach = min(float((D * np.square(unreachable)).sum()), total)
-    noise = float((D * np.square(predicted.half_difference, dtype=np.float64)).sum())
-    noise = min(noise, out_of_reach)
+    noise, painting_noise = (
+        min(float((D * variance).sum()), out_of_reach)
+        for variance in (
+            np.square(predicted.half_difference, dtype=np.float64),
+            grain(unreachable, solution.importance > 0),
+        )
+    )
+    # What is seen of noise is that of both.
+    painting_noise = max(painting_noise - noise, 0.0)
+    lacking = out_of_reach - noise - painting_noise
     uncounted = np.maximum(1 - solution.importance.astype(np.float64), 0)
     # Where nothing was painted no colour is missed either.
     uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
@@ -144,7 +156,7 @@ def diagnose(solution: Solution) -> Diagnosis:
     bounds, left_out = bounds_of(whole)
     return Diagnosis(
         total=total,
-        unreachable=out_of_reach - noise,
+        unreachable=lacking,
         forbidden=total - out_of_reach - compromise,
         noise=noise,
         ignored=float((uncounted[..., None] * np.square(seen)).sum()),
@@ -157,7 +169,8 @@ def diagnose(solution: Solution) -> Diagnosis:
         lighting_total=total if whole is solution else whole.energy,
         is_constrained=bool(solution.problem.constraints),
         compromise=compromise,
-        place=_place(solution, unreachable) if out_of_reach > noise else None,
+        painting_noise=painting_noise,
+        place=_place(solution, unreachable) if lacking > 0 else None,
     )
 
 

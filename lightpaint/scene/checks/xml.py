@@ -117,9 +117,8 @@ class _Walk:
         import mitsuba as mi
 
         if os.path.realpath(path) in map(os.path.realpath, chain):
-            raise SceneError(
-                f"{chain[-1]} includes {path}, which includes it in turn: this has no end"
-            )
+            which = "itself" if path == chain[-1] else f"{path}, which includes it in turn"
+            raise SceneError(f"{chain[-1]} includes {which}: this has no end")
         chain = (*chain, path)
         try:
             data = _as_utf8(read_bytes(path, "scene file", SceneError, limit=MAX_XML))

@@ -8,18 +8,19 @@ import pytest
 from renderer import CORNELL, LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
 from lightpaint.basis.render.budget import Budget, Keeper
+from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
 from lightpaint.basis.render.render import (
     ONE_PASS,
     SEPARATE,
     _render_one_by_one,
     memory_needed,
     render_basis,
-    why_not_one_pass,
 )
 from lightpaint.basis.render.separate import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.progress import silent
-from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes
+from lightpaint.remarks import remarks_of_scene
+from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 from lightpaint.scene.scene import Scene, load_scene
 
 INTEGRATORS = {
@@ -183,7 +184,7 @@ def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("integrator", "why"),
     [
-        ('<integrator type="volpath"/>', "volpath"),
+        ('<integrator type="volpathmis"/>', "volpathmis"),
         ('<integrator type="ptracer"/>', "ptracer"),
     ],
 )
@@ -192,6 +193,11 @@ def test_what_one_pass_cannot_serve_is_rendered_separately(
 ) -> None:
     scene = load_scene(write_room(tmp_path, integrator=integrator))
     assert why in str(why_not_one_pass(scene))
+    [remark] = remarks_of_scene(scene)
+    assert remark == (
+        f"the integrator is {why}: each of the 5 lights is rendered by itself, 5 times the work; "
+        "the integrator path, where it shows the same, renders all in one pass"
+    )
     basis = render_basis(scene, spp=4)
     assert basis.origin.method == SEPARATE
     assert (basis.images.reshape(len(basis.lights), -1).sum(axis=1) > 0).all()
@@ -201,27 +207,158 @@ def test_what_one_pass_cannot_serve_is_rendered_separately(
 def test_direct_with_other_sample_counts_is_not_one_path(tmp_path: Path, option: str) -> None:
     integrator = f'<integrator type="direct"><integer name="{option}" value="2"/></integrator>'
     scene = load_scene(write_room(tmp_path, integrator=integrator))
-    assert "draws other than one" in str(why_not_one_pass(scene))
+    assert "takes other than one sample" in str(why_not_one_pass(scene))
 
 
-def test_rays_that_only_pass_surfaces_are_left_to_mitsuba(tmp_path: Path) -> None:
-    ghost = """<shape type="rectangle" id="ghost"><transform name="to_world">
-        <translate z="0.8" y="1"/></transform><bsdf type="null"/><emitter type="area"/></shape>"""
-    scene = load_scene(write_room(tmp_path, lights=ghost + LIGHTS["bulb"]))
-    assert "pass surfaces" in str(why_not_one_pass(scene))
+#: What lets rays pass: a lamp without a surface, a leaf with holes, thin glass, a cloud.
+PASSED = {
+    "ghost": """<shape type="rectangle" id="ghost"><transform name="to_world">
+        <translate z="0.8" y="1"/></transform><bsdf type="null"/><emitter type="area"/></shape>""",
+    "leaf": """<shape type="rectangle" id="leaf"><transform name="to_world"><scale value="0.6"/>
+        <translate z="1.2" y="1.2"/></transform><bsdf type="mask"><float name="opacity"
+        value="0.4"/><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></bsdf></shape>""",
+    "pane": """<shape type="rectangle" id="pane"><transform name="to_world"><scale value="0.7"/>
+        <translate z="1.6" x="-0.3" y="0.9"/></transform><bsdf type="thindielectric"/></shape>""",
+    "cloud": """<shape type="cube" id="cloud"><transform name="to_world"><scale value="0.3"/>
+        <translate x="0.5" y="1" z="1"/></transform><bsdf type="null"/>
+        <medium type="homogeneous" name="interior"><float name="albedo" value="0.5"/></medium>
+        </shape>""",
+}
+SEVERAL = "".join(PASSED.values()) + LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
+
+
+def _integrator(plugin: str, **options: int | bool) -> str:
+    names = {bool: "boolean", int: "integer"}
+    inside = "".join(
+        f'<{names[type(value)]} name="{name}" value="{str(value).lower()}"/>'
+        for name, value in options.items()
+    )
+    return f'<integrator type="{plugin}">{inside}</integrator>'
+
+
+def _same_as_mitsuba_at_random_weights(scene: Scene) -> None:
+    """Only if every plane is what Mitsuba makes of that light are all their sums."""
+    planes = one_pass(scene, seed=3, spp=16)
+    weights = np.random.default_rng(1).uniform(0.1, 3, (len(scene.lights), 3))
+    emission = {x.name: tuple(w) for x, w in zip(scene.lights, weights.tolist(), strict=True)}
+    rendered = mitsuba_render(scene, emission, seed=3, spp=16)
+    assert rendered.max() > 0
+    mixed = np.einsum("nhwc,nc->hwc", planes, weights)
+    # float32 throughput times weights in another order.
+    assert np.abs(mixed - rendered).max() <= 1e-5 * rendered.max()
+
+
+@pytest.mark.parametrize("hide", [False, True])
+@pytest.mark.parametrize(
+    ("lights", "options"),
+    [
+        (PASSED["ghost"] + LIGHTS["bulb"], {}),
+        (SEVERAL, {"rr_depth": 1}),
+        (SEVERAL, {"max_depth": 2}),
+        (SEVERAL + LIGHTS["sky"], {"max_depth": 3}),
+    ],
+)
+def test_paths_that_only_pass_surfaces_are_what_they_are_to_mitsuba(
+    tmp_path: Path, lights: str, options: dict[str, int], hide: bool
+) -> None:
+    """Black, with all they gathered on the way, unless an environment is seen behind."""
+    integrator = _integrator("path", hide_emitters=hide, **options)
+    scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
+    assert scene.has_null
+    assert needs_a_bounce(scene) == (hide or LIGHTS["sky"] not in lights)
+    assert why_not_one_pass(scene) is None
+    _same_as_mitsuba_at_random_weights(scene)
+
+
+def test_each_plane_behind_what_is_passed_is_that_light_alone_within_noise(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path, lights=SEVERAL))
+    basis = render_basis(scene, spp=256)
+    assert basis.origin.method == ONE_PASS
+    separate = _render_one_by_one(scene, Budget(256), 0, None, Keeper(None), silent)
+    for k, name in enumerate(basis.names):
+        gap = float((basis.images[k] - separate.images[k]).sum(dtype=np.float64))
+        noise = np.square(basis.half_differences[k], dtype=np.float64)
+        noise += np.square(separate.half_differences[k], dtype=np.float64)
+        # Noise: four and a half standard errors of the whole image's sum, four lights.
+        assert abs(gap) <= 4.5 * np.sqrt(noise.sum()), name
+    # What is gathered and then lost is much: else the test would say nothing.
+    kept = one_pass(scene, seed=1, spp=64)
+    scene = load_scene(write_room(tmp_path, lights=SEVERAL + LIGHTS["sky"]))
+    assert kept.sum() < 0.9 * one_pass(scene, seed=1, spp=64)[: len(kept)].sum()
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        _integrator("prb", max_depth=4),
+        _integrator("prb", max_depth=3, hide_emitters=True),
+        _integrator("prb_projective", max_depth=4),
+        _integrator("direct_projective"),
+    ],
+)
+def test_integrators_that_trace_the_paths_of_path_are_one_pass(
+    tmp_path: Path, integrator: str
+) -> None:
+    """They roll the dice of Russian roulette one vertex later, so their paths end before it."""
+    lights = "".join(LIGHTS.values())
+    if "direct" not in integrator:
+        lights += "".join(PASSED.values())
+    scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
+    assert why_not_one_pass(scene) is None
+    assert not needs_a_bounce(scene)
+    _same_as_mitsuba_at_random_weights(scene)
+
+
+def test_depth_of_integrators_that_nobody_told(tmp_path: Path) -> None:
+    for plugin, depth in {"prb": 6, "prb_projective": 6, "path": -1, "volpath": -1}.items():
+        scene = load_scene(write_room(tmp_path, integrator=_integrator(plugin)))
+        assert scene.integrator.max_depth == depth
+
+
+@pytest.mark.parametrize(
+    ("plugin", "lights", "options"),
+    [
+        ("volpath", LIGHTS["bulb"] + LIGHTS["sky"], {}),
+        ("volpath", "".join(LIGHTS.values()), {"max_depth": 3, "rr_depth": 1}),
+        ("direct", SEVERAL, {}),
+    ],
+)
+def test_integrators_that_take_other_samples_have_the_same_mean(
+    tmp_path: Path, plugin: str, lights: str, options: dict[str, int]
+) -> None:
+    integrator = _integrator(plugin, **options)
+    scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
+    assert why_not_one_pass(scene) is None
     basis = render_basis(scene, spp=256)
     white = {light.name: WHITE for light in scene.lights}
-    rendered = mitsuba_render(scene, white, seed=1, spp=256)
-    gap = float((basis.images.sum(axis=0) - rendered).sum(dtype=np.float64))
-    noise = 2 * np.square(basis.half_differences.sum(axis=0), dtype=np.float64).sum()
-    # Noise: five standard errors of the difference of the sums.
-    assert abs(gap) <= 5 * np.sqrt(noise)
-    # With a sky, what passes is seen against it, and one pass serves.
-    lit = load_scene(write_room(tmp_path, lights=ghost + LIGHTS["sky"]))
-    assert why_not_one_pass(lit) is None
-    planes = one_pass(lit, seed=3, spp=16)
-    rendered = mitsuba_render(lit, {x.name: WHITE for x in lit.lights}, seed=3, spp=16)
-    assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
+    rendered = render(scene, white, spp=1024, stream=Stream.VERIFICATION)
+    gap = basis.images.sum(axis=0, dtype=np.float64) - rendered.image
+    noise = np.square(basis.half_differences.sum(axis=0), dtype=np.float64)
+    noise += np.square(rendered.half_difference, dtype=np.float64)
+    # Noise: five standard errors of the sum, and of pixels in the mean square.
+    assert abs(gap.sum()) <= 5 * np.sqrt(noise.sum())
+    assert np.square(gap).sum() <= 1.5 * noise.sum()
+    # Less than a hundredth of the picture: what is missed would be seen.
+    assert np.sqrt(noise.sum()) <= 2e-3 * rendered.image.sum()
+
+
+@pytest.mark.parametrize(
+    ("integrator", "lights", "why"),
+    [
+        (_integrator("volpath"), SEVERAL, "fog, smoke or liquids"),
+        (_integrator("volpath"), PASSED["pane"] + LIGHTS["bulb"], "behind masks, thin glass"),
+        (_integrator("volpath", hide_emitters=True), LIGHTS["bulb"], "hides emitters in a way"),
+        (_integrator("direct_projective", hide_emitters=True), LIGHTS["bulb"], "hides emitters"),
+    ],
+)
+def test_what_integrators_do_otherwise_than_path_is_left_to_them(
+    tmp_path: Path, integrator: str, lights: str, why: str
+) -> None:
+    scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
+    assert why in str(why_not_one_pass(scene))
+    # One light costs no more than it does.
+    is_said = any(why in remark for remark in remarks_of_scene(scene))
+    assert is_said == (len(scene.lights) > 1)
 
 
 @pytest.mark.parametrize("sampler", ["stratified", "multijitter", "orthogonal", "ldsampler"])
@@ -252,9 +389,9 @@ def test_a_wrapped_path_is_one_pass(tmp_path: Path, wrapper: str) -> None:
     assert rendered.max() > 0
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
     inside = load_scene(
-        write_room(tmp_path, integrator=wrapper.format("<integrator type='volpath'/>"))
+        write_room(tmp_path, integrator=wrapper.format("<integrator type='volpathmis'/>"))
     )
-    assert "volpath" in str(why_not_one_pass(inside))
+    assert "volpathmis" in str(why_not_one_pass(inside))
 
 
 def test_wrapped_integrators_hide_what_the_inner_one_hides(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from lightpaint.progress import Interrupted
 from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene, load_scene
 
-VOLPATH = '<integrator type="volpath"><integer name="max_depth" value="4"/></integrator>'
+SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="4"/></integrator>'
 THREE = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
 
 
@@ -35,7 +35,7 @@ def small_passes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
-    return load_scene(write_room(tmp_path, lights=THREE, integrator=VOLPATH))
+    return load_scene(write_room(tmp_path, lights=THREE, integrator=SEPARATELY))
 
 
 def interrupted_after(passes: int, scene: Scene, kept: list[Basis], **budget: object) -> str:
@@ -132,7 +132,7 @@ def test_a_part_of_separate_renders_does_not_replace_a_whole_basis(
     assert obtain_basis(scene, spp=8).origin == start.origin
 
 
-@pytest.mark.parametrize("integrator", [VOLPATH, '<integrator type="path"/>'])
+@pytest.mark.parametrize("integrator", [SEPARATELY, '<integrator type="path"/>'])
 def test_a_time_is_kept_and_adds_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:
@@ -153,7 +153,7 @@ def test_a_time_is_kept_and_adds_samples(
     assert first.origin.each_light == ()
     more = obtain_basis(scene, time_s=0.1)
     assert more.origin.spp > first.origin.spp
-    if integrator is VOLPATH:  # whose passes are as short for a number of samples
+    if integrator is SEPARATELY:  # whose passes are as short for a number of samples
         same_basis(more, render_basis(scene, spp=more.origin.spp))
 
 

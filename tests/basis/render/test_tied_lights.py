@@ -20,7 +20,7 @@ TWIN = LIGHTS["bulb"].replace('"bulb"', '"twin"').replace("-0.5", "0.6")
 SCREEN = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
     <rotate y="1" angle="90"/><translate x="-1" y="1"/></transform><emitter type="area">
     <texture type="checkerboard" name="radiance"/></emitter></shape>"""
-SLOW = '<integrator type="volpath"><integer name="max_depth" value="5"/></integrator>'
+SLOW = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
 
 ROOM = "".join(LIGHTS.values()) + TWIN
 TIED = {"pair": ["bulb", "twin"], "mix": ["panel", "sun"]}

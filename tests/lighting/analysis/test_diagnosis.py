@@ -122,9 +122,9 @@ def test_the_parts_add_up(make_basis: Any, seed: int, n: int, is_scalar: bool):
     target = _target(rng.random((*SIZE, 3)) * rng.random(3), importance)
     solution = solve(basis, target)
     found = diagnose(solution)
-    parts = (found.unreachable, found.forbidden, found.noise, found.ignored)
+    parts = (found.unreachable, found.forbidden, found.noise, found.painting_noise, found.ignored)
     assert min(parts) >= 0
-    assert sum(parts[:3]) == pytest.approx(found.total, rel=1e-12)
+    assert sum(parts[:4]) == pytest.approx(found.total, rel=1e-12)
     # As the solve counts it, and as the pixels do, in float64 over float32.
     assert found.total == pytest.approx(sum(solution.certificate.objective), rel=1e-5)
     D = importance[..., None]

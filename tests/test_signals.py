@@ -1,13 +1,15 @@
 """Ctrl-C between two pieces of work, and whose handler stands meanwhile."""
 
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from lightpaint.progress import interruptible_between_pieces
+from lightpaint.signals import interruptible_between_pieces
 
 
 @pytest.fixture(autouse=True)
@@ -72,3 +74,43 @@ def test_other_threads_get_no_signals():
     thread.start()
     thread.join()
     assert done == [signal.default_int_handler]
+
+
+def test_what_ends_a_process_otherwise_waits_too():
+    """SIGTERM and SIGHUP where a handler of Python's stands; by default they end it at once."""
+    heard: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, _: heard.append(number))
+        for number in (signal.SIGTERM, signal.SIGHUP)
+    }
+    try:
+        with interruptible_between_pieces() as let_through:
+            signal.raise_signal(signal.SIGTERM)
+            assert heard == []
+            let_through()
+            assert heard == [signal.SIGTERM]
+            signal.raise_signal(signal.SIGHUP)
+        assert heard == [signal.SIGTERM, signal.SIGHUP]
+        with interruptible_between_pieces():
+            assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with interruptible_between_pieces():
+            assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_exit_code_is_kept_wherever_the_signal_came(number: signal.Signals):
+    code = f"""
+import signal, sys
+from lightpaint.signals import hearing
+came = []
+with hearing(came):
+    try:
+        exec("signal.raise_signal({int(number)})")
+    except KeyboardInterrupt:
+        sys.exit(128 + came[0])
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + number

@@ -1,0 +1,69 @@
+"""Which of Mitsuba's integrators the one pass stands for, and what it has to know of them.
+
+It traces the paths of `path`. Others estimate the same picture from other samples: then they have
+the same basis, but for noise.
+"""
+
+from lightpaint.scene.emission import ENVIRONMENTS
+from lightpaint.scene.integrator import Integrator
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.variant import use_variant
+
+#: They end after one bounce.
+DIRECT = ("direct", "direct_projective")
+#: They see surfaces alone, and whatever is inside of them as nothing.
+ON_SURFACES = ("path", "prb", "prb_projective", *DIRECT)
+#: They hide emitters from the camera otherwise than `path` does.
+HIDING_OTHERWISE = ("volpath", "prb_projective", "direct_projective")
+
+
+def why_not_one_pass(scene: Scene) -> str | None:
+    """What keeps `scene` from the one-pass basis, in a few words; None if nothing does."""
+    variant = use_variant()
+    if not variant.is_jit:
+        return f"the variant is {variant.variant}"
+    integrator = scene.integrator
+    plugin = integrator.plugin
+    if plugin not in ("volpath", *ON_SURFACES):
+        return f"the integrator is {plugin}"
+    if plugin == "volpath" and scene.has_media:
+        return "the integrator volpath renders fog, smoke or liquids (participating media)"
+    if plugin == "volpath" and scene.has_null:
+        return "the integrator volpath lights what is behind masks, thin glass or null surfaces"
+    if integrator.hide_emitters and plugin in HIDING_OTHERWISE:
+        return f"the integrator {plugin} hides emitters in a way of its own (hide_emitters)"
+    if integrator.samples != (1, 1):
+        # It counts lights without a size once for each of them.
+        return "the integrator direct takes other than one sample (emitter_samples, bsdf_samples)"
+    return None
+
+
+def remark_on_separate_renders(scene: Scene) -> str | None:
+    """What `scene` costs for want of one pass, and what to do; None if it costs nothing."""
+    count = len(scene.lights)
+    if (reason := why_not_one_pass(scene)) is None or count == 1:
+        return None
+    if use_variant().is_jit:
+        instead = "the integrator path, where it shows the same,"
+    else:
+        instead = "a variant like llvm_ad_rgb"
+    return (
+        f"{reason}: each of the {count} lights is rendered by itself, {count} times the work; "
+        f"{instead} renders all in one pass"
+    )
+
+
+def depth_limit(integrator: Integrator) -> int:
+    """Longest path in vertices behind the camera. Mitsuba's −1 means none."""
+    return 2 if integrator.plugin in DIRECT else integrator.max_depth % 2**32
+
+
+def needs_a_bounce(scene: Scene) -> bool:
+    """Whether a path is black that met nothing but surfaces which let it pass.
+
+    `path` counts it as one that met nothing, and what it has gathered on masks as nothing,
+    wherever no environment is to be seen behind.
+    """
+    sees_backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
+    is_hidden = scene.integrator.hide_emitters or not sees_backdrop
+    return scene.integrator.plugin == "path" and scene.has_null and is_hidden

@@ -1,0 +1,61 @@
+"""One command from its words to its exit code."""
+
+import io
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+
+from lightpaint.cli import lines
+from lightpaint.cli.parser import command_parser
+from lightpaint.cli.words import spoken
+from lightpaint.errors import LightpaintError
+
+
+def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
+    """Run one command and return the exit code. came: the signals that have been heard."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that lacks a character shows another, and loses no result over it.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    parser = command_parser()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what could be typed
+        from lightpaint.cli.completion import complete
+
+        complete(parser)
+    options = parser.parse_args(given)
+    how_to_go_on = ""
+    try:
+        # What a command needs is imported when it runs: --help answers at once. An interrupt in
+        # the middle of it would leave libraries half there, which some do not survive.
+        from lightpaint.signals import interruptible_between_pieces
+
+        with interruptible_between_pieces():
+            from lightpaint.cli import commands
+            from lightpaint.cli.options import values_of
+            from lightpaint.scene.variant import SlowBackendWarning
+
+        # The commands say it in their own words.
+        warnings.simplefilter("ignore", SlowBackendWarning)
+        return int(getattr(commands, options.command)(**values_of(options, given)))
+    except KeyboardInterrupt as interrupt:
+        how_to_go_on = f": {interrupt}" if str(interrupt) else ""
+    except Exception as error:
+        # An interrupt in the middle of a library often surfaces as some error of its own.
+        if not came:
+            return _failed(options.command, error)
+    lines.err(f"lightpaint {options.command}: interrupted{how_to_go_on}")
+    return 130
+
+
+def _failed(command: str, error: Exception) -> int:
+    """Say what went wrong, and return the exit code."""
+    if isinstance(error, LightpaintError):
+        lines.err(f"lightpaint {command}: {spoken(str(error))}")
+        return 2
+    # A mistake of lightpaint's own, told whole; its text may repeat what a file says.
+    for line in traceback.format_exception(error):
+        lines.err(line.rstrip("\n"))
+    return 1

@@ -1,0 +1,225 @@
+"""report.json: the numbers of a report, for programs (docs/formats.md).
+
+What stands in lighting.json, as emissions do, is not repeated. The page rounds; this does not.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.solution import Solution
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.report.diagnosis import maps_limit
+from lightpaint.report.pictures import brighter_than_white, residual_limit, transform_of
+from lightpaint.report.sentences import brightness, halving_spp, most_uncertain, relative_errors
+from lightpaint.report.verdict import (
+    brighter_as_allowed,
+    codes_missed,
+    energy_shares,
+    linear_residual,
+    noise_residual,
+    relative_residual,
+    share_met,
+)
+from lightpaint.target.target import Target
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-report 1"
+
+
+def report_numbers(
+    *,
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    command: str = "",
+    uncertainty: Uncertainty | None = None,
+    diagnosis: Diagnosis | None = None,
+    unconstrained: Solution | None = None,
+    suggestions: Sequence[Suggestion] | None = None,
+) -> str:
+    """JSON of the numbers of `report_page`, whose arguments these are."""
+    verified = None if verification is None else verification.verified.image
+    transform = transform_of(target, predicted.image, verified)
+    told = {
+        "format": FORMAT,
+        "lightpaint": __version__,
+        "target": target.name,
+        "command": command,
+        "basis": _basis(basis),
+        "painting": _painting(target, solution),
+        "view": {
+            "name": transform.name,
+            "stops": transform.stops,
+            "brighter_than_white": brighter_than_white(predicted.image, transform),
+            "residual_limit": residual_limit(solution, predicted.image, transform=transform),
+        },
+        "fit": _fit(solution, predicted, unconstrained),
+        "lights": _lights(basis, solution, uncertainty),
+        "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
+        "uncertainty": None if uncertainty is None else _sure(basis, solution, uncertainty),
+        "verification": None if verification is None else _verification(verification),
+        "suggestions": _suggested(suggestions, solution.lighting.cd_per_unit),
+    }
+    return json.dumps(_finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _basis(basis: Basis) -> dict[str, Any]:
+    origin, (height, width) = basis.origin, basis.size
+    return {
+        "scene": origin.scene,
+        "sensor": origin.sensor,
+        "method": origin.method,
+        "lightpaint": origin.lightpaint,
+        "spp": origin.spp if basis.knows_noise else None,
+        "seed": origin.seed if basis.knows_noise else None,
+        "size": [width, height],
+        "adjusted": int((~basis.is_fixed).sum()),
+        "emitters_seen": int(basis.emitters_seen.sum()),
+    }
+
+
+def _painting(target: Target, solution: Solution) -> dict[str, Any]:
+    importance = solution.importance
+    return {
+        "importance_mean": float(importance.mean()),
+        "importance_max": float(importance.max()),
+        "not_finite": target.not_finite,
+    }
+
+
+def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
+    """RMS, relative to the painting. norm2: what relative objectives are relative to."""
+    told = {
+        "met": share_met(solution, predicted),
+        "missed": relative_residual(solution),
+        "noise": noise_residual(solution, predicted),
+        "missed_without_constraints": None if free is None else relative_residual(free),
+        "off": sum(not any(light.emission) for light in solution.lighting.lights),
+        "norm2": solution.norm2.tolist(),
+        "noise_removed": solution.problem.noise_removed,
+    }
+    if solution.problem.refinement is not None:
+        told["refined"] = solution.problem.refinement.share
+    if not solution.problem.is_linear:
+        told["missed_in_linear_light"] = missed = linear_residual(solution, predicted)
+        told["met_in_linear_light"] = max(1 - missed, 0.0)
+    if solution.certificate.display:
+        told["codes_missed"] = codes_missed(solution)
+    if (brighter := brighter_as_allowed(solution, predicted.image)) is not None:
+        told["at_least"], told["at_least_and_brighter"] = brighter
+    return told
+
+
+def _lights(
+    basis: Basis, solution: Solution, uncertainty: Uncertainty | None
+) -> Mapping[str, dict[str, Any]]:
+    lighting = solution.lighting
+    shares, before = (energy_shares(basis, its) for its in (lighting, Lighting.present(basis)))
+    told: dict[str, dict[str, Any]] = {}
+    for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
+        # Of the channels that reach something painted: of the others nothing is told.
+        told_of = np.array(setting.reached) | light.is_fixed
+        now, new = (float(luminance(told_of * np.array(x.emission))) for x in (light, setting))
+        told[light.name] = {
+            "share": float(shares[k]),
+            "share_before": float(before[k]),
+            "emission_before": light.emission,
+            "luminance": new,
+            "times": new / now if now > 0 else None,
+            "stops": math.log2(new / now) if now > 0 and new > 0 else None,
+        }
+    if uncertainty is not None:
+        errors, (solved, *ends) = relative_errors(uncertainty), brightness(uncertainty)
+        for k, its in enumerate(told.values()):
+            its["interval"] = [float(end[k]) for end in ends]
+            its["relative_error"] = float(errors[k])
+            if solved[k] > 0:
+                its["relative_interval"] = [float(end[k] / solved[k]) - 1 for end in ends]
+    return told
+
+
+def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[str, Any]:
+    """Shares of the energy that is missed."""
+    told: dict[str, Any] = {
+        "energy": d.total,
+        "out_of_reach": d.share(d.unreachable),
+        "forbidden": d.share(d.forbidden),
+        "given_up": d.share(d.compromise),
+        "noise": d.share(d.noise),
+        "painting_noise": d.share(d.painting_noise),
+        "not_counted": d.share(d.ignored),
+        "map_limit": maps_limit(solution, d, transform=transform),
+        "bounds": [
+            {"lights": x.lights, "share": d.gained(x), "multiplier": x.multiplier} for x in d.bounds
+        ],
+        "bounds_left_out": d.bounds_left_out,
+    }
+    if d.place is not None:
+        names = ("region", "share", "box", "painted", "reached")
+        told["place"] = {name: getattr(d.place, name) for name in names}
+    return told
+
+
+def _sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[str, Any]:
+    k = most_uncertain(basis, solution, uncertainty)
+    return {
+        "excess": uncertainty.relative_excess,
+        "most_uncertain": None if k is None else basis.names[k],
+        "halving_spp": None if k is None else halving_spp(basis, uncertainty, k),
+    }
+
+
+def _verification(v: Verification) -> dict[str, Any]:
+    height, width = v.verified.size
+    return {
+        "agrees": v.agrees,
+        "standard_errors": v.difference,
+        "limit": LIMIT,
+        "size": [width, height],
+        "rmse": v.rmse,
+        "noise_rmse": v.noise_rmse,
+        "z_mean": v.z_mean,
+        "z_pattern": v.z_pattern,
+        "z_rms": v.z_rms,
+        "delta_e_mean": v.delta_e_mean,
+        "delta_e_95": v.delta_e_95,
+    }
+
+
+def _suggested(
+    suggestions: Sequence[Suggestion] | None, cd_per_unit: float | None
+) -> list[dict[str, Any]] | None:
+    if suggestions is None:
+        return None
+    names = ("name", "position", "emission", "gain_share", "missed_share", "seen_at", "xml")
+    return [
+        {name: getattr(x, name) for name in names}
+        | {"photometry": x.photometry(cd_per_unit).fields(), "together": 1 - x.missed_share}
+        for x in suggestions
+    ]
+
+
+def _finite(told: Any) -> Any:
+    """The same without what there is none of, and without NumPy's numbers."""
+    if isinstance(told, Mapping):
+        held = {key: _finite(value) for key, value in told.items()}
+        return {key: value for key, value in held.items() if value is not None}
+    if isinstance(told, list | tuple):
+        return [_finite(value) for value in told]
+    if isinstance(told, np.generic):
+        told = told.item()
+    return None if isinstance(told, float) and not math.isfinite(told) else told

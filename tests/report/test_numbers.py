@@ -1,0 +1,184 @@
+"""Every number of the report stands in a file, and writing it neither solves nor sums anew."""
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.basis import basis as basis_module
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting import reweighted
+from lightpaint.lighting import solve as solve_module
+from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.constraints import reduced_problem
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.file import write_lighting
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.solve import solve
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import compare
+from lightpaint.results import Look, write_report
+from lightpaint.target.target import Target
+
+SIZE = (24, 32)
+
+#: What holds no result: headings, the command, versions.
+FIXED = {"style", "script", "pre", "footer", "thead", "title", "option"}
+
+
+class Words(HTMLParser):
+    """What a page shows, and the words of its pictures."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.shown: list[str] = []
+        self._open: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        self.shown += [f" {value} " for key, value in attrs if key in ("alt", "title") and value]
+        if tag not in ("meta", "link", "img", "input", "br", "wbr"):
+            self._open.append(tag)
+            self.shown.append(" ")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._open.pop()
+        self.shown.append(" ")
+
+    def handle_data(self, data: str) -> None:
+        if not set(self._open) & FIXED:
+            self.shown.append(data)
+
+
+def _look(make_basis: Any, *, lights: Any = None, **asked: Any) -> Look:
+    rng = np.random.default_rng(3)
+    images = rng.random((5, *SIZE, 3)) + 3 * rng.random((5, 1, 1, 3))
+    noise = rng.normal(0, 0.01, (2, *images.shape))
+    basis = make_basis(
+        images=images + noise[0],
+        half_differences=noise[1],
+        names=["key", "fill", "back", "rim", "sky"],
+        emission=[*rng.random((4, 3)).tolist(), (1, 1, 1)],
+        seen=rng.random(SIZE) < 0.1,
+    )
+    emitters = [replace(light, unit_flux=(3.0, 3.1, 3.2)) for light in basis.lights]
+    emitters[-1] = replace(emitters[-1], is_fixed=True)
+    basis = replace(basis, lights=tuple(emitters))
+    image = np.einsum("nhwc,nc->hwc", images, rng.random((5, 3)) * [1, 0.6, 0.3])
+    image = (image * rng.uniform(0.7, 1.2, (*SIZE, 1))).astype(np.float32)
+    target = Target(
+        *("dusk", image, rng.random(SIZE, np.float32), False),
+        not_finite=5,
+        at_least=image > 3,
+        transform=ViewTransform("srgb", -1.5),
+    )
+    constraints = Constraints.of(lights, **asked) if asked else None
+    solution = solve(basis, target, constraints=constraints, transform=target.transform)
+    solution = replace(solution, lighting=replace(solution.lighting, cd_per_unit=120.0))
+    [analysis] = analyse(solution)
+    predicted = combine(basis, analysis.solution.lighting)
+    noisy = rng.normal(0, 0.01, (2, *image.shape)).astype(np.float32)
+    verified = Estimate(predicted.image + noisy[0], noisy[1])
+    small = image[::3, ::4]
+    about = ((1.23, 4.567, -2.5), (0.3, 0.21, 0.17))
+    lamp = Suggestion("lamp", *about, 0.34, 0.61, "<emitter/>", (0.3, 0.4), small, small)
+    more = replace(lamp, name="more", gain_share=0.11, missed_share=0.49)
+    return Look(
+        target=target,
+        basis=basis,
+        solution=analysis.solution,
+        predicted=predicted,
+        relit=None,
+        verification=compare(predicted, verified),
+        analysis=analysis,
+        suggestions=(lamp, more),
+    )
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from _numbers(one)
+    elif isinstance(value, int | float):
+        yield float(value)
+
+
+def _is_one_of(text: str, known: Any) -> bool:
+    """Whether a printed number is one that is known, or it in percent, as far as its digits say."""
+    mantissa, _, exponent = text.partition("e")
+    step = 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    # A general format drops zeros at the end, and so may say less than it looks.
+    step = max(step, 0.5 * 10.0 ** (np.floor(np.log10(max(abs(float(text)), 1e-300))) - 3))
+    pool = np.concatenate([known, 100 * known])
+    return bool((np.abs(pool - abs(float(text))) <= step * (1 + 1e-6)).any())
+
+
+ASKED: list[dict[str, Any]] = [
+    {},
+    {"sparse": 2},
+    {"lights": {"key": {"color": "3200K"}, "fill": {"off": True}}, "sparse": 3},
+]
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_every_number_of_the_page_stands_in_a_file(
+    make_basis: Any, tmp_path: Path, asked: Any
+) -> None:
+    look = _look(make_basis, **asked)
+    write_report(tmp_path, look, command="lightpaint solve")
+    write_lighting(tmp_path / "lighting.json", look.lighting)
+    files = [json.loads((tmp_path / f"{name}.json").read_text()) for name in ("report", "lighting")]
+    fit, solved = files[0]["fit"], files[1]["solve"]
+    # What docs/formats.md says is derived.
+    norm2, errors = np.array(fit["norm2"]), np.array(solved["objective_error"])
+    derived = [*np.sqrt(solved["relative_objective"]), fit["missed"] ** 2]
+    derived += [*(errors / norm2), errors.sum() / norm2.sum()]
+    lights = files[0]["lights"].values()
+    derived += [x["relative_error"] * x["share"] for x in lights if "relative_error" in x]
+    constants = [0, 1, 95, 255]
+    known = np.abs(np.concatenate([list(_numbers(files)), derived, constants]))
+    text = "".join(Words((tmp_path / "report.html").read_text(encoding="utf-8")).shown)
+    shown = text.split("Paint again")[0].replace("−", "-")
+    shown = re.sub(r"#[0-9a-f]{6}|8×8|95 of 100|ΔE2000|at [-+\d.]+ stops", "", shown)
+    found = re.findall(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", shown)
+    assert len(found) > 150
+    assert [number for number in found if not _is_one_of(number, known)] == []
+
+
+def test_writing_neither_solves_nor_sums_anew(
+    make_basis: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look = _look(make_basis, sparse=2)
+    calls: list[str] = []
+
+    def count(where: Any, name: str) -> None:
+        plain = getattr(where, name)
+
+        def counted(*arguments: Any, **options: Any) -> Any:
+            calls.append(name)
+            return plain(*arguments, **options)
+
+        monkeypatch.setattr(where, name, counted)
+
+    count(solve_module, "_solution")
+    count(reduced_problem, "_optima")
+    count(reweighted, "_fall")
+    count(basis_module, "mix")
+    count(Basis.__dict__["totals"], "func")
+    # One that has kept nothing yet.
+    write_report(tmp_path, replace(look, basis=replace(look.basis)), command="")
+    # Of all lights: the present look, and what is shown of other answers.
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    others = len(re.findall(r"<strong>(Without constraints|As asked|With \d)", page))
+    assert others > 2
+    assert calls.count("mix") == 1 + others
+    assert calls.count("func") == 1
+    assert set(calls) == {"mix", "func"}

@@ -1,0 +1,432 @@
+"""What a result folder holds is kept, and what is read is never written over."""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import refused, run, succeed
+from light_groups import interleaved, pictures
+from renderer import LIGHTS, write_room
+
+import lightpaint as lp
+from lightpaint.basis.file import write_basis
+from lightpaint.errors import OutputError
+from lightpaint.images.exr import write_rgb
+from lightpaint.images.png import png_bytes
+from lightpaint.result_folder import RECORD
+from lightpaint.sources import BasisFile
+
+SOLVE = ("solve", "a.basis.exr")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+    """A folder with a basis, and two paintings of one name."""
+    basis = make_basis(3)
+    write_basis(tmp_path / "a.basis.exr", basis)
+    for k, folder in enumerate(("template", "gallery"), start=1):
+        write_rgb(tmp_path / folder / "evening.exr", k * basis.images.sum(axis=0))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def room(here: Path) -> Path:
+    return write_room(here, lights=LIGHTS["panel"] + LIGHTS["bulb"])
+
+
+@pytest.fixture
+def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is rendered: what is refused is refused before."""
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("this was to be refused before it renders")
+
+    for name in ("pipeline.obtain", "renders.render", "renders.render_surfaces"):
+        monkeypatch.setattr(f"lightpaint.{name}", never)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_a_painting_in_the_result_folder_is_not_written_over(here: Path) -> None:
+    """Under whatever name, with whatever force."""
+    succeed(here, *SOLVE, "gallery/evening.exr")
+    painting = here / "evening" / "predicted.exr"
+    before = contents(here)
+    os.link(painting, here / "hard.exr")
+    (here / "symbolic.exr").symlink_to(painting)
+    for name in ("evening/predicted.exr", "hard.exr", "symbolic.exr", "gallery/../evening/x.exr"):
+        if name.endswith("x.exr"):
+            painting.rename(here / "evening" / "x.exr")
+            (here / "evening" / "report.html").unlink()
+            (here / "evening" / "report.html").symlink_to("x.exr")
+        for how in ([], ["--force"]):
+            line = refused(here, *SOLVE, name, "-o", "evening", *how)
+            assert "is read by this command, and would be written over" in line
+            assert line.endswith("(-o)")
+    (here / "evening" / "x.exr").rename(painting)
+    (here / "evening" / "report.html").unlink()
+    left = contents(here)
+    assert {name: left[name] for name in before if name != "evening/report.html"} == {
+        name: data for name, data in before.items() if name != "evening/report.html"
+    }
+
+
+@pytest.mark.parametrize(
+    ("where", "option"),
+    [("lighting.json", "--lights-file"), ("comparison.png", "--mask"), ("predicted.exr", "")],
+)
+def test_what_goes_with_a_painting_is_not_written_over_either(
+    here: Path, where: str, option: str
+) -> None:
+    file = here / "out" / where
+    file.parent.mkdir()
+    arguments: list[object] = [*SOLVE, "gallery/evening.exr", option, f"out/{where}"]
+    if where == "predicted.exr":
+        (here / "a.basis.exr").rename(file)
+        arguments = ["solve", "out/predicted.exr", "gallery/evening.exr"]
+    elif where == "comparison.png":
+        file.write_bytes(png_bytes(np.full((12, 10, 3), 255, np.uint8)))
+    else:
+        file.write_text("[light.'light 0']\noff = true\n", encoding="utf-8")
+    line = refused(here, *arguments, "-o", "out", "--force")
+    assert f"out/{where} is read by this command" in line
+
+
+def test_light_groups_are_not_written_over(here: Path) -> None:
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
+    interleaved(here / "relit.exr", layers)
+    write_rgb(here / "p.exr", pictures()[0])
+    assert "relit.exr is read" in refused(here, "solve", "relit.exr", "p.exr", "-o", ".", "--force")
+    (here / "groups").mkdir()
+    (here / "relit.exr").rename(here / "groups" / "relit.exr")
+    line = refused(here, "solve", "groups", "p.exr", "-o", "groups", "--force")
+    assert "groups/relit.exr is read" in line
+
+
+@pytest.mark.usefixtures("no_render")
+def test_a_scene_is_not_written_over(here: Path, room: Path) -> None:
+    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    room.rename(here / "relit.xml")
+    for command in (
+        ("solve", "relit.xml", "p.exr", "-o", "."),
+        ("basis", "relit.xml", "-o", "relit.exr"),
+    ):
+        if command[0] == "basis":
+            os.link(here / "relit.xml", here / "relit.exr")
+        line = refused(here, *command)
+        assert "relit.xml belongs to the scene" in line or "relit.exr is read" in line
+    sky = LIGHTS["panel"] + (
+        '<emitter type="envmap" id="sky"><string name="filename" value="albedo.exr"/></emitter>'
+    )
+    write_room(here, lights=sky)
+    write_rgb(here / "albedo.exr", np.ones((4, 8, 3), np.float32))
+    line = refused(here, "template", "room.xml", "-o", ".", "--force")
+    assert "albedo.exr is read by this command" in line
+    line = refused(here, "template", "room.xml", "-o", "albedo.exr", "--force")
+    assert "albedo.exr is read by this command" in line
+    os.link(here / "albedo.exr", here / "verified.exr")
+    line = refused(here, "solve", "room.xml", "p.exr", "-o", ".", "--force")
+    assert "verified.exr is read by this command" in line
+
+
+def test_earlier_results_are_kept_unless_they_answer_the_same_painting(here: Path) -> None:
+    succeed(here, *SOLVE, "gallery/evening.exr")
+    (here / "evening" / "notes.txt").write_text("mine", encoding="utf-8")
+    before = contents(here / "evening")
+    line = refused(here, *SOLVE, "template/evening.exr")
+    assert line == (
+        "lightpaint solve: evening holds the answer to gallery/evening.exr, not to "
+        "template/evening.exr: name another folder (-o), or replace it (--force)"
+    )
+    assert contents(here / "evening") == before
+    # A designer paints on, in the same file.
+    os.replace(here / "template" / "evening.exr", here / "gallery" / "evening.exr")
+    succeed(here, *SOLVE, "./template/../gallery/evening.exr", "--off", "light 0")
+    after = contents(here / "evening")
+    assert after["lighting.json"] != before["lighting.json"]
+    assert after["notes.txt"] == b"mine"
+    # Also where the whole has been moved.
+    (here / "moved").mkdir()
+    for name in ("evening", "gallery", "a.basis.exr"):
+        (here / name).rename(here / "moved" / name)
+    succeed(here / "moved", *SOLVE, "gallery/evening.exr")
+
+
+def test_force_replaces_whatever_it_was(here: Path) -> None:
+    succeed(here, *SOLVE, "gallery/evening.exr")
+    (here / "evening" / "notes.txt").write_text("mine", encoding="utf-8")
+    succeed(here, *SOLVE, "template/evening.exr", "--force")
+    assert (here / "evening" / "notes.txt").is_file()
+    assert json.loads((here / "evening" / RECORD).read_text())["answers"] == [
+        "../template/evening.exr"
+    ]
+    succeed(here, *SOLVE, "template/evening.exr")
+
+
+def test_two_paintings_of_one_name_in_one_command(here: Path) -> None:
+    line = refused(here, *SOLVE, "template/evening.exr", "gallery/evening.exr", "-o", "out")
+    assert "results would overwrite each other in evening: give" in line
+
+
+def test_jobs_that_were_born_before_the_other_was_run(here: Path) -> None:
+    jobs = [
+        lp.Job((), (lp.Painting(f"{name}/evening.exr"),), Path("out"), BasisFile("a.basis.exr"))
+        for name in ("template", "gallery")
+    ]
+    lp.run(jobs[0])
+    before = contents(here / "out")
+    with pytest.raises(OutputError, match=r"holds the answer to template/evening\.exr"):
+        lp.run(jobs[1])
+    assert contents(here / "out") == before
+    lp.run(jobs[0])
+
+
+def test_what_comes_to_the_folder_during_a_run_is_kept(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two of one name at once, as `xargs -P` starts them."""
+    from lightpaint import pipeline
+
+    job, other = (
+        lp.Job((), (lp.Painting(f"{name}/evening.exr"),), Path("out"), BasisFile("a.basis.exr"))
+        for name in ("template", "gallery")
+    )
+    once = pipeline.analyse
+    with monkeypatch.context() as patch:
+
+        def meanwhile(*given: Any) -> Any:
+            patch.setattr(pipeline, "analyse", once)
+            lp.run(other)
+            return once(*given)
+
+        patch.setattr(pipeline, "analyse", meanwhile)
+        with pytest.raises(OutputError, match=r"holds the answer to gallery/evening\.exr"):
+            lp.run(job)
+    assert json.loads((here / "out" / RECORD).read_text())["answers"] == ["../gallery/evening.exr"]
+    assert [path.name for path in here.glob(".*")] == []
+
+
+def test_results_of_an_older_version_say_nothing_of_whose_they_are(here: Path) -> None:
+    succeed(here, *SOLVE, "gallery/evening.exr")
+    (here / "evening" / RECORD).unlink()
+    (here / "evening" / "relit.xml").write_text("earlier", encoding="utf-8")
+    line = refused(here, *SOLVE, "gallery/evening.exr")
+    assert "evening holds results that do not say what they answer, as an older" in line
+    assert line.endswith("name another folder (-o), or replace it (--force)")
+    succeed(here, *SOLVE, "gallery/evening.exr", "--force")
+    assert not (here / "evening" / "relit.xml").exists()
+    succeed(here, *SOLVE, "gallery/evening.exr")
+
+
+@pytest.mark.parametrize("name", ["report.html", "lighting.json", RECORD])
+def test_somebody_else_s_files_are_kept(here: Path, name: str) -> None:
+    (here / "out").mkdir()
+    (here / "out" / name).write_text("{}", encoding="utf-8")
+    line = refused(here, *SOLVE, "gallery/evening.exr", "-o", "out")
+    assert ("say what they answer" if name == "lighting.json" else "no result of") in line
+    assert (here / "out" / name).read_text() == "{}"
+
+
+@pytest.mark.parametrize("name", ["lighting.json", "report.html"])
+def test_what_was_changed_by_hand_is_kept(here: Path, name: str) -> None:
+    succeed(here, *SOLVE, "gallery/evening.exr")
+    with (here / "evening" / name).open("a", encoding="utf-8") as file:
+        file.write("\n")
+    line = refused(here, *SOLVE, "gallery/evening.exr")
+    assert f"evening/{name} was changed since lightpaint wrote it" in line
+    (here / "evening" / name).unlink()
+    succeed(here, *SOLVE, "gallery/evening.exr")
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"files": {"../gallery/evening.exr": "00000000"}},
+        {"files": {"/etc/hostname": "00000000", "lighting.json": 7}},
+        {"answers": "all"},
+        {"format": "another"},
+    ],
+)
+def test_a_damaged_record_is_none(here: Path, damage: dict[str, Any]) -> None:
+    succeed(here, *SOLVE, "gallery/evening.exr")
+    path = here / "evening" / RECORD
+    record = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(record | damage), encoding="utf-8")
+    line = refused(here, *SOLVE, "gallery/evening.exr")
+    assert "do not say what they answer" in line
+    succeed(here, *SOLVE, "gallery/evening.exr", "--force")
+    assert (here / "gallery" / "evening.exr").is_file()
+
+
+def test_targets_in_memory_go_by_their_names(here: Path, make_basis: Any) -> None:
+    basis = make_basis(3)
+    target = lp.Target.of(basis.images[0], name="key")
+    lp.paint_with_light(None, target, "out", basis=basis)
+    lp.paint_with_light(None, replace(target, image=2 * target.image), "out", basis=basis)
+    other = replace(target, name="fill")
+    with pytest.raises(OutputError, match=r"key \(in memory\), not to fill \(in memory\)"):
+        lp.paint_with_light(None, other, "out", basis=basis)
+    lp.paint_with_light(None, other, "out", basis=basis, force=True)
+    # What was read from a file is that file's.
+    read = lp.read_target("gallery/evening.exr")
+    lp.paint_with_light(None, read, "read", basis=basis)
+    lp.paint_with_light(None, "gallery/evening.exr", "read", basis=basis)
+
+
+def test_relight_keeps_what_is_not_its_own(here: Path, room: Path) -> None:
+    def relight(*how: object) -> Any:
+        return run(here, "relight", "room.xml", *how, "--spp", 2)
+
+    scene = lp.load_scene(room)
+    write_rgb(here / "look.exr", np.ones((20, 24, 3), np.float32))
+    lp.paint_with_light(scene, "look.exr", "look", spp=2)
+    # Edited by hand, as the documents say, and relit where it lies.
+    lighting = here / "look" / "lighting.json"
+    lighting.write_text(lighting.read_text() + "\n", encoding="utf-8")
+    assert relight("look/lighting.json").returncode == 0
+    assert relight("look/lighting.json").returncode == 0
+    names = {"relit.xml", "relit.exr", "relit.png", "report.html", "lighting.json"}
+    assert names <= contents(here / "look").keys()
+    line = refused(here, "solve", "room.xml", "look.exr", "--spp", 2)
+    assert "look/lighting.json was changed" in line
+
+    # Another of that name does not meet it, and what is read is not written over.
+    (here / "other").mkdir()
+    (here / "other" / "lighting.json").write_bytes(lighting.read_bytes())
+    before = contents(here)
+    done = relight("other/lighting.json")
+    assert done.returncode == 2
+    assert "look holds the answer to look.exr, not to other/lighting.json" in done.stderr
+    done = relight("other/lighting.json", "look/lighting.json")
+    assert "results would overwrite each other in look: give" in done.stderr
+    os.link(lighting, here / "other" / "relit.png")
+    done = relight("look/lighting.json", "-o", "other", "--force")
+    assert "other/relit.png is read by this command" in done.stderr
+    (here / "other" / "relit.png").unlink()
+    assert contents(here) == before
+
+    assert relight("other/lighting.json", "-o", "new").returncode == 0
+    assert relight("other/lighting.json", "-o", "new").returncode == 0
+    done = relight("look/lighting.json", "-o", "new")
+    assert "new holds the answer to other/lighting.json, not to look/lighting.json" in done.stderr
+    # What replaces a solve's results leaves none of them behind.
+    assert relight("other/lighting.json", "-o", "look", "--force").returncode == 0
+    assert contents(here / "look").keys() == {"relit.xml", "relit.exr", "relit.png", RECORD}
+
+
+def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(here: Path, room: Path) -> None:
+    """Also where the scene lies in the folder itself, and the relit one is written there."""
+    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    for folder in ("out", "."):
+        look = lp.paint_with_light(lp.load_scene("room.xml"), "p.exr", folder, spp=2)
+        assert look.relit is not None
+        assert look.relit.path == Path(folder) / "relit.xml"
+        assert lp.verify(look.predicted, look.relit, spp=2).agrees
+        again = lp.relight(look.relit, look.lighting, "again.xml")
+        assert again.light("panel").emission == pytest.approx(look.lighting.emission["panel"])
+        way = f'<path value="{os.path.relpath(".", folder)}"/>'
+        assert way in (Path(folder) / "relit.xml").read_text(encoding="utf-8")
+        assert run(here, "verify", folder).returncode == 0
+
+
+def test_views_that_are_not_painted_any_more_go(here: Path, make_basis: Any) -> None:
+    from lightpaint.result_folder import ResultFolder
+
+    both = ResultFolder(Path("out"), (Path("out/a/x"), Path("out/b/x")), (), ("a", "b"))
+    one = replace(both, files=(Path("out/a/x"),), answers=("a",))
+    for folder, names in ((one, ["a"]), (both, ["a", "b"])):
+        folder.check()
+        with folder.filled() as stage:
+            for name in names:
+                (stage / name).mkdir()
+                (stage / name / "x").touch()
+    # The answer to b would be lost.
+    with pytest.raises(OutputError, match=r"holds the answer to a \(in memory\) and b \(in mem"):
+        one.check()
+    forced = replace(one, force=True)
+    with forced.filled() as stage:
+        (stage / "a").mkdir()
+        (stage / "a" / "x").touch()
+    assert contents(here / "out").keys() == {"a/x", RECORD}
+    assert not (here / "out" / "b").exists()
+
+
+@pytest.mark.usefixtures("no_render")
+def test_a_folder_where_a_result_should_go_is_said_before_it_renders(
+    here: Path, room: Path
+) -> None:
+    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    for folder in ("out/predicted.exr", "out/relit.png", "x.exr", "y.png", "t/albedo.exr"):
+        (here / folder).mkdir(parents=True)
+    lp.write_lighting("l.json", replace(_lighting(room), target="out"))
+    for command, file in (
+        (("solve", "room.xml", "p.exr", "-o", "out"), "out/predicted.exr"),
+        (("relight", "room.xml", "l.json"), "out/relit.png"),
+        (("basis", "room.xml", "-o", "x.exr"), "x.exr"),
+        (("template", "room.xml", "-o", "x.exr"), "x.exr"),
+        (("template", "room.xml", "-o", "y.exr"), "y.png"),
+        (("template", "room.xml", "-o", "t"), "t/albedo.exr"),
+    ):
+        line = refused(here, *command)
+        assert f"{file} is a folder, where a file is to be written" in line
+
+
+@pytest.mark.usefixtures("no_render")
+def test_places_that_are_not_utf_8_are_said_before_it_renders(here: Path, room: Path) -> None:
+    name = os.fsdecode(b"evening\xff")
+    write_rgb(here / "p.exr", np.ones((20, 24, 3), np.float32))
+    for ending in ("png", "exr"):
+        os.link(here / "p.exr", here / f"{name}.{ending}")
+        line = refused(here, *SOLVE, f"{name}.{ending}")
+        assert f"evening\\udcff.{ending} is not a name in UTF-8: rename the file" in line
+    lp.write_lighting("l.json", _lighting(room))
+    for command in (
+        ("solve", "room.xml", "p.exr", "-o", name),
+        ("relight", "room.xml", "l.json", "-o", name),
+        ("basis", "room.xml", "-o", f"{name}.basis.exr"),
+        ("template", "room.xml", "-o", name),
+        ("template", "room.xml", "-o", f"{name}.exr"),
+    ):
+        line = refused(here, *command)
+        assert "evening\\udcff" in line
+        assert "is not a name in UTF-8: choose another (-o)" in line
+
+
+def _lighting(room: Path) -> lp.Lighting:
+    """As the scene is now."""
+    basis = lp.render_basis(lp.load_scene(room), spp=2)
+    image = basis.images.sum(axis=0)
+    return lp.solve(basis, lp.Target.of(image)).lighting
+
+
+@pytest.mark.usefixtures("no_render")
+def test_a_template_keeps_what_is_there(here: Path, room: Path) -> None:
+    (here / "mattes").mkdir()
+    for name in ("mattes/mine.png", "depth.exr"):
+        (here / name).write_text("mine", encoding="utf-8")
+        line = refused(here, "template", "room.xml", "-o", ".")
+        assert f"{name} exists and may have been painted on" in line
+        (here / name).unlink()
+
+
+def test_a_forced_template_leaves_what_is_not_its_own(here: Path, room: Path) -> None:
+    how = ("template", "room.xml", "--spp", 2)
+    succeed(here, *how)
+    (here / "template" / "mattes" / "mine.png").write_text("mine", encoding="utf-8")
+    assert (here / "template" / "evening.exr").is_file()
+    succeed(here, *how, "--force")
+    assert (here / "template" / "mattes" / "mine.png").is_file()
+    assert (here / "template" / "evening.exr").is_file()
+    about = json.loads((here / "template" / "template.json").read_text(encoding="utf-8"))
+    assert all((here / "template" / name).is_file() for name in about["files"])

@@ -1,0 +1,327 @@
+"""Files appear in a folder together, whenever the process is killed."""
+
+import fcntl
+import os
+import signal
+import stat
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from lightpaint import staging, system
+from lightpaint.errors import OutputError
+from lightpaint.staging import JOURNAL, MARK, finish, staged
+
+EARLIER = {"a": "earlier", "deep/b": "earlier", "view/c": "earlier"}
+OTHERS = {"notes.txt": "mine", "deep/mine": "mine", "mine/too": "mine"}
+LATER = {"a": "later", "deep/b": "later", "d": "later"}
+
+#: Of EARLIER, what has no namesake in LATER.
+GONE = ("view/c",)
+
+
+def fill(folder: Path, contents: dict[str, str]) -> None:
+    for name, text in contents.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def read(folder: Path) -> dict[str, str]:
+    """What a person sees in it."""
+    return {
+        name: file.read_text(encoding="utf-8")
+        for file in folder.rglob("*")
+        if file.is_file() and not (name := file.relative_to(folder).as_posix()).startswith(".")
+    }
+
+
+def hidden(folder: Path) -> list[str]:
+    """What is left of staging, beside `folder` and in it."""
+    there = (*folder.parent.iterdir(), *folder.iterdir())
+    return [path.name for path in there if MARK in path.name or path.name == JOURNAL]
+
+
+def replace(folder: Path) -> None:
+    with staged(folder, [folder / name for name in (*EARLIER, "never there")]) as stage:
+        fill(stage, LATER)
+
+
+@pytest.fixture
+def look(tmp_path: Path) -> Path:
+    """A folder with earlier files, and others."""
+    folder = tmp_path / "look"
+    fill(folder, EARLIER | OTHERS)
+    (folder / "empty").mkdir()
+    (folder / "link").symlink_to("nowhere")
+    return folder
+
+
+@pytest.fixture(params=["exchanged", "moved", "moved within"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """How they come to their place."""
+    if request.param != "exchanged":
+        monkeypatch.setattr(staging, "is_somebody_in", lambda _folder: True)
+    if request.param == "moved within":
+        monkeypatch.setattr(staging, "is_mounted", lambda _folder: True)
+    return str(request.param)
+
+
+def test_new_files_take_the_place_of_earlier_ones_and_others_stay(look: Path, way: str) -> None:
+    look.chmod(0o751)
+    mine, before = (look / "notes.txt").stat().st_ino, look.stat().st_ino
+    replace(look)
+    assert (look.stat().st_ino != before) == (way == "exchanged")
+    assert read(look) == LATER | OTHERS
+    assert (look / "notes.txt").stat().st_ino == mine
+    assert os.readlink(look / "link") == "nowhere"
+    assert (look / "empty").is_dir()
+    assert not (look / "view").exists()
+    assert stat.S_IMODE(look.stat().st_mode) == 0o751
+    assert hidden(look) == []
+
+
+@pytest.mark.usefixtures("way")
+@pytest.mark.parametrize("trouble", [OutputError("full"), KeyboardInterrupt(), ValueError()])
+def test_trouble_leaves_all_as_it_was(look: Path, trouble: BaseException) -> None:
+    def work() -> None:
+        with staged(look, [look / "a"]) as stage:
+            fill(stage, LATER)
+            assert read(look) == EARLIER | OTHERS
+            raise trouble
+
+    with pytest.raises(type(trouble)):
+        work()
+    assert read(look) == EARLIER | OTHERS
+    assert hidden(look) == []
+
+
+def test_a_folder_that_is_not_there_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "look"
+    with pytest.raises(OutputError, match=f"^cannot write {folder}/a$"), staged(folder) as stage:
+        raise OutputError(f"cannot write {stage}/a")
+    assert list(tmp_path.iterdir()) == []
+    with staged(folder) as stage:
+        fill(stage, LATER)
+        assert not folder.exists()
+    assert read(folder) == LATER
+    assert hidden(folder) == []
+
+
+def test_whoever_works_in_a_folder_stays_in_it(look: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(look / "deep")
+    before = look.stat().st_ino
+    replace(look)
+    assert look.stat().st_ino == before
+    monkeypatch.chdir(look)
+    replace(Path())
+    assert Path("deep/b").read_text(encoding="utf-8") == "later"
+    assert read(look) == LATER | OTHERS
+    assert hidden(look) == []
+
+
+def test_a_link_to_a_folder_stays_one(look: Path, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(look)
+    replace(tmp_path / "link")
+    assert (tmp_path / "link").is_symlink()
+    assert read(look) == LATER | OTHERS
+
+
+def test_what_comes_while_names_are_exchanged_is_not_lost(
+    look: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def late(one: Path, other: Path) -> None:
+        fill(look, {"painting.png": "just saved", "deep/more": "new"})
+        (look / "saved").write_text("anew", encoding="utf-8")
+        os.replace(look / "saved", look / "notes.txt")
+        system.exchange(one, other)
+
+    monkeypatch.setattr(staging, "exchange", late)
+    replace(look)
+    came = {"painting.png": "just saved", "deep/more": "new", "notes.txt": "anew"}
+    assert read(look) == LATER | OTHERS | came
+
+
+def test_where_names_cannot_be_exchanged_files_are_moved(
+    look: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError("not here")
+
+    before = look.stat().st_ino
+    monkeypatch.setattr(staging, "exchange", refuse)
+    replace(look)
+    assert read(look) == LATER | OTHERS
+    monkeypatch.undo()
+    monkeypatch.setattr(staging, "MANY", 2)
+    replace(look)
+    assert look.stat().st_ino == before
+    assert hidden(look) == []
+
+
+#: Where a process may be killed: before each of these.
+STEPS = (
+    (os, ("mkdir", "rename", "replace", "link", "unlink", "rmdir", "open", "fsync", "chmod")),
+    (staging, ("exchange",)),
+)
+
+
+def fork() -> int:
+    with warnings.catch_warnings():
+        # Threads of other tests may wait in this process; the child asks nothing of them.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return os.fork()
+
+
+def killed_at(step: int, work: Callable[[], None]) -> bool:
+    """Do `work` in a process that is killed at its step number `step`; whether it came so far."""
+    if (child := fork()) == 0:
+        count = 0
+
+        def counted(do: Callable[..., object]) -> Callable[..., object]:
+            def counting(*args: object, **how: object) -> object:
+                nonlocal count
+                count += 1
+                if count > step:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return do(*args, **how)
+
+            return counting
+
+        for module, names in STEPS:
+            for name in names:
+                setattr(module, name, counted(getattr(module, name)))
+        try:
+            work()
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    status = os.waitpid(child, 0)[1]
+    assert status in (0, signal.SIGKILL)
+    return status != 0
+
+
+def _steps(work: Callable[[Path], None], folder: Path) -> Iterator[int]:
+    """Kill `work` at each of its steps, each time on a folder with earlier files."""
+    step = 0
+    while True:
+        look = folder / str(step)
+        fill(look, EARLIER | OTHERS)
+        goes_on = killed_at(step, lambda look=look: work(look))  # type: ignore[misc]
+        yield step
+        if not goes_on:
+            return
+        step += 1
+
+
+def test_killed_at_any_step_it_is_the_one_or_the_other(tmp_path: Path, way: str) -> None:
+    whole = (EARLIER | OTHERS, LATER | OTHERS)
+    found = []
+    for step in _steps(replace, tmp_path):
+        look = tmp_path / str(step)
+        seen = read(look)
+        if way == "exchanged":
+            assert seen in whole, step
+        finish(look)
+        found.append(whole.index(read(look)))
+        if way == "exchanged":
+            assert read(look) == seen
+        assert hidden(look) == [], step
+    # First all earlier, later all new, and no way back.
+    assert found == sorted(found)
+    assert {0, 1} == set(found)
+    assert len(found) > 25
+
+
+def test_killed_while_it_finishes_what_was_killed(tmp_path: Path) -> None:
+    def cut_short(look: Path) -> None:
+        staging.is_somebody_in = lambda _folder: True  # type: ignore[assignment]
+        before, staging._finish_stage = staging._finish_stage, lambda *_, **__: os._exit(0)
+        try:
+            replace(look)
+        finally:
+            staging._finish_stage = before
+
+    for step in range(200):
+        look = tmp_path / str(step)
+        fill(look, EARLIER | OTHERS)
+        if (child := fork()) == 0:
+            cut_short(look)
+        os.waitpid(child, 0)
+        assert read(look) == EARLIER | OTHERS
+        goes_on = killed_at(step, lambda look=look: finish(look))  # type: ignore[misc]
+        finish(look)
+        assert read(look) == LATER | OTHERS
+        assert hidden(look) == []
+        if not goes_on:
+            return
+    raise AssertionError("it never came to its end")
+
+
+@pytest.mark.usefixtures("way")
+def test_what_another_process_is_writing_is_left_alone(look: Path) -> None:
+    with staged(look) as stage:
+        fill(stage, {"a": "later"})
+        finish(look)
+        replace(look)
+        assert (stage / "a").is_file()
+    assert read(look) == LATER | OTHERS | {"a": "later"}
+    assert hidden(look) == []
+
+
+def test_an_interrupt_while_it_is_published_waits(
+    look: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(one: Path, other: Path) -> None:
+        signal.raise_signal(signal.SIGINT)
+        system.exchange(one, other)
+
+    monkeypatch.setattr(staging, "exchange", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        replace(look)
+    assert read(look) == LATER | OTHERS
+    assert hidden(look) == []
+
+
+@pytest.mark.parametrize(
+    "journal",
+    [
+        '{"move": ["../stolen"]}',
+        '{"gone": ["/etc/passwd"]}',
+        '{"old": "..", "gone": []}',
+        '{"old": "a/b"}',
+        "{",
+        '{"move": "a"}',
+    ],
+)
+def test_a_journal_from_elsewhere_reaches_nothing_outside(look: Path, journal: str) -> None:
+    (look.parent / "stolen").write_text("mine", encoding="utf-8")
+    stage = look.parent / f".look{MARK}1"
+    fill(stage, {JOURNAL: journal, "a": "theirs"})
+    fill(look, {JOURNAL: journal})
+    finish(look)
+    assert (look.parent / "stolen").read_text(encoding="utf-8") == "mine"
+    assert read(look) == EARLIER | OTHERS
+    assert not stage.exists()
+
+
+def test_a_disk_without_locks(look: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError("no locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    fresh, old = (look.parent / f".look{MARK}{k}" for k in range(2))
+    for stage in (fresh, old):
+        stage.mkdir()
+    os.utime(old, (0, 0))
+    replace(look)
+    assert read(look) == LATER | OTHERS
+    assert hidden(look) == [fresh.name]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="mounts are asked of Linux")
+def test_mounts_are_known() -> None:
+    assert system.is_mounted(Path("/proc"))
+    assert not system.is_mounted(Path(__file__).parent)
