@@ -28,13 +28,13 @@ def uv_of_black_body(kelvin: Doubles) -> Doubles:
 def uv_of(xyz: Floats) -> Doubles:
     """CIE 1960 (u, v), (…, 2), of XYZ (…, 3)."""
     X, Y, Z = np.moveaxis(np.asarray(xyz, np.float64), -1, 0)
-    return np.stack([4 * X, 6 * Y], axis=-1) / (X + 15 * Y + 3 * Z)[..., None]
+    return np.asarray(np.stack([4 * X, 6 * Y], axis=-1) / (X + 15 * Y + 3 * Z)[..., None])
 
 
 def xyz_of(uv: Floats) -> Doubles:
     """XYZ of luminance 1, (3,), of CIE 1960 (u, v)."""
     u, v = uv
-    return np.array([3 * u, 2 * v, 4 - u - 10 * v]) / (2 * v)
+    return np.asarray(np.array([3 * u, 2 * v, 4 - u - 10 * v]) / (2 * v))
 
 
 def nearest_mired(uv: Floats) -> float:
