@@ -6,15 +6,14 @@ Everything here takes linear Rec.709 (D65) with a last axis of 3.
 import math
 import re
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.difference import ciede2000, lab
 from lightpaint.colour.display import decode_display, encode_display, to_8_bit
 from lightpaint.colour.locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
-from lightpaint.colour.science import colour_science
 from lightpaint.errors import ColorError
 
 #: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
@@ -41,13 +40,7 @@ def delta_e(a: Floats, b: Floats) -> Floats:
     a, b: (…, 3) linear Rec.709 at the exposure they are looked at, white = 1. What a display
     cannot show is clipped, as the display would.
     """
-    colour = colour_science()
-
-    def lab(image: Floats) -> Any:
-        xyz = colour.RGB_to_XYZ(np.clip(image, 0, 1), "ITU-R BT.709", apply_cctf_decoding=False)
-        return colour.XYZ_to_Lab(xyz)
-
-    return np.asarray(colour.delta_E(lab(a), lab(b), method="CIE 2000"))
+    return ciede2000(*(lab(np.clip(image, 0, 1)) for image in (a, b)))
 
 
 @lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges ask for 128

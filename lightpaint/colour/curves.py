@@ -120,10 +120,13 @@ class _Sigmoid:
         )
 
     def forward(self, x: Floats) -> Floats:
-        return self._by_side(x, self.pivot[0], self.pivot[1], self._rise)
+        return self.rising(x)[0]
 
     def inverse(self, y: Floats) -> Floats:
-        return self._by_side(y, self.pivot[1], self.pivot[0], self._run)
+        (start, end), (toe, shoulder) = self.pivot, zip(self.scales, self.powers, strict=True)
+        below = start - self._run(np.maximum(end - y, 0), *toe)
+        above = start + self._run(np.maximum(y - end, 0), *shoulder)
+        return np.where(y < end, below, above)
 
     def rising(self, x: Floats) -> tuple[Floats, Floats]:
         """`forward` and its derivative."""
@@ -137,20 +140,9 @@ class _Sigmoid:
         root = grown ** (-1 / power)
         return self.pivot[1] + run * root, self.contrast * root / grown
 
-    def _rise(self, away: Floats, scale: float, power: float) -> Floats:
-        u = self.contrast * away / scale
-        return np.asarray(scale * u / (1 + u**power) ** (1 / power))
-
     def _run(self, away: Floats, scale: float, power: float) -> Floats:
         h = away / scale
         return np.asarray(scale / self.contrast * h / (1 - h**power) ** (1 / power))
-
-    def _by_side(
-        self, v: Floats, start: float, end: float, side: Callable[[Floats, float, float], Floats]
-    ) -> Floats:
-        toe = end - side(np.maximum(start - v, 0), self.scales[0], self.powers[0])
-        shoulder = end + side(np.maximum(v - start, 0), self.scales[1], self.powers[1])
-        return np.where(v < start, toe, shoulder)
 
 
 _SIGMOID = _Sigmoid()
