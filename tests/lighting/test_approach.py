@@ -60,9 +60,10 @@ def _value(solution: Solution, w: Any) -> float:
     return float(solution.problem.objective(w).sum()) + asked
 
 
-@pytest.mark.parametrize("transform", VIEWS, ids=lambda v: v.spoken)
-@pytest.mark.parametrize("hold", [0.0, 0.3])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("seed", "hold", "transform"),
+    [(0, 0.0, VIEWS[0]), (1, 0.3, VIEWS[0]), (0, 0.3, VIEWS[1]), (1, 0.0, VIEWS[2])],
+)
 def test_the_optimum_is_that_of_all_pixels(
     make_basis: Any, few: Any, seed: int, hold: float, transform: ViewTransform
 ):
