@@ -5,16 +5,15 @@ Everything here takes linear Rec.709 (D65) with a last axis of 3.
 
 import math
 import re
-import warnings
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.difference import ciede2000, lab
 from lightpaint.colour.display import decode_display, encode_display, to_8_bit
+from lightpaint.colour.locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
-from lightpaint.colour.science import colour_science
 from lightpaint.errors import ColorError
 
 #: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
@@ -25,6 +24,9 @@ KELVIN_RANGE = (1000.0, 100_000.0)
 
 #: |Duv| beyond which a colour has no correlated colour temperature (CIE 15:2018, 9.5).
 LARGEST_DUV = 0.05
+
+#: Newton's steps to the nearest black body from the nearest of those tried, with one to spare.
+STEPS = 5
 
 
 def luminance(rgb: Floats) -> Floats:
@@ -38,13 +40,7 @@ def delta_e(a: Floats, b: Floats) -> Floats:
     a, b: (…, 3) linear Rec.709 at the exposure they are looked at, white = 1. What a display
     cannot show is clipped, as the display would.
     """
-    colour = colour_science()
-
-    def lab(image: Floats) -> Any:
-        xyz = colour.RGB_to_XYZ(np.clip(image, 0, 1), "ITU-R BT.709", apply_cctf_decoding=False)
-        return colour.XYZ_to_Lab(xyz)
-
-    return np.asarray(colour.delta_E(lab(a), lab(b), method="CIE 2000"))
+    return ciede2000(*(lab(np.clip(image, 0, 1)) for image in (a, b)))
 
 
 @lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges ask for 128
@@ -64,8 +60,7 @@ def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Doubles:
     if not abs(duv) <= LARGEST_DUV:
         raise ColorError(f"a Duv of {duv:g}: need -{LARGEST_DUV:g} to {LARGEST_DUV:g}")
     at, along, _ = _locus(1e6 / kelvin)
-    colour = colour_science()
-    xyz = colour.xy_to_XYZ(colour.UCS_uv_to_xy(at + duv * _towards_green(along)))
+    xyz = xyz_of(at + duv * _towards_green(along))
     rgb = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz), 0)
     rgb /= luminance(rgb)
     rgb.setflags(write=False)
@@ -84,15 +79,11 @@ def cct_and_duv(rgb: Floats) -> tuple[float, float] | None:
     xyz = rgb_to_xyz(REC709) @ (rgb / rgb.max())
     if xyz.min() <= 0:
         return None
-    colour = colour_science()
-    uv = colour.UCS_to_uv(colour.XYZ_to_UCS(xyz))
-    with warnings.catch_warnings():
-        # It warns of colours beyond its ends, which are found below.
-        warnings.simplefilter("ignore")
-        mired = 1e6 / float(colour.temperature.uv_to_CCT_Ohno2013(uv)[0])
-    # That is good to 1e-5. Newton's steps lead to where the difference is at a right angle to the
-    # locus, so that a temperature that was asked for comes back as it was, to 1e-9.
-    for _ in range(2):
+    uv = uv_of(xyz)
+    mired = nearest_mired(uv)
+    # Newton's steps lead to where the difference is at a right angle to the locus, so that a
+    # temperature that was asked for comes back as it was, to 1e-9.
+    for _ in range(STEPS):
         at, along, bend = _locus(mired)
         mired += float((uv - at) @ along / (along @ along - (uv - at) @ bend))
         mired = min(max(mired, 1e6 / (2 * KELVIN_RANGE[1])), 2e6 / KELVIN_RANGE[0])
@@ -142,7 +133,7 @@ def _locus(mired: float) -> tuple[Doubles, Doubles, Doubles]:
     """CIE 1960 (u, v) of a black body of 1e6/mired kelvin, and its two derivatives by mired."""
     step = 1e-4 * mired
     kelvin = 1e6 / (mired + step * np.array([-1, 0, 1]))
-    before, at, after = colour_science().temperature.CCT_to_uv_Planck1900(kelvin)
+    before, at, after = uv_of_black_body(kelvin)
     return at, (after - before) / (2 * step), (after - 2 * at + before) / step**2
 
 

@@ -20,11 +20,15 @@ AGX_INSET = 0.8 * np.eye(3) + 0.2 * np.array([0.211994645, 0.392150825, 0.395854
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve for each channel, after a matrix. forward and slope take light in [0, white]."""
+    """One curve for each channel, after a matrix.
+
+    forward: display values of light in [0, white]. inverse: light of display values. rising: of
+    light in [0, white], its display values and the derivatives of these.
+    """
 
     forward: Callable[[Floats], Floats]
     inverse: Callable[[Floats], Floats]
-    slope: Callable[[Floats], Floats]
+    rising: Callable[[Floats], tuple[Floats, Floats]]
     white: float = 1.0
     matrix: Floats | None = None
 
@@ -37,20 +41,34 @@ class Curve:
             return light
         return np.asarray(light @ np.linalg.inv(self.matrix).T.astype(light.dtype))
 
-    def jacobian(self, image: Floats) -> Floats:
-        light = self._mixed(image)
-        shown = (light >= 0) & (light <= self.white)
-        slope = np.where(shown, self.slope(np.clip(light, 0, self.white)), 0)
-        matrix = np.eye(3) if self.matrix is None else self.matrix
-        return np.asarray(slope[..., None] * matrix.astype(slope.dtype))
+    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
+        light = planes if self.matrix is None else self.matrix.astype(planes.dtype) @ planes
+        its = np.minimum(np.maximum(light, 0), self.white)
+        shown, rise = self.rising(its)
+        rise *= its == light
+        if self.matrix is not None:
+            return shown, rise[:, None] * self.matrix.astype(rise.dtype)[..., None]
+        slopes = np.zeros((3, *rise.shape), rise.dtype)
+        for k in range(3):
+            slopes[k, k] = rise[k]
+        return shown, slopes
 
     def _mixed(self, image: Floats) -> Floats:
         return image if self.matrix is None else image @ self.matrix.T.astype(image.dtype)
 
 
-def _srgb_slope(light: Floats) -> Floats:
-    power = 1.055 / 2.4 * np.maximum(light, 1e-6) ** (1 / 2.4 - 1)
-    return np.where(light <= 0.0031308, 12.92, power)
+def _srgb_rising(light: Floats) -> tuple[Floats, Floats]:
+    power = 1.055 * light ** (1 / 2.4)
+    dark = light <= 0.0031308
+    slope = power / (2.4 * np.maximum(light, 1e-6))
+    power -= 0.055
+    np.multiply(light, 12.92, out=power, where=dark)
+    slope[dark] = 12.92
+    return power, slope
+
+
+def _linear_rising(light: Floats) -> tuple[Floats, Floats]:
+    return light, np.ones_like(light)
 
 
 # Narkowicz, ACES Filmic Tone Mapping Curve (2016): y = x (a x + b) / (x (c x + d) + e), a fit of
@@ -74,12 +92,12 @@ def _filmic_inverse(display: Floats) -> Floats:
     return np.asarray(np.where(linear < 0, falling, rising))
 
 
-def _filmic_slope(light: Floats) -> Floats:
+def _filmic_rising(light: Floats) -> tuple[Floats, Floats]:
     below = light * (_C * light + _D) + _E
     above = light * (_A * light + _B)
-    toned = above / below
+    shown, slope = _srgb_rising(np.minimum(above / below, 1))
     steep = ((2 * _A * light + _B) * below - above * (2 * _C * light + _D)) / below**2
-    return np.asarray(_srgb_slope(toned) * steep)
+    return shown, slope * steep
 
 
 class _Sigmoid:
@@ -102,33 +120,29 @@ class _Sigmoid:
         )
 
     def forward(self, x: Floats) -> Floats:
-        return self._by_side(x, self.pivot[0], self.pivot[1], self._rise)
+        return self.rising(x)[0]
 
     def inverse(self, y: Floats) -> Floats:
-        return self._by_side(y, self.pivot[1], self.pivot[0], self._run)
+        (start, end), (toe, shoulder) = self.pivot, zip(self.scales, self.powers, strict=True)
+        below = start - self._run(np.maximum(end - y, 0), *toe)
+        above = start + self._run(np.maximum(y - end, 0), *shoulder)
+        return np.where(y < end, below, above)
 
-    def slope(self, x: Floats) -> Floats:
-        away = np.abs(x - self.pivot[0])
-        toe, shoulder = (
-            self.contrast * (1 + (self.contrast * away / s) ** p) ** (-1 / p - 1)
-            for s, p in zip(self.scales, self.powers, strict=True)
-        )
-        return np.asarray(np.where(x < self.pivot[0], toe, shoulder))
-
-    def _rise(self, away: Floats, scale: float, power: float) -> Floats:
-        u = self.contrast * away / scale
-        return np.asarray(scale * u / (1 + u**power) ** (1 / power))
+    def rising(self, x: Floats) -> tuple[Floats, Floats]:
+        """`forward` and its derivative."""
+        below = x < self.pivot[0]
+        scale, power = (np.where(below, *each) for each in (self.scales, self.powers))
+        # To float32 as x is, if it is.
+        scale, power = scale.astype(x.dtype), power.astype(x.dtype)
+        run = self.contrast * (x - self.pivot[0])
+        u = np.abs(run) / scale
+        grown = 1 + u**power
+        root = grown ** (-1 / power)
+        return self.pivot[1] + run * root, self.contrast * root / grown
 
     def _run(self, away: Floats, scale: float, power: float) -> Floats:
         h = away / scale
         return np.asarray(scale / self.contrast * h / (1 - h**power) ** (1 / power))
-
-    def _by_side(
-        self, v: Floats, start: float, end: float, side: Callable[[Floats, float, float], Floats]
-    ) -> Floats:
-        toe = end - side(np.maximum(start - v, 0), self.scales[0], self.powers[0])
-        shoulder = end + side(np.maximum(v - start, 0), self.scales[1], self.powers[1])
-        return np.where(v < start, toe, shoulder)
 
 
 _SIGMOID = _Sigmoid()
@@ -152,16 +166,18 @@ def _agx_inverse(display: Floats) -> Floats:
     return np.where(display > 0, light, 0)
 
 
-def _agx_slope(light: Floats) -> Floats:
+def _agx_rising(light: Floats) -> tuple[Floats, Floats]:
+    shown, slope = _SIGMOID.rising(_agx_log(light))
     above = light >= 2.0**_AGX_LOW
-    of_log = 1 / (np.where(above, light, 1) * math.log(2) * _AGX_RANGE)
-    return np.where(above, _SIGMOID.slope(_agx_log(light)) * of_log, 0)
+    slope *= above
+    slope /= np.where(above, light, 1) * (math.log(2) * _AGX_RANGE)
+    return shown, slope
 
 
 #: By the name that a person gives.
 BUILT_IN = {
-    "srgb": Curve(encode_display, decode_display, _srgb_slope),
-    "linear": Curve(lambda x: x, lambda x: x, np.ones_like),
-    "filmic": Curve(_filmic, _filmic_inverse, _filmic_slope, _FILMIC_WHITE),
-    "agx": Curve(_agx, _agx_inverse, _agx_slope, 2.0**_AGX_HIGH, AGX_INSET),
+    "srgb": Curve(encode_display, decode_display, _srgb_rising),
+    "linear": Curve(lambda x: x, lambda x: x, _linear_rising),
+    "filmic": Curve(_filmic, _filmic_inverse, _filmic_rising, _FILMIC_WHITE),
+    "agx": Curve(_agx, _agx_inverse, _agx_rising, 2.0**_AGX_HIGH, AGX_INSET),
 }

@@ -42,7 +42,9 @@ def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
     """
     xy = np.asarray(primaries, dtype=np.float64).reshape(4, 2)
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
-        matrix = colour_science().normalised_primary_matrix(xy[:3], xy[3])
+        columns = np.array([xy[:, 0], xy[:, 1], 1 - xy.sum(axis=1)])
+        white = columns[:, 3] / xy[3, 1]
+        matrix = columns[:, :3] * np.linalg.solve(columns[:, :3], white)
         if xy[3, 1] > 1e-6 and np.linalg.cond(matrix) < 1e6:
             matrix.setflags(write=False)
             return np.asarray(matrix)

@@ -38,8 +38,10 @@ class Encoding(Protocol):
     def decode(self, image_display: Floats) -> Floats:
         """Linear light of display values in [0, 1]."""
 
-    def jacobian(self, image: Floats) -> Floats:
-        """(..., 3, 3): derivative of display value i by linear channel j, 0 where clipped."""
+    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
+        """Of linear light (3, p), a row for each channel: display values (3, p), and derivatives
+        (3, 3, p) of display value i by linear channel j, 0 where clipped.
+        """
 
 
 @dataclass(frozen=True)
@@ -116,8 +118,17 @@ class ViewTransform:
         (..., 3, 3): of display value i by linear channel j. 0 where the display clips. Only
         `agx` and `ocio:` mix channels.
         """
+        _, slopes = self.with_slopes(np.reshape(image, (-1, 3)).T)
+        return np.asarray(slopes.transpose(2, 0, 1).reshape(*image.shape, 3))
+
+    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
+        """What `encode` and `jacobian` say of pixels whose channels lie apart, at once.
+
+        planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p).
+        """
         scale = 2.0**self.stops
-        return np.asarray(_encoding(self.name).jacobian(image * scale) * scale)
+        shown, slopes = _encoding(self.name).with_slopes(planes * scale)
+        return shown, slopes * scale if self.stops else slopes
 
 
 @dataclass(frozen=True)

@@ -77,16 +77,16 @@ class OcioEncoding:
     def decode(self, image_display: Floats) -> Floats:
         return _applied(self._to_light, image_display)
 
-    def jacobian(self, image: Floats) -> Floats:
-        step = np.maximum(np.abs(image).max(axis=-1), 1e-4) * STEP
+    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
+        step = np.maximum(np.abs(planes).max(axis=0), 1e-4) * STEP
         columns = []
         for k in range(3):
-            aside = np.zeros(3)
+            aside = np.zeros((3, 1))
             aside[k] = 1
-            up = self.encode(image + step[..., None] * aside)
-            down = self.encode(image - step[..., None] * aside)
-            columns.append((up - down) / (2 * step[..., None]))
-        return np.stack(columns, axis=-1)
+            up = self.encode((planes + step * aside).T)
+            down = self.encode((planes - step * aside).T)
+            columns.append((up - down).T / (2 * step))
+        return self.encode(planes.T).T, np.stack(columns, axis=1)
 
     def _check_way_back(self) -> None:
         greys = np.repeat(np.linspace(0.05, 0.95, 19, dtype=np.float32), 3).reshape(1, 19, 3)

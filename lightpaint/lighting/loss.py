@@ -5,7 +5,7 @@ the loss where nothing else is asked. A `PaintingLoss` knows "at least this brig
 display shows; `reweighted.py` finds the squares that stand for it where it is least.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,9 +15,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.transform import ViewTransform
-
-#: Pixels that go through the transform at once.
-STRIP = 2**16
+from lightpaint.lighting.pixels import STRIP, Pixels, image_of, planes_of
 
 #: From arrays of all views to the part of one of them.
 Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
@@ -53,10 +51,6 @@ class Squares:
         missed = np.subtract(self.image, x, dtype=np.float64)
         return np.asarray((self.weight * np.square(missed)).sum(axis=(0, 1)))
 
-    def squares(self, x: Floats, *, from_clipping: bool = False) -> "Squares":
-        """These, at every x."""
-        return self
-
     def meant(self, x: Floats) -> Floats:
         """The image, whatever x is."""
         return self.image
@@ -64,10 +58,6 @@ class Squares:
     def missed(self, x: Floats) -> Doubles:
         """What x misses of the image, (h, w, 3)."""
         return np.asarray(np.subtract(self.image, x, dtype=np.float64))
-
-    def same_squares(self, a: Floats, b: Floats) -> bool:
-        """They are the same everywhere."""
-        return True
 
     def cut(self, part: Cut) -> "Squares":
         """Those of some of the pixels."""
@@ -106,27 +96,32 @@ class PaintingLoss:
             at_least=part(self.at_least),
         )
 
+    @cached_property
+    def pixels(self) -> Pixels:
+        """All of them, channel by channel."""
+        return Pixels(
+            planes_of(self.painted),
+            np.asarray(self.importance, np.float64).ravel(),
+            np.asarray(self.share, np.float64).ravel(),
+            planes_of(self.current),
+            planes_of(self.at_least, bool) if self._may_exceed else None,
+            self.transform,
+        )
+
     def shown(self, image: Floats) -> Doubles:
         """V of linear pixels, (…, 3)."""
-        out = np.array(image, np.float64)
-        if self.transform is not None:
-            for its in _strips(out):
-                its[:] = self.transform.encode(its)
-        return out
+        if self.transform is None:
+            return np.array(image, np.float64)
+        planes = planes_of(image)
+        out = np.empty_like(planes)
+        for start in range(0, planes.shape[1], STRIP):
+            where = slice(start, start + STRIP)
+            out[:, where] = self.transform.with_slopes(planes[:, where])[0]
+        return image_of(out, image.shape[:-1])
 
     def objective(self, x: Floats) -> Doubles:
         """F less the least that any picture could have, per channel, (3,). x: (h, w, 3)."""
-        shown = self.shown(x)
-        wanted = self._shown_painting
-        if (exceeds := self._exceeds(x)).any():
-            its = exceeds.any(axis=-1)
-            wanted = wanted.copy()
-            wanted[its] = self.shown(self._moved(x)[its])
-        q, D = self.share[..., None], self.importance[..., None]
-        terms = (1 - q) * np.square(wanted - shown)
-        if self.share.any():
-            terms += q * (np.square(self._shown_current - shown)) - self._inevitable
-        return np.asarray((D * terms).sum(axis=(0, 1)))
+        return self.pixels.objective(planes_of(x))
 
     @cached_property
     def norm2(self) -> Doubles:
@@ -142,70 +137,6 @@ class PaintingLoss:
         """V(ψ) − V(x), (h, w, 3): what a picture misses of the painting."""
         return np.asarray(self.shown(self._moved(x)) - self.shown(x))
 
-    def same_squares(self, a: Floats, b: Floats) -> bool:
-        """Whether the squares made for two pictures are the same, and so exact between them."""
-        if self.transform is not None:
-            return False
-        differ = self._exceeds(a) != self._exceeds(b)
-        return not differ[self.importance > 0].any()
-
-    def squares(self, x: Floats, *, from_clipping: bool = False) -> Squares:
-        """Squares with F's own gradient at x, (h, w, 3).
-
-        from_clipping: where the display clips x but not what is wanted there, F is flat. With it
-        x is drawn back from there, as strongly as the chord between the two is steep.
-        """
-        image, factor, share = np.zeros((3, *x.shape))
-        rows = [a.reshape(-1, a.shape[-1]) for a in (x, self._moved(x), self.current)]
-        exceeds, q = self._exceeds(x).reshape(-1, 3), self.share.reshape(-1, 1)
-        for where in _parts(x):
-            lit, wanted, now = (a[where].astype(np.float64) for a in rows)
-            made = self._of_strip(
-                lit, wanted, now, exceeds[where], q[where], from_clipping=from_clipping
-            )
-            for whole, part in zip((image, factor, share), made, strict=True):
-                whole.reshape(-1, 3)[where] = part
-        return Squares(image, self.importance[..., None] * factor, share)
-
-    def _of_strip(
-        self,
-        x: Floats,
-        wanted: Floats,
-        current: Floats,
-        exceeds: Bools,
-        q: Floats,
-        *,
-        from_clipping: bool,
-    ) -> tuple[Floats, Floats, Floats]:
-        """image, factor and share of some pixels, (p, 3) each. As of `squares`."""
-        if self.transform is None:
-            counts = (1 - q) * ~exceeds
-            factor, gradient = counts + q, counts * (wanted - x) + q * (current - x)
-            from_current = q * np.ones(3)
-        else:
-            own, shown = self.transform.jacobian(x), self.transform.encode(x)
-            factor, gradient, from_current = np.zeros((3, *x.shape))
-            for part, goal, moves in ((1 - q, wanted, exceeds), (q, current, None)):
-                if not part.any():
-                    continue
-                missed = self.transform.encode(goal) - shown
-                slope = _with_chords(own, missed, goal - x) if from_clipping else own
-                if moves is not None and moves.any():
-                    # What is wanted there moves along with x.
-                    slope = slope - self.transform.jacobian(goal) * moves[:, None, :]
-                gradient += part * np.einsum("pkc,pk->pc", slope, missed)
-                # The squares of channels that the transform mixes, from above by those of single
-                # ones.
-                mixed = np.einsum("pkc,pkd->pcd", slope, slope)
-                factor += part * np.abs(mixed).sum(axis=-1)
-            if q.any():
-                steep = np.einsum("pkc,pkc->pc", own, self.transform.jacobian(current))
-                from_current = q * steep
-        some = factor > 0
-        safe = np.where(some, factor, 1)
-        image = x + np.where(some, gradient / safe, 0)
-        return image, factor, np.where(some, from_current / safe, 0)
-
     def _exceeds(self, x: Floats) -> Bools:
         return self.at_least & (x > self.painted) if self._may_exceed else self.at_least
 
@@ -217,40 +148,6 @@ class PaintingLoss:
         """ψ at x, (h, w, 3)."""
         return np.asarray(np.where(self._exceeds(x), x, self.painted), np.float64)
 
-    @cached_property
-    def _shown_painting(self) -> Doubles:
-        return self.shown(self.painted)
-
-    @cached_property
-    def _shown_current(self) -> Doubles:
-        return self.shown(self.current)
-
-    @cached_property
-    def _inevitable(self) -> Doubles:
-        """What the painting and the current look cost each other, (h, w, 3), without D."""
-        q = self.share[..., None]
-        apart = np.square(self._shown_painting - self._shown_current)
-        apart = np.where(self.at_least & (self.current >= self.painted), 0, apart)
-        return np.asarray(q * (1 - q) * apart)
-
 
 #: F, of pictures x, (h, w, 3) linear; seen through its transform, or as linear light.
 Loss = Squares | PaintingLoss
-
-
-def _with_chords(own: Floats, missed: Floats, way: Floats) -> Doubles:
-    """Derivatives (p, 3, 3) with chords of display values that are flat and miss something."""
-    flat = ~own.any(axis=-1) & (missed * way > 0)
-    chord = np.where(flat, missed / np.where(flat, way, 1), 0)
-    return np.asarray(own + chord[..., None] * np.eye(3))
-
-
-def _parts(image: Floats) -> Iterator[slice]:
-    pixels = image.size // image.shape[-1]
-    return (slice(start, start + STRIP) for start in range(0, pixels, STRIP))
-
-
-def _strips(image: Doubles) -> Iterator[Doubles]:
-    """A contiguous image (…, 3) by parts (p, 3) that look at its memory."""
-    rows = image.reshape(-1, 3)
-    return (rows[where] for where in _parts(image))

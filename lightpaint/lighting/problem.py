@@ -16,6 +16,7 @@ from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.whites import white_where_free
 from lightpaint.lighting.fit import Fit, Space, meant_by
+from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.painting import (
@@ -28,7 +29,6 @@ from lightpaint.lighting.painting import (
     what_counts,
 )
 from lightpaint.lighting.pull import to_colors, to_present
-from lightpaint.lighting.reweighted import predicted
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
@@ -180,7 +180,7 @@ class Problem:
     @property
     def brightness(self) -> float:
         """By how much the view transform brightens the squares of light."""
-        transform = self.loss.transform
+        transform = self.fit.transform
         return 1.0 if transform is None else float(4.0**transform.stops)
 
     @property
@@ -225,9 +225,10 @@ class Problem:
 
     def objective(self, weights: Doubles) -> Doubles:
         """(3,), what weights (n, 3) miss."""
-        if self.is_linear:
+        if isinstance(self.loss, Squares):
             return self.equations.objective(weights)
-        return self.loss.objective(predicted(self.basis, weights))
+        lit = LitPixels.whole(self.basis, self.loss)
+        return lit.pixels.objective(lit.predicted(weights))
 
     def of_view(self, k: int) -> "Problem":
         """The problem of view k alone: its pixels of the same squares."""

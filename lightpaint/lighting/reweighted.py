@@ -6,14 +6,16 @@ answer is stationary under all that is asked of the lights: of a convex loss the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.loss import Loss, Squares
-from lightpaint.lighting.normal_equations import BLOCK, NormalEquations
+from lightpaint.lighting.lit_pixels import LitPixels
+from lightpaint.lighting.loss import PaintingLoss, Squares
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.pixels import Pixels, image_of
 
 #: Rounds at most.
 ROUNDS = 100
@@ -48,6 +50,11 @@ class Reweighting:
     converged: bool
 
 
+#: The weights (n, 3) that are best for equations, and for what is asked of the weights, from those
+#: to begin with; the set of those it may return is convex.
+Solve = Callable[[NormalEquations, Doubles], Doubles]
+
+
 @dataclass(frozen=True)
 class Descent:
     """Where the rounds led: weights, and the last linear problem.
@@ -61,109 +68,166 @@ class Descent:
     reweighting: Reweighting
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What is added to the loss of the pixels: pull(w) − 2 tilt · (w − origin).
+
+    pull: of the weights; None for none. tilt, origin: (n, 3).
+    """
+
+    pull: NormalEquations | None = None
+    tilt: Doubles | None = None
+    origin: Doubles | None = None
+
+    def value(self, w: Doubles) -> float:
+        value = 0.0 if self.pull is None else float(self.pull.objective(w).sum())
+        if self.tilt is not None and self.origin is not None:
+            value -= 2 * float((self.tilt * (w - self.origin)).sum())
+        return value
+
+    def fall(self, w: Doubles, best: Doubles) -> float:
+        """By how much it falls per step from w to `best`, at its beginning."""
+        way, fall = best - w, 0.0
+        if self.pull is not None:
+            fall -= 2 * float((self.pull.gradient(w) * way).sum())
+        return fall if self.tilt is None else fall + 2 * float((self.tilt * way).sum())
+
+    def tilted(self, equations: NormalEquations) -> NormalEquations:
+        """`equations` with the tilt; whoever solves them knows of the pull."""
+        return equations if self.tilt is None else replace(equations, b=equations.b + self.tilt.T)
+
+
+@dataclass(frozen=True)
+class Led:
+    """Where rounds over some pixels led.
+
+    weights: (n, 3). at: (n, 3), the weights that the last squares were made for; x: (3, p), their
+    picture. from_clipping: how these squares were made. image, weight: (3, p), what they are.
+    count, step, converged: as of `Reweighting`.
+    """
+
+    weights: Doubles
+    at: Doubles
+    x: Doubles
+    from_clipping: bool
+    image: Doubles
+    weight: Doubles
+    equations: NormalEquations
+    count: int
+    step: float
+    converged: bool
+
+
 def descend(
     basis: Basis,
-    loss: Loss,
+    loss: PaintingLoss,
     start: Doubles,
-    solve: Callable[[NormalEquations, Doubles], Doubles],
+    solve: Solve,
     *,
     pull: NormalEquations | None = None,
+    from_clipping: bool = True,
 ) -> Descent:
     """Minimise `loss` over what `solve` keeps to, from the weights `start`, (n, 3).
 
-    solve: (equations, weights to begin with) → the weights (n, 3) that are best for them; the
-    set of those it may return is convex. pull: of the weights, added to the loss; `solve` adds
-    it by itself.
+    pull: of the weights, added to the loss; `solve` adds it by itself. from_clipping: as of
+    `rounds`.
     """
-    w, x = start, predicted(basis, start)
-    value = _value(loss, pull, w, x)
-    # First with what is drawn back from clipping, then with the loss's own slope.
-    from_clipping = loss.transform is not None
+    lit = LitPixels.of(basis, loss)
+    led = rounds(lit, Asked(pull), start, solve, from_clipping=from_clipping)
+    x, image, weight = led.x, led.image, led.weight
+    if lit.which is not None:
+        x = LitPixels.whole(basis, loss).predicted(led.at)
+        image, weight = loss.pixels.squares(x, from_clipping=led.from_clipping)
+    share = loss.pixels.shares(x, weight)
+    squares = Squares(*(image_of(planes, basis.size) for planes in (image, weight, share)))
+    told = Reweighting(led.at, led.count, led.step, led.converged)
+    return Descent(led.weights, squares, led.equations, told)
+
+
+def rounds(
+    lit: LitPixels,
+    asked: Asked,
+    start: Doubles,
+    solve: Solve,
+    *,
+    from_clipping: bool,
+    until: float = STEP,
+) -> Led:
+    """Minimise the loss of some pixels and what is asked beside it, from weights (n, 3).
+
+    from_clipping: first with what is drawn back from clipping, then with the loss's own slope.
+    until: the change of a light's picture that ends them.
+    """
+    pixels = lit.pixels
+    is_display = pixels.transform is not None
+    from_clipping = from_clipping and is_display
+    w, x = start, lit.predicted(start)
+    value = value_of(pixels, asked, w, x)
     count = 0
     while True:
-        squares = loss.squares(x, from_clipping=from_clipping)
-        equations = NormalEquations.of(basis, squares.image, squares.weight)
-        best = solve(equations, w)
+        image, weight = pixels.squares(x, from_clipping=from_clipping)
+        equations = lit.equations(image, weight)
+        best = solve(asked.tilted(equations), w)
         count += 1
-        ahead = predicted(basis, best)
-        step = _change(equations, w, best)
-        fall = _fall(squares, pull, x, ahead, w, best)
+        ahead = lit.predicted(best)
+        step = change(equations, w, best)
+        fall = 2 * lit.slope(image, weight, x, ahead) + asked.fall(w, best)
         # A problem that is exact all the way has its optimum where the true one has it.
-        is_exact = loss.same_squares(x, ahead)
-        done = is_exact if loss.transform is None else step <= STEP or fall <= FALL * value
-        part, reached = _part_of_step(loss, pull, (w, best), (x, ahead), value, fall)
+        is_exact = pixels.same_squares(x, ahead)
+        done = step <= until or fall <= FALL * value if is_display else is_exact
+        part, reached = 1.0, value_of(pixels, asked, best, ahead)
+        is_worse = reached > value * (1 + ROUND_OFF)
+        if is_worse or from_clipping or not done:
+            steps = (w, best), (x, ahead)
+            part, reached = _part_of_step(pixels, asked, *steps, value, reached, fall)
         if from_clipping and (done or part == 0):
             from_clipping = False
             if part == 0:
                 continue
             done = False
         if done or part == 0 or count >= ROUNDS:
-            is_worse = _value(loss, pull, best, ahead) > value * (1 + ROUND_OFF)
             small = done or (part == 0 and fall <= FLAT * value)
-            weights = w + part * (best - w) if is_worse else best
-            return Descent(weights, squares, equations, Reweighting(w, count, step, small))
-        w, x, value = w + part * (best - w), x + part * (ahead - x), reached
+            weights = between(w, best, part) if is_worse else best
+            return Led(weights, w, x, from_clipping, image, weight, equations, count, step, small)
+        w, x, value = between(w, best, part), between(x, ahead, part), reached
 
 
-def predicted(basis: Basis, weights: Doubles) -> Doubles:
-    """Σ w_i Φ_i, (h, w, 3), in float64: a float32's round-off would hide the last steps."""
-    n, height, width, _ = basis.images.shape
-    rows = basis.images.reshape(n, -1, 3)
-    mixed = np.empty((height * width, 3))
-    for start in range(0, height * width, BLOCK):
-        where = slice(start, start + BLOCK)
-        for c in range(3):
-            mixed[where, c] = weights[:, c] @ rows[:, where, c].astype(np.float64)
-    return mixed.reshape(height, width, 3)
+def change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:
+    """Largest change of a light's picture beside the brightest one of its channel."""
+    size = np.sqrt(np.einsum("cii->ic", equations.M))
+    largest = (size * np.maximum(w, best)).max(axis=0, initial=0)
+    moved = (size * np.abs(best - w)).max(axis=0, initial=0)
+    return float((moved / np.where(largest > 0, largest, 1)).max())
 
 
-def _value(loss: Loss, pull: NormalEquations | None, w: Doubles, x: Doubles) -> float:
-    value = float(loss.objective(x).sum())
-    return value if pull is None else value + float(pull.objective(w).sum())
-
-
-def _fall(
-    squares: Squares,
-    pull: NormalEquations | None,
-    x: Doubles,
-    ahead: Doubles,
-    w: Doubles,
-    best: Doubles,
-) -> float:
-    """By how much the loss falls per step, at its beginning."""
-    slope = squares.weight * (squares.image - x)
-    fall = 2 * float((slope * (ahead - x)).sum())
-    if pull is not None:
-        gradient = pull.gradient(w)
-        fall -= 2 * float((gradient * (best - w)).sum())
-    return fall
+def value_of(pixels: Pixels, asked: Asked, w: Doubles, x: Doubles) -> float:
+    """The loss of a picture x, (3, p), and what is asked of its weights, (n, 3)."""
+    return float(pixels.objective(x).sum()) + asked.value(w)
 
 
 def _part_of_step(
-    loss: Loss,
-    pull: NormalEquations | None,
+    pixels: Pixels,
+    asked: Asked,
     weights: tuple[Doubles, Doubles],
     pictures: tuple[Doubles, Doubles],
     value: float,
+    whole: float,
     fall: float,
 ) -> tuple[float, float]:
     """How much of a step to take, and the loss there: half of it until the loss falls enough.
 
-    0 if it never does.
+    0 if it never does. whole: the loss after all of the step.
     """
-    (w, best), (x, ahead) = weights, pictures
-    part = 1.0
-    while part >= SHORTEST:
-        reached = _value(loss, pull, w + part * (best - w), x + part * (ahead - x))
-        if reached <= value - KEPT * part * max(fall, 0):
-            return (part, reached) if reached < value else (0.0, value)
+    part, reached = 1.0, whole
+    while reached > value - KEPT * part * max(fall, 0):
         part /= 2
-    return 0.0, value
+        if part < SHORTEST:
+            return 0.0, value
+        w, x = (between(*ends, part) for ends in (weights, pictures))
+        reached = value_of(pixels, asked, w, x)
+    return (part, reached) if reached < value else (0.0, value)
 
 
-def _change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:
-    """Largest change of a light's picture beside the brightest one of its channel."""
-    size = np.sqrt(np.einsum("cii->ic", equations.M))
-    largest = (size * np.maximum(w, best)).max(axis=0, initial=0)
-    change = (size * np.abs(best - w)).max(axis=0, initial=0)
-    return float((change / np.where(largest > 0, largest, 1)).max())
+def between(a: Doubles, b: Doubles, part: float) -> Doubles:
+    """From a by that part of the way to b."""
+    return b if part == 1 else a + part * (b - a)

@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
+from lightpaint.lighting.approach import near_optimum
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import (
@@ -19,6 +20,7 @@ from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.constraints.sparse import best_knobs
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import descend
@@ -87,9 +89,10 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     if problem.is_linear:
         return _linear(problem, begin)
     # The painting is first taken at its word, which also tells what lights reach.
-    first = _linear(replace(problem, constraints=_of_all(problem.constraints)), begin)
+    every = replace(problem, constraints=_of_all(problem.constraints))
+    first = _linear(replace(every, loss=problem.squares), begin)
     reached = first.reached
-    solution = _descended(first.problem, first.weights, reached)
+    solution = _descended(every, first.weights, reached)
     if problem.constraints.sparse is not None:
         # The lights are chosen where all of them would lead.
         chosen = _linear(
@@ -157,13 +160,14 @@ def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
         asked = problem.pulled(equations)
         return solve_reduced(asked, problem.reduction, begin, method=problem.fit.method)
 
-    found = descend(
-        problem.basis,
-        problem.loss,
-        start,
-        lambda equations, begin: best_of(equations, begin).weights,
-        pull=problem.pull,
-    )
+    def weights_of(equations: NormalEquations, begin: Doubles) -> Doubles:
+        return best_of(equations, begin).weights
+
+    basis, loss, pull = problem.basis, problem.loss, problem.pull
+    assert isinstance(loss, PaintingLoss)
+    near = near_optimum(basis, loss, problem.equations, start, weights_of, pull=pull)
+    begin = start if near is None else near
+    found = descend(basis, loss, begin, weights_of, pull=pull, from_clipping=near is None)
     solved = replace(problem, squares=found.squares, equations=found.equations)
     optimum = best_of(found.equations, found.reweighting.at)
     equations = problem.pulled(found.equations)

@@ -8,7 +8,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from lightpaint.errors import SceneError
 from lightpaint.scene.checks.tokens import attributes, decoded, encoding_of, line_of, markup
@@ -115,6 +114,9 @@ def tag(element: str, /, **attributes: str) -> str:
 
     Raises SceneError if one holds a `$`, which cannot be escaped.
     """
+    # It brings half of the network's protocols along.
+    from xml.sax.saxutils import quoteattr
+
     for key, value in attributes.items():
         if "$" in value:
             raise SceneError(

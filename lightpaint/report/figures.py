@@ -45,12 +45,22 @@ class Picture:
 
 def data_uri(image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = LARGEST_PNG) -> str:
     """An (h, w, 3) picture as a data: URI: lossless while it is small, else a good JPEG."""
-    data, kind = png_bytes(image_8_bit), "png"
-    if len(data) > largest_png:
+    data, kind = _small_png(image_8_bit, largest_png), "png"
+    if data is None:
         buffer = io.BytesIO()
         Image.fromarray(image_8_bit).save(buffer, "JPEG", quality=91, subsampling=0)
         data, kind = buffer.getvalue(), "jpeg"
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _small_png(image_8_bit: npt.NDArray[np.uint8], largest: int) -> bytes | None:
+    """A picture as a PNG of that many bytes at most, if it can be one."""
+    # A quarter of it tells what will be far too large.
+    quarter = image_8_bit[: -(-len(image_8_bit) // 4)]
+    if largest == 0 or len(png_bytes(quarter)) > 0.5 * largest:
+        return None
+    data = png_bytes(image_8_bit)
+    return data if len(data) <= largest else None
 
 
 def thumbnail(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> tuple[Floats, float]:

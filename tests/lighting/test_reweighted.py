@@ -21,8 +21,8 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
+from lightpaint.lighting.pixels import image_of, planes_of
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.reweighted import predicted
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again, solve
 from lightpaint.target.target import Target
@@ -129,9 +129,9 @@ def test_the_objective_never_rises(
 ):
     basis, image, importance = _random(make_basis, seed)
     target = _target(image, importance, top=0.3 if transform is None else None)
-    loss = solve(basis, target, transform=transform).problem.loss
+    problem = solve(basis, target, transform=transform).problem
     plain = solve(basis, replace(target, at_least=None))
-    values = [loss.objective(predicted(basis, plain.weights)).sum()]
+    values = [problem.objective(plain.weights).sum()]
     for rounds in range(1, 12):
         monkeypatch.setattr(reweighted, "ROUNDS", rounds)
         solution = solve(basis, target, transform=transform)
@@ -152,11 +152,8 @@ def test_running_out_of_rounds_keeps_what_was_won(
     monkeypatch.setattr(reweighted, "ROUNDS", 1)
     solution = solve(basis, target, constraints=asked, transform=transform)
     assert not solution.certificate.converged
-    begin = predicted(basis, problem.lighting.weights_for(basis))
-    assert (
-        sum(solution.certificate.objective)
-        < (1 - 1e-4) * solution.problem.loss.objective(begin).sum()
-    )
+    begin = solution.problem.objective(problem.lighting.weights_for(basis)).sum()
+    assert sum(solution.certificate.objective) < (1 - 1e-4) * begin
     labels = [light.constraint for light in solution.lighting.lights]
     assert labels == [light.constraint for light in problem.lighting.lights]
     assert solution.lighting.emission["light 1"] == basis.lights[1].emission
@@ -257,12 +254,14 @@ def test_squares_have_the_gradient_of_the_loss(make_basis: Any, transform: ViewT
     """At pictures where nothing clips, by differences of each pixel's own loss."""
     rng = np.random.default_rng(2)
     top = 0.5 / 2.0 ** (transform.stops if transform else 0)
-    image, current, x = rng.uniform(0.1, 1, (3, *SIZE, 3)) * top
+    painted, current, x = rng.uniform(0.1, 1, (3, *SIZE, 3)) * top
     loss = PaintingLoss(
-        image, rng.random(SIZE), rng.random(SIZE), current, image > 0.6 * top, transform
+        painted, rng.random(SIZE), rng.random(SIZE), current, painted > 0.6 * top, transform
     )
-    squares = loss.squares(x)
-    gradient = -2 * squares.weight * (squares.image - x)
+    image, weight = (
+        image_of(planes, SIZE) for planes in loss.pixels.squares(planes_of(x), from_clipping=False)
+    )
+    gradient = -2 * weight * (image - x)
     step = 1e-6 * top
     for y, k, c in [(0, 0, 0), (3, 4, 1), (7, 8, 2), (5, 1, 0), (2, 2, 1), (6, 3, 2)]:
         aside = np.zeros_like(x)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.lighting.algebra.quadratic import UNREACHED
 from lightpaint.lighting.solution import Solution
 
@@ -56,7 +56,7 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
     basis = solution.basis
     free = np.flatnonzero(~basis.is_fixed)
     noise, power = (
-        np.square(images[free], dtype=np.float64).sum(axis=(1, 2, 3))
+        np.array([_power(images[k]) for k in free])
         for images in (basis.half_differences, basis.images)
     )
     shares = noise[power > 0] / power[power > 0]
@@ -110,6 +110,12 @@ def indistinguishable(
                 mixed = tuple(names[i] for i in heads[part].tolist())
                 mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
     return (*found, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
+
+
+def _power(image: Floats) -> float:
+    """Sum of squares."""
+    its = image.astype(np.float64).ravel()
+    return float(its @ its)
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:

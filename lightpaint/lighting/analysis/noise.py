@@ -5,18 +5,23 @@ their difference, pixel by pixel, has the covariance of the gradient's noise (do
 "How sure").
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import mix
+from lightpaint.lighting.algebra.threads import one_thread
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations
 from lightpaint.lighting.solution import Solution
 
 #: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
 #: the estimate of it is itself noise, and what is left of M would soon be indefinite.
 LARGEST_NOISE = 0.5
+
+#: Rows of matrices that several threads only wait for.
+SMALL = 256
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 SINGULAR = 1e-12
@@ -59,7 +64,10 @@ def noise_sums(solution: Solution) -> Noise:
     unseen = ~basis.emitters_seen.ravel()
     counted = np.flatnonzero((importance > 0) | (unseen & pulled.any()))
     for start in range(0, counted.size, BLOCK):
-        pixels = counted[start : start + BLOCK]
+        its = counted[start : start + BLOCK]
+        # Pixels in one run are looked at where they are; others have to be gathered.
+        in_one_run = its[-1] - its[0] + 1 == its.size
+        pixels = slice(int(its[0]), int(its[-1]) + 1) if in_one_run else its
         rows = []
         for c in range(3):
             D = weight[pixels, c % weight.shape[1]].astype(np.float64)
@@ -127,10 +135,17 @@ def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:
     made = np.empty_like(equations.M)
     for c in range(3):
         root, inverse = _roots(equations.M[c])
-        values, vectors = np.linalg.eigh(inverse @ power[c] @ inverse.T)
+        values, vectors = eigh(inverse @ power[c] @ inverse.T)
         values = np.clip(values, 0, LARGEST_NOISE)
         made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
     return made
+
+
+def eigh(M: Doubles) -> tuple[Doubles, Doubles]:
+    """Eigenvalues and vectors; of small matrices by one thread, which is done before two meet."""
+    with one_thread() if len(M) <= SMALL else nullcontext():
+        values, vectors = np.linalg.eigh(M)
+    return values, vectors
 
 
 def pseudo_inverse(M: Doubles) -> Doubles:
@@ -143,7 +158,7 @@ def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     """R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
     scale = np.sqrt(np.diag(M))
     safe = np.where(scale > 0, scale, 1)
-    values, vectors = np.linalg.eigh(M / safe[:, None] / safe)
+    values, vectors = eigh(M / safe[:, None] / safe)
     seen = values > SINGULAR * values.max(initial=0)
     root = np.sqrt(values[seen])
     inverse = (vectors[:, seen] / root).T / safe

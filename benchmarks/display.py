@@ -1,0 +1,96 @@
+"""How long a fit of what a display shows takes, beside rounds over all pixels alone.
+
+    python benchmarks/display.py BASIS PAINTING [--views srgb agx filmic] [--repeats N]
+
+The solve, in seconds of the processor: from a sample of the pixels and exact in the end, and by
+rounds over all of them alone, one after the other in one process; how far apart both end, beside
+the brightest light's picture, and by what part of the loss. The command is a process of its own,
+from its start to its end, with error bars, report and pictures.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lightpaint as lp
+from lightpaint.lighting import approach
+from lightpaint.lighting.solution import Solution
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("basis")
+    parser.add_argument("painting")
+    parser.add_argument("--views", nargs="+", default=["srgb", "filmic", "agx"])
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    basis, target = lp.read_basis(options.basis), lp.read_target(options.painting)
+    stops = target.transform.stops if target.transform is not None else 0.0
+    height, width = basis.size
+    print(
+        f"{len(basis.names)} lights, {width}x{height}; seconds of the processor, and on the clock"
+    )
+    header = ("view", "sampled", "rounds", "all", "rounds", "ratio", "apart", "loss", "command")
+    print("{:8s} {:>8s} {:>7s} {:>8s} {:>7s} {:>7s} {:>8s} {:>8s} {:>13s}".format(*header))
+    for name in options.views:
+        view = lp.ViewTransform(name, stops)
+        sampled, all_pixels = [], []
+        for _ in range(options.repeats):
+            sampled.append(timed(basis, target, view, sample=approach.SAMPLE))
+            all_pixels.append(timed(basis, target, view, sample=10**12))
+        (a, found), (b, expected) = (
+            min(each, key=lambda x: x[0]) for each in (sampled, all_pixels)
+        )
+        size = np.sqrt(basis.power)
+        apart = np.abs(size * (found.weights - expected.weights)).max()
+        loss = loss_of(found) / loss_of(expected) - 1
+        used, clock = command(options.basis, options.painting, view)
+        rounds = [x.certificate.rounds for x in (found, expected)]
+        print(
+            f"{name:8s} {a:8.2f} {rounds[0]:7d} {b:8.2f} {rounds[1]:7d} {b / a:6.1f}x "
+            f"{apart / (size * expected.weights).max():8.0e} {loss:+8.0e} {used:6.2f} {clock:6.2f}",
+            flush=True,
+        )
+
+
+def timed(basis: lp.Basis, target: lp.Target, view: Any, *, sample: int) -> tuple[float, Solution]:
+    """Seconds of the processor, and the solution."""
+    usual, approach.SAMPLE = approach.SAMPLE, sample
+    try:
+        start = time.process_time()
+        solution = lp.solve(basis, target, transform=view)
+        return time.process_time() - start, solution
+    finally:
+        approach.SAMPLE = usual
+
+
+def loss_of(solution: Solution) -> float:
+    """What the solve made least: what is missed, and what pulls at the weights."""
+    problem, w = solution.problem, solution.weights
+    pull = 0.0 if problem.pull is None else float(problem.pull.objective(w).sum())
+    return float(problem.objective(w).sum()) + pull
+
+
+def command(basis: str, painting: str, view: Any) -> tuple[float, float]:
+    """Seconds of the processor and on the clock of the whole command, the second time it runs."""
+    asked = ["solve", basis, painting, "--view", view.name, "--exposure", str(view.stops)]
+    for _ in range(2):
+        with tempfile.TemporaryDirectory() as folder:
+            run = [sys.executable, "-m", "lightpaint", *asked, "-o", str(Path(folder) / "out")]
+            before, start = os.times(), time.perf_counter()
+            subprocess.run(run, check=True, capture_output=True)
+            clock, after = time.perf_counter() - start, os.times()
+    used = after.children_user + after.children_system
+    return used - before.children_user - before.children_system, clock
+
+
+if __name__ == "__main__":
+    main()
