@@ -1,4 +1,4 @@
-"""Colours as people name them, and how far apart two look.
+"""Colours as people name them.
 
 Everything here takes linear Rec.709 (D65) with a last axis of 3.
 """
@@ -7,7 +7,6 @@ import math
 import re
 import warnings
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -30,21 +29,6 @@ LARGEST_DUV = 0.05
 def luminance(rgb: Floats) -> Floats:
     """Relative luminance, (…,), of linear Rec.709 colours (…, 3)."""
     return np.asarray(rgb @ LUMINANCE)
-
-
-def delta_e(a: Floats, b: Floats) -> Floats:
-    """CIEDE2000 between two images as a display would show them, (…,).
-
-    a, b: (…, 3) linear Rec.709 at the exposure they are looked at, white = 1. What a display
-    cannot show is clipped, as the display would.
-    """
-    colour = colour_science()
-
-    def lab(image: Floats) -> Any:
-        xyz = colour.RGB_to_XYZ(np.clip(image, 0, 1), "ITU-R BT.709", apply_cctf_decoding=False)
-        return colour.XYZ_to_Lab(xyz)
-
-    return np.asarray(colour.delta_E(lab(a), lab(b), method="CIE 2000"))
 
 
 @lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges ask for 128
