@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
     from lightpaint.lighting.analysis.refine import refine as refine
+    from lightpaint.lighting.analysis.seen import Seen as Seen
+    from lightpaint.lighting.analysis.seen import what_is_seen as what_is_seen
     from lightpaint.lighting.analysis.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.uncertainty import correct_noise as correct_noise
     from lightpaint.lighting.analysis.uncertainty import error_bars as error_bars
@@ -101,6 +103,7 @@ _HOMES = {
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "sources",
+    "Seen": "lighting.analysis.seen",
     "Settings": "settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
@@ -132,6 +135,7 @@ _HOMES = {
     "use_variant": "scene.variant",
     "verdict": "report.verdict",
     "verify": "relit.verify",
+    "what_is_seen": "lighting.analysis.seen",
     "write_basis": "basis.file",
     "write_demo": "demo",
     "write_exports": "relit.export.exports",

@@ -9,6 +9,7 @@ from lightpaint.cli import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
+from lightpaint.report.measures import energy_shares
 from lightpaint.report.sentences import (
     how_sure,
     partly_reached,
@@ -18,7 +19,7 @@ from lightpaint.report.sentences import (
     what_is_missed,
 )
 from lightpaint.report.suggestion import spoken_position, spoken_suggestions
-from lightpaint.report.verdict import agreement, energy_shares, verdict
+from lightpaint.report.verdict import agreement
 from lightpaint.results import Look
 from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.emitters import Emitter
@@ -110,7 +111,7 @@ def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
 def show_look(look: Look, folder: Path) -> None:
     """Print the lights that were solved for, and what is to be said of the answer."""
     _show_solved(look)
-    terminal.write(verdict(look.solution, look.predicted, look.verification))
+    terminal.write(look.verdict)
     for sentence in what_is_missed(look.diagnosis):
         terminal.write(sentence)
     if look.uncertainty is not None:

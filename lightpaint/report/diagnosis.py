@@ -14,6 +14,7 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure, signed_scale
 from lightpaint.report.html import row, share_cell, table
+from lightpaint.report.measures import energy_shares
 from lightpaint.report.pictures import coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
     brightness,
@@ -24,7 +25,6 @@ from lightpaint.report.sentences import (
     spoken_percent,
     what_is_missed,
 )
-from lightpaint.report.verdict import energy_shares
 
 #: Rows of a table, beyond which only those that matter most are shown.
 ROWS = 8

@@ -18,8 +18,8 @@ from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import share_cell
+from lightpaint.report.measures import energy_shares
 from lightpaint.report.sentences import spoken_errors, unreached_channels
-from lightpaint.report.verdict import energy_shares
 
 
 def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:

@@ -15,12 +15,12 @@ from lightpaint.lighting.software import Software, version
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, row
-from lightpaint.report.sentences import partly_reached
-from lightpaint.report.verdict import (
+from lightpaint.report.measures import (
     codes_missed,
     linear_residual,
     relative_residual,
 )
+from lightpaint.report.sentences import partly_reached
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
