@@ -143,13 +143,18 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
     if d.place is not None and d.share(d.unreachable) >= SMALL:
         sentences.append(spoken_place(d.place))
+    return sentences + what_holds(d)
+
+
+def what_holds(diagnosis: Diagnosis) -> list[str]:
+    """At most two sentences on what holds single lights, the largest gain first."""
+    d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gained(bound) >= SMALL]
     to_switch_on = [
         bound for bound in d.bounds if bound.is_switched_off and d.gained(bound) >= SMALLER
     ]
-    for bound in dict.fromkeys([*most, *to_switch_on[:1]]):
-        sentences.append(spoken_bound(bound, d.gained(bound)))
-    return sentences
+    its = dict.fromkeys([*most, *to_switch_on[:1]])
+    return [spoken_bound(bound, d.gained(bound)) for bound in its]
 
 
 def spoken_bound(bound: Bound, share: float) -> str:
