@@ -31,6 +31,9 @@ ALL, MOST = 16, 10
 #: Cells of a name in a table that fits 80 columns with a swatch before it.
 NAME = 30
 
+#: Of its present emission, what of a light nobody sees.
+OFF = 2.0**-10
+
 #: Distance from Planck's locus up to which a colour is called by its temperature.
 WHITE = 0.02
 
@@ -118,12 +121,13 @@ def _show_short(look: Look) -> None:
     shown = _that_matter(look)
     table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
     for k in shown:
-        color = _color(look, lights[k])
-        swatches.append(color)
+        changed = change(present[k], lights[k])
+        is_off = changed == "off"
+        swatches.append(None if is_off else _color(look, lights[k]))
         table.row(
             lights[k].name + "*" * lights[k].is_active,
-            change(present[k], lights[k]),
-            _spoken_color(look, lights[k]),
+            changed,
+            "" if is_off else _spoken_color(look, lights[k]),
             errors[k],
             f"{100 * shares[k]:.1f} %",
             room=NAME,
@@ -166,15 +170,17 @@ def change(light: BasisLight, setting: LightSetting) -> str:
     if light.is_fixed or not any(setting.reached):
         return "kept"
     before, after = (float(luminance(np.array(x.emission))) for x in (light, setting))
-    if after == 0 or before == 0:
-        return "on" if after > 0 else "off"
+    if after <= OFF * before:
+        return "off"
+    if before == 0:
+        return "on"
     stops = f"{np.log2(after / before):+.1f}"
     return "0.0" if stops in ("+0.0", "-0.0") else stops.replace("-", "−")
 
 
 def _color(look: Look, light: LightSetting) -> str | None:
     """Of a swatch; of a light whose own colour is not known, that of its factor."""
-    if light.is_fixed or light.is_partly_reached or not any(light.emission):
+    if light.is_fixed or light.is_partly_reached:
         return None
     return look.lighting.photometry(light).hex or rgb_to_hex(np.array(light.emission))
 

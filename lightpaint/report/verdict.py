@@ -37,7 +37,7 @@ def verdict(
     Examples:
         >>> solution = lp.solve(basis, target)
         >>> lp.verdict(solution, lp.combine(basis, solution.lighting), None)
-        'Close: it looks as painted. Mean ΔE 0.0 over the paint (... as the scene is now, ...'
+        'Close: it looks as painted. Mean ΔE 0.0 over what was painted (... as the scene is now...'
     """
     seen = seen or what_is_seen(solution, predicted)
     said = [headline(seen), f"{spoken_delta_e(seen, known=bool(predicted.half_difference.any()))}."]
@@ -85,11 +85,13 @@ def _why(seen: Seen) -> str:
     assert seen.place is not None
     if seen.held:
         return " and ".join(HOLDING[one] for one in seen.held)
-    some = some_names(seen.there[:2], joint=" and ")
-    if _is_darker(seen):
-        return f"{some} shines there too" if len(seen.there) == 1 else f"{some} shine there too"
     if not seen.there:
         return "no light gets there"
+    some, is_one = some_names(seen.there[:2], joint=" and "), len(seen.there) == 1
+    if _is_darker(seen):
+        return f"{some} {'lights' if is_one else 'light'} it too"
+    if not seen.does_much:
+        return f"{some} {'does' if is_one else 'do'} little there"
     return f"{some} would light too much else"
 
 
@@ -100,10 +102,10 @@ def _is_darker(seen: Seen) -> bool:
 
 
 def spoken_delta_e(seen: Seen, *, known: bool) -> str:
-    """`Mean ΔE 4.2 over the paint (11.3 as the scene is now, 0.8 of it is noise)`."""
-    noise = f"noise explains {seen.noise:.1f}" if known else "noise is not known"
+    """`Mean ΔE 4.2 over what was painted (11.3 as the scene is now; noise explains 0.8)`."""
+    noise = f"noise explains {seen.noise:.1f}" if known else "noise included"
     now = f"{seen.asked:.1f} as the scene is now"
-    return f"Mean ΔE {seen.delta_e:.1f} over the paint ({now}; {noise})"
+    return f"Mean ΔE {seen.delta_e:.1f} over what was painted ({now}; {noise})"
 
 
 def agreement(verification: Verification | None) -> str:

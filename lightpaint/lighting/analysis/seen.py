@@ -30,8 +30,12 @@ NOTICED, SPOT = 6.0, 0.02
 #: ΔE below which nobody sees anything, and the share of what was asked that must have come about.
 UNSEEN, SOME = 1.0, 0.3
 
-#: A light gets to a place from this share of what it does to its brightest pixels.
-GETS_THERE = 0.1
+#: A light gets to a place from this share on of what it does to its brightest pixels, and does
+#: much there from that.
+GETS_THERE, DOES_MUCH = 0.01, 0.1
+
+#: Every so-many-th pixel of each side is enough to find the brightest.
+THINNED = 2
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,9 @@ class Seen:
         asked: Of the scene as it is now: how much was asked for.
         place: Where most of it is missed; None where nothing is, and of several views.
         is_spot: Whether what is missed in that place is seen at a glance.
-        there: Lights that get to that place, the one that does most for it first.
+        there: Lights that get to that place, the one that does most for it first; where there is
+            too much light, those that it is from.
+        does_much: Whether one of them does much there.
         held: What is asked beside the painting and keeps the lights from it.
 
     Examples:
@@ -59,6 +65,7 @@ class Seen:
     place: Place | None = None
     is_spot: bool = False
     there: tuple[str, ...] = ()
+    does_much: bool = True
     held: tuple[Held, ...] = ()
 
     __repr__ = shortly
@@ -106,11 +113,11 @@ def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     if len(problem.views) > 1 or not missed.any():
         return seen
     place, share = _place(look, missed, light)
-    is_spot = share >= SPOT
-    there = _lights_at(solution, place)
-    seen = replace(seen, place=place, is_spot=is_spot, there=there)
-    if seen.is_close and not is_spot:
+    seen = replace(seen, place=place, is_spot=share >= SPOT)
+    if seen.is_close and not seen.is_spot:
         return seen
+    there, does_much = _lights_at(solution, place)
+    seen = replace(seen, there=there, does_much=does_much)
     return replace(seen, held=held_back_by(solution))
 
 
@@ -158,19 +165,22 @@ def _place(look: Looking, missed: Doubles, light: Doubles) -> tuple[Place, float
     return place, float((weights * noticed * inside).sum() / weights.sum())
 
 
-def _lights_at(solution: Solution, place: Place) -> tuple[str, ...]:
-    """Where it lacks light, those that get there best; where there is too much, what it is from."""
+def _lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
+    """The lights that get to a place, and whether one does much there.
+
+    Where it is too bright, those that most of its light is from; else by what they do there beside
+    what they do to their brightest pixels, which does not depend on how strong they are.
+    """
     basis = solution.basis
     top, left, bottom, right = place.box
     there = basis.images[:, top:bottom, left:right].mean(axis=(1, 2), dtype=np.float64)
     if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
-        part = luminance(there * solution.weights)
-        gets = part > GETS_THERE * part.sum()
+        part, enough = luminance(there * solution.weights), DOES_MUCH
+        whole = np.full(len(part), part.sum())
     else:
-        every = luminance(basis.images[:, ::4, ::4].reshape(len(basis.names), -1, 3))
-        best = np.percentile(every, 99, axis=1)
-        part = np.where(
-            basis.is_fixed | (best <= 0), 0, luminance(there) / np.where(best > 0, best, 1)
-        )
-        gets = part > GETS_THERE
-    return tuple(basis.names[k] for k in np.argsort(-part, kind="stable") if gets[k])
+        part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
+        every = luminance(basis.images[:, ::THINNED, ::THINNED])
+        whole = np.percentile(every.reshape(len(part), -1), 99, axis=1)
+    share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
+    names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
+    return tuple(names), bool(share.max() > DOES_MUCH)
