@@ -40,16 +40,16 @@ WHITE = 0.02
 
 def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     """Print how near the answer is, what the lights do, and what was asked beside the painting."""
-    terminal.write_sentence(look.verdict)
+    terminal.tell(look.verdict)
     for sentence in _sentences(look, table):
-        terminal.write_sentence(sentence)
+        terminal.tell(sentence)
     terminal.write("")
     if table == "full":
         _show_all(look)
     else:
         _show_short(look)
     terminal.write("")
-    terminal.write_sentence(how_it_was_meant(look))
+    terminal.tell(how_it_was_meant(look))
     certificate = look.solution.certificate
     if curve := certificate.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
@@ -134,7 +134,7 @@ def _show_short(look: Look) -> None:
         )
     terminal.print_table(table, swatches)
     if rest := sorted(set(range(len(lights))) - set(shown)):
-        terminal.write_sentence(_spoken_rest(look, rest))
+        terminal.tell(_spoken_rest(look, rest))
     if any(lights[k].is_active for k in shown):
         terminal.write("* held by what is asked of it (--table full says what)")
 

@@ -75,7 +75,7 @@ def write(text: str) -> None:
     lines.out(text)
 
 
-def write_sentence(text: str) -> None:
+def tell(text: str) -> None:
     """A sentence or two, to stdout: on a terminal in lines that end where words do."""
     if not sys.stdout.isatty():
         lines.out(text)

@@ -64,7 +64,7 @@ def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: A
 
 def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
-    dark = make_basis(images=basis.images, emission=[[0.2 / 64] * 3] * 2)
+    dark = make_basis(images=basis.images, names=basis.names, emission=[[0.2 / 64] * 3] * 2)
     bright = ViewTransform("srgb", 6.0)
     where = (slice(None), slice(0, 24))
     found = []
