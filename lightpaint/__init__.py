@@ -11,6 +11,7 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     read_target                 painting → Target                    what is wanted, and where?
     solve                       Basis, Target → Solution             which lighting is closest?
     analyse                     Solution → Analysis of each view     how sure, and why not closer?
+    what_is_seen                Solution → Seen                      how close does it look?
     combine                     Basis, Lighting → Estimate           what will it look like?
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?

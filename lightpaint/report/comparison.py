@@ -155,7 +155,7 @@ def fitted(words: str, font: Any, width: int) -> str:
 
 
 def _in_short(seen: Seen) -> str:
-    how = "close" if seen.is_close else "another picture" if seen.is_far else "part of the way"
+    how = "close" if seen.is_close else "out of reach" if seen.is_far else "part of the way"
     return f"{how}: mean dE {seen.delta_e:.1f} where painted (noise explains {seen.noise:.1f})"
 
 

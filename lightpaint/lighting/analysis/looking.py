@@ -14,7 +14,7 @@ from lightpaint.lighting.painting import brighter_will_do, painted_light
 from lightpaint.lighting.problem import Problem
 
 #: Painted pixels that are looked at, and pixels of each side of a block that noise is averaged in.
-LOOKED_AT, BLOCK = 2**16, 8
+LOOKED_AT, BLOCK = 2**15, 8
 
 
 @dataclass(frozen=True)
