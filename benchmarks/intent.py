@@ -26,7 +26,8 @@ from scipy.ndimage import gaussian_filter, label
 
 import lightpaint as lp
 from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
+from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.colour.difference import delta_e
 from lightpaint.colour.display import choose_exposure
 
 SCENES = Path(__file__).parent.parent / "scenes"

@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint import Basis, Scene, load_scene, read_target, render_basis, solve
 from lightpaint.colour.color import luminance
-from lightpaint.report.verdict import energy_shares
+from lightpaint.report.measures import energy_shares
 from lightpaint.target.target import Target
 
 RESOLUTIONS = ("1/1", "1/2", "1/4")

@@ -11,6 +11,7 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     read_target                 painting → Target                    what is wanted, and where?
     solve                       Basis, Target → Solution             which lighting is closest?
     analyse                     Solution → Analysis of each view     how sure, and why not closer?
+    what_is_seen                Solution → Seen                      how close does it look?
     combine                     Basis, Lighting → Estimate           what will it look like?
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
     from lightpaint.lighting.analysis.refine import refine as refine
+    from lightpaint.lighting.analysis.seen import Seen as Seen
+    from lightpaint.lighting.analysis.seen import what_is_seen as what_is_seen
     from lightpaint.lighting.analysis.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.uncertainty import correct_noise as correct_noise
     from lightpaint.lighting.analysis.uncertainty import error_bars as error_bars
@@ -101,6 +104,7 @@ _HOMES = {
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "sources",
+    "Seen": "lighting.analysis.seen",
     "Settings": "settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
@@ -132,6 +136,7 @@ _HOMES = {
     "use_variant": "scene.variant",
     "verdict": "report.verdict",
     "verify": "relit.verify",
+    "what_is_seen": "lighting.analysis.seen",
     "write_basis": "basis.file",
     "write_demo": "demo",
     "write_exports": "relit.export.exports",

@@ -79,7 +79,7 @@ def paint_with_light(
     Examples:
         >>> look = lp.paint_with_light("room.xml", "painting.exr", "evening", spp=4)
         >>> look
-        Look(of painting: The lighting meets ... % of the painting ...)
+        Look(of painting: Close: it looks as painted. Mean ΔE ...)
         >>> look.verification.agrees
         True
     """

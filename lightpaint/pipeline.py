@@ -9,7 +9,7 @@ from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import samples_for
 from lightpaint.images.estimate import write_estimate
 from lightpaint.job import Job, PaintedView
-from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_bounds
+from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import combine
@@ -63,7 +63,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
     with job.results.filled() as folder:
-        lighting = with_bounds(solution, analyses).lighting
+        lighting = with_findings(solution, analyses).lighting
         write_lighting(folder / "lighting.json", lighting)
         if job.groups is not None:
             write_exports(folder, job.groups, lighting)

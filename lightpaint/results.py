@@ -88,11 +88,17 @@ class Look:
     suggestions: tuple[Suggestion, ...] | None = None
 
     def __repr__(self) -> str:
-        said = verdict(self.solution, self.predicted, self.verification)
-        return f"Look(of {self.target.name}: {said})"
+        return f"Look(of {self.target.name}: {self.verdict})"
 
     def _repr_html_(self) -> str:
-        return look_html(self.target, self.solution, self.predicted, self.verification)
+        return look_html(
+            self.target, self.solution, self.predicted, self.verification, seen=self.analysis.seen
+        )
+
+    @property
+    def verdict(self) -> str:
+        """How near the lights come to what was painted, in sentences."""
+        return verdict(self.solution, self.predicted, self.verification, seen=self.analysis.seen)
 
     @property
     def uncertainty(self) -> Uncertainty | None:
@@ -157,6 +163,7 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         solution=look.solution,
         predicted=look.predicted.image,
         verified=verified,
+        seen=look.analysis.seen,
     )
     write_bytes(folder / "comparison.png", png_bytes(sheet))
     for name, written in (("report.json", report_numbers), ("report.html", report_page)):
@@ -171,6 +178,7 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
             diagnosis=look.diagnosis,
             unconstrained=look.analysis.unconstrained,
             suggestions=look.suggestions,
+            seen=look.analysis.seen,
         )
         write_text(folder / name, text)
 

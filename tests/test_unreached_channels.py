@@ -112,7 +112,11 @@ def test_people_see_neither_a_colour_nor_an_error(
 ):
     lp.write_basis(tmp_path / "a.basis.exr", basis)
     write_rgb(tmp_path / "t.exr", target.image)
-    said = succeed(tmp_path, "solve", "a.basis.exr", "t.exr", "-o", "out")
+    solved = ("solve", "a.basis.exr", "t.exr", "-o", "out")
+    [row] = [x for x in succeed(tmp_path, *solved).splitlines() if x.startswith("lamp")]
+    assert "#" not in row
+    assert " K" not in row
+    said = succeed(tmp_path, *solved, "--table", "full")
     [row] = [line for line in said.splitlines() if line.startswith("lamp")]
     assert "0.2 (blue kept)" in row
     assert "#" not in row

@@ -10,6 +10,7 @@ from typing import Any
 from lightpaint.basis import cache as bases
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import tables, terminal
+from lightpaint.cli.answer import Table, show_look
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.colour.transform import ViewTransform
@@ -121,7 +122,7 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> int:
     return 0
 
 
-def solve(*, jobs: Sequence[Job]) -> int:
+def solve(*, jobs: Sequence[Job], table: Table = "short") -> int:
     """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`"""
     listen, obtained = terminal.Listener(), None
     # Those of all before the first is run, which says its own again: once is enough.
@@ -136,7 +137,7 @@ def solve(*, jobs: Sequence[Job]) -> int:
             if job.by_sensor:
                 terminal.write("")
                 terminal.write(f"{look.basis.origin.sensor}:")
-            tables.show_look(look, view.folder)
+            show_look(look, view.folder, table=table)
             if look.suggestions is not None:
                 tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
         if job.groups is not None:

@@ -14,15 +14,25 @@ from lightpaint.screen import visible
 LONGEST = 4000
 
 
-def out(line: str) -> None:
-    """A line of results, to stdout. Work goes on if whoever read them has left (`| head`)."""
+def out(line: str, *, swatch: str | None = None) -> None:
+    """A line of results, to stdout. Work goes on if whoever read them has left (`| head`).
+
+    swatch: a colour like `#ffaa66`, of which a block stands before the line; "" for room for one.
+    """
     try:
-        print(visible(line), flush=True)
+        print(_block(swatch) + visible(line), flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise OutputError(f"cannot write to standard output: {error.strerror}") from error
+
+
+def _block(color: str | None) -> str:
+    if not color:
+        return "" if color is None else "   "
+    r, g, b = (int(color[k : k + 2], 16) for k in (1, 3, 5))
+    return f"\x1b[38;2;{r};{g};{b}m██\x1b[0m "
 
 
 def err(line: str) -> None:

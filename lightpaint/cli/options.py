@@ -54,7 +54,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             output = output or Path("lightpaint-demo")
             return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
-            return {"jobs": jobs_of(options, settings)}
+            return {"jobs": jobs_of(options, settings), "table": options.table}
         case "relight":
             scene = scene_of(options, is_to_solve=False, use_lights_file=False)
             paths = list(map(Path, options.lightings))

@@ -84,6 +84,13 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_paintings(parser)
     add_output(parser, "DIR", "result folder (default: named after the target)")
     add_force(parser)
+    parser.add_argument(
+        "--table",
+        choices=("short", "full"),
+        default="short",
+        help="short: in stops and colours, of many lights those that matter; full: all lights, "
+        "with their radiometry, and how sure they are (default: %(default)s)",
+    )
     add_method(parser)
     add_unit(parser)
     add_lights(parser)

@@ -1,7 +1,6 @@
-"""What commands print of scenes and answers: tables, and sentences below them."""
+"""What commands print of scenes, bases and suggestions: tables, and sentences below them."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.cache import Entry
@@ -10,21 +9,14 @@ from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.sentences import (
-    how_sure,
-    partly_reached,
-    spoken_errors,
     spoken_percent,
-    unreached_channels,
-    what_is_missed,
 )
 from lightpaint.report.suggestion import spoken_position, spoken_suggestions
-from lightpaint.report.verdict import agreement, energy_shares, verdict
-from lightpaint.results import Look
+from lightpaint.report.verdict import agreement
 from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import some_names
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
@@ -105,76 +97,6 @@ def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
     if len(members) == 1:
         about["sampling_weight"] = light.members[0].sampling_weight
     return about
-
-
-def show_look(look: Look, folder: Path) -> None:
-    """Print the lights that were solved for, and what is to be said of the answer."""
-    _show_solved(look)
-    terminal.write(verdict(look.solution, look.predicted, look.verification))
-    for sentence in what_is_missed(look.diagnosis):
-        terminal.write(sentence)
-    if look.uncertainty is not None:
-        terminal.write(how_sure(look.basis, look.solution, look.uncertainty))
-    terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    certificate = look.solution.certificate
-    if curve := certificate.curve:
-        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
-        terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
-    _say_unreached(look)
-    for channels in partly_reached(look.lighting):
-        terminal.say(channels)
-    for ambiguity in look.analysis.ambiguities:
-        terminal.say(ambiguity.sentence)
-    if not certificate.converged:
-        terminal.say(
-            f"the solve stopped after {max(certificate.sweeps)} sweeps at a KKT residual of "
-            f"{max(certificate.kkt_residual):.1e}"
-        )
-    if look.verification is not None and not look.verification.agrees:
-        terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
-
-
-def _say_unreached(look: Look) -> None:
-    """Say of which lights nothing is known, and what would help."""
-    unreached = look.solution.certificate.unreached
-    dark = [name for name in unreached if not look.basis.image(name).any()]
-    if dark:
-        terminal.say(f"the picture holds nothing of {some_names(dark)}: kept as it is")
-    if seen := [name for name in unreached if name not in dark]:
-        terminal.say(
-            f"no painted pixel sees {some_names(seen)}: kept as it is; "
-            "paint where it shines, or pass --unpainted"
-        )
-
-
-def _show_solved(look: Look) -> None:
-    """Print a row for each light: before, solved, how sure, and what it does to the picture."""
-    shares = energy_shares(look.basis, look.lighting)
-    held = any(light.constraint for light in look.lighting.lights)
-    headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
-    amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
-    asked = ["asked (* holds it)"] if held else []
-    table = terminal.table(*headings, *amounts, *asked)
-    errors = spoken_errors(look.uncertainty, len(shares))
-    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
-        solved = "off" if not any(light.emission) else terminal.numbers(light.emission)
-        if not all(light.reached) and any(light.emission):
-            kept = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
-            solved += f" ({kept})"
-        seen = look.lighting.photometry(light)
-        table.row(
-            light.name,
-            light.plugin,
-            "" if light.is_fixed else terminal.numbers(now.emission),
-            "kept" if light.is_fixed else solved,
-            errors[k],
-            "" if light.is_fixed else light.unit,
-            f"{100 * shares[k]:.1f} %",
-            "" if light.is_fixed else seen.color,
-            *seen.amounts[: len(amounts)],
-            *([light.constraint + "*" * light.is_active] if held else []),
-        )
-    terminal.print_table(table)
 
 
 def show_kept(entries: Sequence[Entry]) -> None:

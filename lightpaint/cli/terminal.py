@@ -1,7 +1,10 @@
 """How the command line speaks: tables to stdout, progress and remarks to stderr."""
 
 import io
+import os
 import sys
+import textwrap
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.progress import (
@@ -28,9 +31,12 @@ def numbers(rgb: tuple[float, float, float]) -> str:
 class Rows(Table):
     """A table whose cells are text as it stands, without markup."""
 
-    def row(self, *cells: str) -> None:
-        """Add a row."""
-        self.add_row(*(Text(visible(cell)) for cell in cells))
+    def row(self, *cells: str, room: int | None = None) -> None:
+        """Add a row. room: cells of the terminal that the first one is cut to."""
+        first, *others = (Text(visible(cell)) for cell in cells)
+        if room is not None:
+            first.truncate(room, overflow="ellipsis")
+        self.add_row(first, *others)
 
 
 def table(*columns: str) -> Rows:
@@ -41,17 +47,41 @@ def table(*columns: str) -> Rows:
     return made
 
 
-def print_table(made: Rows) -> None:
-    """Print to stdout. Piped output has no width: nothing in it is cut."""
+def print_table(made: Rows, swatches: Sequence[str | None] = ()) -> None:
+    """Print to stdout. Piped output has no width: nothing in it is cut.
+
+    swatches: a colour like `#ffaa66` for each row, or None for none. They stand before the rows
+    where the terminal can show them, and are nowhere else.
+    """
     width = None if sys.stdout.isatty() else 1000
     page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
     page.print(made)
-    write_lines(page.file.getvalue())  # type: ignore[attr-defined]
+    rows = page.file.getvalue().rstrip().split("\n")  # type: ignore[attr-defined]
+    if not (swatches and has_truecolour()):
+        write_lines("\n".join(rows))
+        return
+    for row, color in zip(rows, (None, *swatches), strict=True):
+        lines.out(row.rstrip(), swatch=color or "")
+
+
+def has_truecolour() -> bool:
+    """Whether stdout is a terminal that says it has all colours, and nobody asked for none."""
+    has_all = os.environ.get("COLORTERM", "").lower() in ("truecolor", "24bit")
+    return has_all and not os.environ.get("NO_COLOR") and sys.stdout.isatty()
 
 
 def write(text: str) -> None:
     """A line of results, to stdout."""
     lines.out(text)
+
+
+def tell(text: str) -> None:
+    """A sentence or two, to stdout: on a terminal in lines that end where words do."""
+    if not sys.stdout.isatty():
+        lines.out(text)
+        return
+    for line in textwrap.wrap(visible(text), Console().width, break_on_hyphens=False):
+        lines.out(line)
 
 
 def write_lines(text: str) -> None:

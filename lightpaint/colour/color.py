@@ -1,4 +1,4 @@
-"""Colours as people name them, and how far apart two look.
+"""Colours as people name them.
 
 Everything here takes linear Rec.709 (D65) with a last axis of 3.
 """
@@ -10,7 +10,6 @@ from functools import lru_cache
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.difference import ciede2000, lab
 from lightpaint.colour.display import decode_display, encode_display, to_8_bit
 from lightpaint.colour.locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
@@ -32,15 +31,6 @@ STEPS = 5
 def luminance(rgb: Floats) -> Floats:
     """Relative luminance, (…,), of linear Rec.709 colours (…, 3)."""
     return np.asarray(rgb @ LUMINANCE)
-
-
-def delta_e(a: Floats, b: Floats) -> Floats:
-    """CIEDE2000 between two images as a display would show them, (…,).
-
-    a, b: (…, 3) linear Rec.709 at the exposure they are looked at, white = 1. What a display
-    cannot show is clipped, as the display would.
-    """
-    return ciede2000(*(lab(np.clip(image, 0, 1)) for image in (a, b)))
 
 
 @lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges ask for 128

@@ -35,6 +35,9 @@ class Certificate:
         hold: Weight of all that was not painted, against the current look, beside that of what was.
         colors: How free lamps were to change their colour: `free`, `gentle` or `white`.
         noise_removed: Share of the noise that was taken out of the equations.
+        delta_e: Mean CIEDE2000 between the prediction and the painting, over what was painted.
+        delta_e_noise: The part of it that noise explains.
+        delta_e_asked: That of the scene as it is: how much was asked for.
         software: What it was computed with, where that is known.
         basis_spp: Samples per pixel of the basis it was solved with, of the first of several views;
             None where nobody knows of any.
@@ -61,6 +64,9 @@ class Certificate:
     hold: float = 0.0
     colors: str = "free"
     noise_removed: float = 0.0
+    delta_e: float | None = None
+    delta_e_noise: float | None = None
+    delta_e_asked: float | None = None
     software: Software | None = None
     basis_spp: int | None = None
 

@@ -22,6 +22,9 @@ READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
 #: Fields of a certificate that say how the lighting was found, where it is not the paper's way.
 FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
 
+#: And how far it looks from the painting, where somebody has looked.
+SEEN = ("delta_e", "delta_e_noise", "delta_e_asked")
+
 
 def write_lighting(path: str | Path, lighting: Lighting) -> None:
     """Write lighting.json (docs/formats.md), whole or not at all.
@@ -55,7 +58,7 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
         },
     }
     if (q := lighting.certificate) is not None:
-        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", *FIT)
+        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", *FIT, *SEEN)
     write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.color import delta_e
+from lightpaint.colour.difference import delta_e
 from lightpaint.colour.display import choose_exposure
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import whole_factor

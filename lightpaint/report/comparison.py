@@ -11,6 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display import to_8_bit
 from lightpaint.images.blocks import block_mean, enlarged, whole_factor
+from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.pictures import (
     diverging,
@@ -21,7 +22,6 @@ from lightpaint.report.pictures import (
     target_picture,
     transform_of,
 )
-from lightpaint.report.verdict import relative_residual
 from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.
@@ -50,13 +50,15 @@ def comparison_image(
     solution: Solution,
     predicted: Floats,
     verified: Floats | None,
+    seen: Seen | None = None,
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
     predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target; pixels that do not
-    count are grey, dim and hatched. Raises SizeError if target and basis differ in size.
+    count are grey, dim and hatched. seen: what `what_is_seen` says, where somebody has looked.
+    Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
     current = basis.present_look
@@ -71,7 +73,7 @@ def comparison_image(
         ),
         Tile(
             f"predicted{at}",
-            f"misses {_percent(relative_residual(solution))} of the target (RMS, with noise)",
+            _in_short(seen or what_is_seen(solution)),
             transform.encode(predicted),
         ),
     ]
@@ -156,6 +158,11 @@ def fitted(words: str, font: Any, width: int) -> str:
     while words and font.getlength(words + "…") > width:
         words = words[:-1]
     return words.rstrip() + "…"
+
+
+def _in_short(seen: Seen) -> str:
+    how = "close" if seen.is_close else "out of reach" if seen.is_far else "part of the way"
+    return f"{how}: mean dE {seen.delta_e:.1f} where painted (noise explains {seen.noise:.1f})"
 
 
 def _percent(share: float) -> str:

@@ -9,8 +9,8 @@ from lightpaint.images.blocks import block_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure
 from lightpaint.report.html import SHOWN, SPARE, row, share_cell, table
+from lightpaint.report.measures import relative_residual
 from lightpaint.report.sentences import spoken_percent
-from lightpaint.report.verdict import relative_residual
 
 #: Width in pixels that the pictures are reduced to, by a whole factor: this to twice this.
 WIDTH = 320

@@ -14,6 +14,7 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure, signed_scale
 from lightpaint.report.html import folded, listed, name_of, row, share_cell, table
+from lightpaint.report.measures import energy_shares
 from lightpaint.report.pictures import FINEST_SCALE, coverage, diverging, round_up, unpainted_look
 from lightpaint.report.sentences import (
     brightness,
@@ -24,7 +25,6 @@ from lightpaint.report.sentences import (
     spoken_percent,
     what_is_missed,
 )
-from lightpaint.report.verdict import energy_shares
 
 #: Headings of the table of errors, and rows of it and of that of bounds that are not folded.
 SURE, ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6

@@ -19,8 +19,8 @@ from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
+from lightpaint.report.measures import energy_shares
 from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
-from lightpaint.report.verdict import energy_shares
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (

@@ -21,6 +21,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import covered, enlarged
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.png import png_bytes
+from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import Verification
@@ -118,7 +119,12 @@ def verification_html(verification: Verification) -> str:
 
 
 def look_html(
-    target: Target, solution: Solution, predicted: Estimate, verification: Verification | None
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    *,
+    seen: Seen | None = None,
 ) -> str:
     """Painting, prediction and render side by side, the verdict, and what the lights do."""
     images = [_on_grey(target.image, target.importance), predicted.image]
@@ -127,7 +133,7 @@ def look_html(
         images.append(covered(verification.verified.image, predicted.size))
         names.append("verified")
     transform = target.transform or _transform(images[-1])
-    said = verdict(solution, predicted, verification)
+    said = verdict(solution, predicted, verification, seen=seen)
     return (
         _picture(", ".join(names), images, transform)
         + f"<p>{', '.join(names)}</p><p>{escape(said)}</p>{solution_html(solution)}"

@@ -15,23 +15,23 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.diagnosis import maps_limit
-from lightpaint.report.pictures import brighter_than_white, residual_limit, transform_of
-from lightpaint.report.sentences import brightness, halving_spp, most_uncertain, relative_errors
-from lightpaint.report.verdict import (
+from lightpaint.report.measures import (
     brighter_as_allowed,
     codes_missed,
     energy_shares,
     linear_residual,
     noise_residual,
     relative_residual,
-    share_met,
 )
+from lightpaint.report.pictures import brighter_than_white, residual_limit, transform_of
+from lightpaint.report.sentences import brightness, halving_spp, most_uncertain, relative_errors
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
@@ -50,6 +50,7 @@ def report_numbers(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
+    seen: Seen | None = None,
 ) -> str:
     """JSON of the numbers of `report_page`, whose arguments these are."""
     verified = None if verification is None else verification.verified.image
@@ -67,6 +68,7 @@ def report_numbers(
             "brighter_than_white": brighter_than_white(predicted.image, transform),
             "residual_limit": residual_limit(solution, predicted.image, transform=transform),
         },
+        "seen": _seen(seen or what_is_seen(solution, predicted)),
         "fit": _fit(solution, predicted, unconstrained),
         "lights": _lights(basis, solution, uncertainty),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
@@ -101,10 +103,14 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
     }
 
 
+def _seen(seen: Seen) -> dict[str, Any]:
+    """Mean CIEDE2000 over what was painted."""
+    return {"delta_e": seen.delta_e, "noise": seen.noise, "asked": seen.asked}
+
+
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
     """RMS, relative to the painting. norm2: what relative objectives are relative to."""
     told = {
-        "met": share_met(solution, predicted),
         "missed": relative_residual(solution),
         "noise": noise_residual(solution, predicted),
         "missed_without_constraints": None if free is None else relative_residual(free),
@@ -115,8 +121,7 @@ def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict
     if solution.problem.refinement is not None:
         told["refined"] = solution.problem.refinement.share
     if not solution.problem.is_linear:
-        told["missed_in_linear_light"] = missed = linear_residual(solution, predicted)
-        told["met_in_linear_light"] = max(1 - missed, 0.0)
+        told["missed_in_linear_light"] = linear_residual(solution, predicted)
     if solution.certificate.display:
         told["codes_missed"] = codes_missed(solution)
     if (brighter := brighter_as_allowed(solution, predicted.image)) is not None:

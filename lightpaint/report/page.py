@@ -15,6 +15,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import covered
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
@@ -43,13 +44,14 @@ def report_page(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
+    seen: Seen | None = None,
 ) -> str:
     """The page as HTML text.
 
     verification: None where nothing was rendered to check the prediction.
     command: the shell command that made the result.
     uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
-    what they tell.
+    what they tell. seen: what `what_is_seen` says, where somebody has looked.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -63,7 +65,7 @@ def report_page(
         title=escape(f"{target.name} · {basis.origin.scene}"),
         target=escape(target.name),
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
-        verdict=escape(verdict(solution, predicted, verification)),
+        verdict=escape(verdict(solution, predicted, verification, seen=seen)),
         banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
         wipe=wipe(looks),
         exposure=_exposure(transform, predicted.image),

@@ -14,7 +14,7 @@ from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.verdict import energy_shares
+from lightpaint.report.measures import energy_shares
 from lightpaint.screen import some_of
 
 CHANNELS = ("red", "green", "blue")
@@ -157,13 +157,18 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
     if d.place is not None and d.share(d.unreachable) >= SMALL:
         sentences.append(spoken_place(d.place))
+    return sentences + what_holds(d)
+
+
+def what_holds(diagnosis: Diagnosis) -> list[str]:
+    """At most two sentences on what holds single lights, the largest gain first."""
+    d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gained(bound) >= SMALL]
     to_switch_on = [
         bound for bound in d.bounds if bound.is_switched_off and d.gained(bound) >= SMALLER
     ]
-    for bound in dict.fromkeys([*most, *to_switch_on[:1]]):
-        sentences.append(spoken_bound(bound, d.gained(bound)))
-    return sentences
+    its = dict.fromkeys([*most, *to_switch_on[:1]])
+    return [spoken_bound(bound, d.gained(bound)) for bound in its]
 
 
 def noise_of_painting(diagnosis: Diagnosis) -> str:
@@ -220,16 +225,24 @@ def spoken_hold(bound: Bound) -> str:
     return "off" if len(held) == 3 else f"off in {' and '.join(held)}"
 
 
-def spoken_place(place: Place) -> str:
-    """Where light is missing, and what it lacks."""
+def spoken_region(place: Place) -> str:
+    """`in the middle`, `top left`: where in the picture."""
     rows, columns = ("top", "middle", "bottom"), ("left", "middle", "right")
     row, column = rows[place.region[0]], columns[place.region[1]]
-    where = "in the middle" if row == column == "middle" else f"{row} {column}"
-    where = {"middle left": "on the left", "middle right": "on the right"}.get(where, where)
-    where = {"top middle": "at the top", "bottom middle": "at the bottom"}.get(where, where)
+    if row == column == "middle":
+        return "in the middle"
+    if row == "middle":
+        return f"on the {column}"
+    return f"at the {row}" if column == "middle" else f"at the {row} {column}"
+
+
+def spoken_place(place: Place) -> str:
+    """Where light is missing, and what it lacks."""
+    where = f"{spoken_region(place)} ({spoken_percent(place.share)})"
+    change = spoken_difference(place.painted, place.reached)
     return (
-        f"Most of that out of reach is {where} ({spoken_percent(place.share)}): painted "
-        f"{spoken_difference(place.painted, place.reached)} than any mix of the lights makes it."
+        f"Most of that out of reach is {where}: painted {change} than any mix of the lights "
+        "makes it."
     )
 
 

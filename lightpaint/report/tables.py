@@ -14,13 +14,14 @@ from lightpaint.lighting.software import Software, version
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, listed, row
-from lightpaint.report.sentences import partly_reached
-from lightpaint.report.verdict import (
+from lightpaint.report.measures import (
     brighter_as_allowed,
     codes_missed,
     linear_residual,
+    noise_residual,
     relative_residual,
 )
+from lightpaint.report.sentences import partly_reached
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
@@ -89,6 +90,8 @@ def render_table(
         ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
         ("Emitters seen directly", f"in {seen} pixels{_seen_note(out)}"),
     ]
+    missed, noise = relative_residual(solution), noise_residual(solution, predicted)
+    told.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
     told += _fitted(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:

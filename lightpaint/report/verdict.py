@@ -1,121 +1,111 @@
-"""What a result comes to, in a few numbers and one sentence."""
+"""What a result comes to, in sentences: what was painted, and whether the lights make it."""
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.analysis.held_back import Held
+from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.report.sentences import spoken_difference, spoken_region
+from lightpaint.screen import some_names
+
+#: What is asked beside the painting, as what holds the lights back.
+HOLDING: dict[Held, str] = {
+    "hold": "what you did not paint is held as it is",
+    "colors": "lamps are held to their colours",
+    "constraints": "limits and locks hold the lights",
+}
 
 
-def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
-    """Share of each light in the predicted image's energy, (n,) float64, in basis order.
-
-    Energy is luminance Y summed over all pixels, painted or not: Σ Y(w_i Φ_i) over
-    Σ_j Σ Y(w_j Φ_j). The shares sum to 1; where every light is off they are all 0.
-    """
-    energy = (basis.totals * lighting.weights_for(basis)) @ LUMINANCE
-    total = energy.sum()
-    return np.asarray(energy / total if total > 0 else np.zeros_like(energy))
-
-
-def relative_residual(solution: Solution) -> float:
-    """RMS of what the prediction misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
-
-    E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
-    by importance; in display space, both of display values. 0 is a perfect match, 1 is what all
-    lights off would give. Without the square root a miss of 10 % of the light would look like
-    one of 1 %.
-    """
-    norm2 = _norm2(solution)
-    # A painting that is black wherever it counts is met by darkness alone.
-    missed = sum(solution.certificate.objective)
-    return float(np.sqrt(missed / norm2)) if norm2 > 0 else float(missed > 0)
-
-
-def noise_residual(solution: Solution, predicted: Estimate) -> float:
-    """The part of `relative_residual` that is the basis' own noise, in the same measure."""
-    norm2 = _norm2(solution)
-    squares = np.square(predicted.half_difference, dtype=np.float64)
-    noise2 = float((solution.weight * squares).sum())
-    return float(np.sqrt(noise2 / norm2)) if norm2 > 0 else 0.0
-
-
-def share_met(solution: Solution, predicted: Estimate) -> float:
-    """How much of the painting the lighting meets, 0 to 1, were it rendered without noise.
-
-    Noise in the prediction adds its power to the objective; what is left without it is what
-    the lighting itself misses.
-    """
-    missed2 = relative_residual(solution) ** 2 - noise_residual(solution, predicted) ** 2
-    return max(0.0, 1.0 - float(np.sqrt(max(missed2, 0.0))))
-
-
-def linear_residual(solution: Solution, predicted: Estimate) -> float:
-    """`relative_residual` as it is in linear light, whatever was fitted."""
-    D = solution.importance[..., None]
-    meant = solution.meant(predicted.image)
-    missed2, norm2 = (
-        float((D * np.square(x, dtype=np.float64)).sum()) for x in (meant - predicted.image, meant)
-    )
-    return float(np.sqrt(missed2 / norm2)) if norm2 > 0 else float(missed2 > 0)
-
-
-def codes_missed(solution: Solution) -> float:
-    """What is missed in display space, RMS over pixels and channels, in codes of 255."""
-    mean = sum(solution.certificate.objective) / (3 * float(solution.importance.sum()))
-    return 255 * float(np.sqrt(mean))
-
-
-def brighter_as_allowed(solution: Solution, predicted: Floats) -> tuple[int, int] | None:
-    """Pixels painted as at least so bright, and how many of them are brighter; None if none are."""
-    loss = solution.problem.loss
-    if not isinstance(loss, PaintingLoss):
-        return None
-    its = loss.at_least & (solution.importance > 0)[..., None]
-    brighter = its & (predicted > loss.painted)
-    pixels = int(its.any(axis=-1).sum())
-    return (pixels, int(brighter.any(axis=-1).sum())) if pixels else None
-
-
-def verdict(solution: Solution, predicted: Estimate, verification: Verification | None) -> str:
-    """One plain sentence: how well the painting is met, and whether a render confirms it.
+def verdict(
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    *,
+    seen: Seen | None = None,
+) -> str:
+    """How near the lights come to what was painted, how far they are, and if a render confirms it.
 
     Args:
         solution: The answer.
         predicted: What `combine` makes of it.
         verification: What `verify` says of that; None where nothing was rendered.
+        seen: What `what_is_seen` says of it, where somebody has looked.
 
     Examples:
         >>> solution = lp.solve(basis, target)
         >>> lp.verdict(solution, lp.combine(basis, solution.lighting), None)
-        'The lighting meets 100 % of the painting (RMS; noise adds ... %); the prediction is not...'
+        'Close: it looks as painted. Mean ΔE 0.0 over what was painted (... as the scene is now...'
     """
-    # No render of light is without noise: where there is none, nobody has measured it.
-    noise = "whatever noise the layers have included"
-    if predicted.half_difference.any() or not predicted.image.any():
-        noise = f"noise adds {100 * noise_residual(solution, predicted):.0f} %"
-    fit = f"The lighting meets {100 * share_met(solution, predicted):.0f} % of the painting"
-    if solution.space == "linear":
-        fit += f" (RMS; {noise})"
-    else:
-        fit += f" as {solution.certificate.display} shows it (RMS, {codes_missed(solution):.1f} of "
-        fit += f"255 codes missed; {noise}) and "
-        fit += f"{100 * max(1 - linear_residual(solution, predicted), 0):.0f} % in linear light"
+    seen = seen or what_is_seen(solution, predicted)
+    said = [headline(seen), f"{spoken_delta_e(seen, known=bool(predicted.half_difference.any()))}."]
     if not solution.certificate.converged:
-        fit += ", from a solve that stopped before it converged"
-    return f"{fit}; {agreement(verification)}."
+        said.append("The solve stopped before it converged.")
+    if verification is None:
+        said.append("Not checked by a render.")
+    elif verification.agrees:
+        said.append("A render confirms it.")
+    else:
+        said.append(f"A render does NOT confirm it: {agreement(verification)}.")
+    return " ".join(said)
 
 
-def _norm2(solution: Solution) -> float:
-    if not solution.problem.is_linear:
-        return float(solution.norm2.sum())
-    weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
-    return float(weighted.sum())
+def headline(seen: Seen) -> str:
+    """One sentence: whether the lights make what was painted, and what is out of reach."""
+    if seen.is_close and not (seen.is_spot and seen.place):
+        return "Close: it looks as painted."
+    if seen.place is None:
+        return f"{_manner(seen)}: too much of what was painted is out of reach."
+    where = spoken_region(seen.place)
+    change = spoken_difference(seen.place.painted, seen.place.reached)
+    if seen.is_far:
+        return f"{_manner(seen)}: {where} it is painted {change} than they make it; {_why(seen)}."
+    change = change.replace("a little", "slightly")
+    light = f"the {change} {'shade' if _is_darker(seen) else 'light'} {where}"
+    return f"{_manner(seen)} {light} is out of reach: {_why(seen)}."
+
+
+def _manner(seen: Seen) -> str:
+    if seen.is_close:
+        return "Close, but"
+    if not seen.is_far:
+        return "Part of the way, but"
+    # It would not be true of the lights where something else holds them.
+    return (
+        "What else is asked keeps the lights from this"
+        if seen.held
+        else ("These lights cannot make this")
+    )
+
+
+def _why(seen: Seen) -> str:
+    """What keeps the lights from the place where most is missed."""
+    assert seen.place is not None
+    if seen.held:
+        return " and ".join(HOLDING[one] for one in seen.held)
+    if not seen.there:
+        return "no light gets there"
+    some, is_one = some_names(seen.there[:2], joint=" and "), len(seen.there) == 1
+    if _is_darker(seen):
+        return f"{some} {'lights' if is_one else 'light'} it too"
+    if not seen.does_much:
+        return f"{some} {'does' if is_one else 'do'} little there"
+    return f"{some} would light too much else"
+
+
+def _is_darker(seen: Seen) -> bool:
+    assert seen.place is not None
+    painted, reached = (luminance(np.array(x)) for x in (seen.place.painted, seen.place.reached))
+    return bool(painted < reached)
+
+
+def spoken_delta_e(seen: Seen, *, known: bool) -> str:
+    """`Mean ΔE 4.2 over what was painted (11.3 as the scene is now; noise explains 0.8)`."""
+    noise = f"noise explains {seen.noise:.1f}" if known else "noise included"
+    now = f"{seen.asked:.1f} as the scene is now"
+    return f"Mean ΔE {seen.delta_e:.1f} over what was painted ({now}; {noise})"
 
 
 def agreement(verification: Verification | None) -> str:

@@ -103,6 +103,10 @@ def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
     write_rgb(tmp_path / "p.exr", basis.images.sum(axis=0))
     done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
     assert done.returncode == 0, done.stderr
+    assert SHOWN[:20] in done.stdout
+    assert not STEERS.search(done.stdout + done.stderr)
+    full = ("--table", "full")
+    done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "again", *full)
     assert SHOWN in done.stdout
     assert not STEERS.search(done.stdout + done.stderr)
 

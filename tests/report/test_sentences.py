@@ -58,11 +58,11 @@ def test_difference_of_colours(painted: Any, reached: Any, words: str):
 @pytest.mark.parametrize(
     ("region", "where"),
     [
-        ((0, 0), "is top left"),
+        ((0, 0), "is at the top left"),
         ((0, 1), "is at the top"),
         ((1, 1), "is in the middle"),
         ((1, 2), "is on the right"),
-        ((2, 2), "is bottom right"),
+        ((2, 2), "is at the bottom right"),
     ],
 )
 def test_places(region: tuple[int, int], where: str):

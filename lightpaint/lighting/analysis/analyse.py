@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
+from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
@@ -18,6 +19,7 @@ class Analysis:
         solution: With its errors and with what holds its lights in its certificate.
         uncertainty: How sure the lights are, None where nothing is known of the noise.
         diagnosis: Why the painting is not met.
+        seen: How far the answer looks from what was painted.
         ambiguities: Lights that it cannot tell apart, where nothing is asked of them.
         unconstrained: The best without what is asked, None where nothing is, or of one view of
             several.
@@ -31,6 +33,7 @@ class Analysis:
     solution: Solution
     uncertainty: Uncertainty | None
     diagnosis: Diagnosis
+    seen: Seen
     ambiguities: tuple[Ambiguity, ...]
     unconstrained: Solution | None
 
@@ -55,12 +58,21 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     found = []
     for view in solution.views:
         diagnosis = diagnose(view)
-        told = view.told(bounds=diagnosis.bounds)
-        found.append(Analysis(told, uncertainty, diagnosis, alike, without_constraints(view)))
+        seen = what_is_seen(view)
+        told = view.told(bounds=diagnosis.bounds, **_numbers(seen))
+        free = without_constraints(view)
+        found.append(Analysis(told, uncertainty, diagnosis, seen, alike, free))
     return tuple(found)
 
 
-def with_bounds(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
+def with_findings(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
     """The answer to all views with what was found of it, for lighting.json."""
     first = analyses[0]
-    return with_error_bars(solution, first.uncertainty).told(bounds=first.diagnosis.bounds)
+    seen = first.seen if len(analyses) == 1 else what_is_seen(solution)
+    told = with_error_bars(solution, first.uncertainty)
+    return told.told(bounds=first.diagnosis.bounds, **_numbers(seen))
+
+
+def _numbers(seen: Seen) -> dict[str, float]:
+    """As a certificate has them."""
+    return {"delta_e": seen.delta_e, "delta_e_noise": seen.noise, "delta_e_asked": seen.asked}

@@ -1,0 +1,186 @@
+"""What an eye sees of an answer beside its painting, over what was painted and against that alone.
+
+What a solve minimises also holds the rest, pulls at colours, and is a sum of squares; whoever
+painted looks at the paint. So the miss that people are told is the mean CIEDE2000 there, at the
+exposure and through the view of the painting, weighted by importance.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.colour.color import luminance
+from lightpaint.colour.difference import ciede2000
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
+from lightpaint.lighting.analysis.held_back import Held, held_back_by
+from lightpaint.lighting.analysis.looking import Looking
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.solution import Solution
+from lightpaint.screen import shortly
+
+#: Mean ΔE up to which a result is close: seen only by who compares side by side; and from which on
+#: it is another picture.
+CLOSE, FAR = 3.0, 10.0
+
+#: ΔE that is seen at a glance, and the share of the paint from which on such a spot is told.
+NOTICED, SPOT = 6.0, 0.02
+
+#: ΔE below which nobody sees anything, and the share of what was asked that must have come about.
+UNSEEN, SOME = 1.0, 0.3
+
+#: A light gets to a place from this share on of what it does to its brightest pixels, and does
+#: much there from that.
+GETS_THERE, DOES_MUCH = 0.01, 0.1
+
+#: Every so-many-th pixel of each side is enough to find the brightest.
+THINNED = 2
+
+
+@dataclass(frozen=True)
+class Seen:
+    """How far an answer looks from what was painted: mean CIEDE2000 over the paint.
+
+    Attributes:
+        delta_e: Of the prediction, with its noise.
+        noise: The part of it that noise explains; 0 where nothing is known of noise.
+        asked: Of the scene as it is now: how much was asked for.
+        place: Where most of it is missed; None where nothing is, and of several views.
+        is_spot: Whether what is missed in that place is seen at a glance.
+        there: Lights that get to that place, the one that does most for it first; where there is
+            too much light, those that it is from.
+        does_much: Whether one of them does much there.
+        held: What is asked beside the painting and keeps the lights from it.
+
+    Examples:
+        >>> seen = lp.what_is_seen(lp.solve(basis, target))
+        >>> seen.is_close, round(seen.missed, 1)
+        (True, 0.0)
+    """
+
+    delta_e: float
+    noise: float
+    asked: float
+    place: Place | None = None
+    is_spot: bool = False
+    there: tuple[str, ...] = ()
+    does_much: bool = True
+    held: tuple[Held, ...] = ()
+
+    __repr__ = shortly
+
+    @property
+    def missed(self) -> float:
+        """What the lighting itself misses, were it rendered without noise."""
+        return self.delta_e - self.noise
+
+    @property
+    def is_in_vain(self) -> bool:
+        """Whether hardly any of what was asked has come about."""
+        return self.missed > max(UNSEEN, (1 - SOME) * self.asked)
+
+    @property
+    def is_close(self) -> bool:
+        """Whether the two look alike; not where little was asked and less has come about."""
+        return self.missed <= CLOSE and not self.is_in_vain
+
+    @property
+    def is_far(self) -> bool:
+        """Whether it looks like another picture, or still like the one there was."""
+        return self.missed > FAR or self.is_in_vain
+
+
+def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
+    """How far `solution` looks from its painting, where most, and what keeps it from there.
+
+    Args:
+        solution: Of one view or, without a place, of several.
+        predicted: What `combine` makes of it, where that is known.
+
+    Examples:
+        >>> lp.what_is_seen(lp.solve(basis, target)).delta_e < 0.1
+        True
+    """
+    problem = solution.problem
+    predicted = predicted or combine(solution.basis, solution.lighting)
+    look = Looking.at(problem)
+    light, grain = look.of(predicted.image), look.of(predicted.half_difference)
+    now = look.of(problem.basis.mix(problem.basis.present_weights))
+    with_noise, missed = _missed(look, light, grain)
+    delta_e, left = (float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed))
+    seen = Seen(delta_e, max(delta_e - left, 0.0), look.mean(look.missed(now)))
+    if len(problem.views) > 1 or not missed.any():
+        return seen
+    place, share = _place(look, missed, light)
+    seen = replace(seen, place=place, is_spot=share >= SPOT)
+    if seen.is_close and not seen.is_spot:
+        return seen
+    there, does_much = _lights_at(solution, place)
+    seen = replace(seen, there=there, does_much=does_much)
+    return replace(seen, held=held_back_by(solution))
+
+
+def _missed(look: Looking, light: Doubles, grain: Doubles) -> tuple[Doubles, Doubles]:
+    """Mean ΔE in each block, (rows, columns), as it is and without what noise explains of it.
+
+    Noise and miss are the legs of a right angle, since neither knows of the other. But a painting
+    over the same renders shares their noise: it explains no more than is left between the pixels
+    when their mean is taken out, which noise hardly moves.
+    """
+    of_light, of_paint = look.lab(light), look.lab(look.meant(light))
+    whole = look.in_blocks(ciede2000(of_light, of_paint))
+    if not grain.any():
+        return whole, whole
+    of_means = ciede2000(look.in_blocks(of_light), look.in_blocks(of_paint))
+    between = np.square(whole) - np.square(np.minimum(of_means, whole))
+    noise = np.square(look.in_blocks(ciede2000(of_light, look.lab(light + grain))))
+    return whole, np.sqrt(np.square(whole) - np.minimum(noise, between))
+
+
+def _place(look: Looking, missed: Doubles, light: Doubles) -> tuple[Place, float]:
+    """Where most is missed, and the share of the paint there that is seen at a glance."""
+    weights = look.block_weights
+    noticed = missed > NOTICED
+    amount = weights * missed * (noticed if (weights * noticed).any() else 1)
+    region = np.zeros((REGIONS, REGIONS))
+    at = [REGIONS * np.arange(length) // length for length in amount.shape]
+    np.add.at(region, np.ix_(*at), amount)
+    worst = np.unravel_index(int(np.argmax(region)), region.shape)
+    inside = (at[0] == worst[0])[:, None] & (at[1] == worst[1])
+    row, column = np.unravel_index(int(np.argmax(np.where(inside, amount, -1))), amount.shape)
+    # What the paint and the answer are there, of all that is missed there.
+    its = np.where(inside, amount, 0)
+    painted, reached = (
+        np.average(look.in_blocks(x).reshape(-1, 3), axis=0, weights=its.ravel())
+        for x in (look.painted[look.counts].astype(np.float64), light)
+    )
+    place = Place(
+        region=(int(worst[0]), int(worst[1])),
+        share=float(region[worst] / region.sum()),
+        box=look.box(int(row), int(column)),
+        painted=as_rgb(painted),
+        reached=as_rgb(reached),
+    )
+    return place, float((weights * noticed * inside).sum() / weights.sum())
+
+
+def _lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
+    """The lights that get to a place, and whether one does much there.
+
+    Where it is too bright, those that most of its light is from; else by what they do there beside
+    what they do to their brightest pixels, which does not depend on how strong they are.
+    """
+    basis = solution.basis
+    top, left, bottom, right = place.box
+    there = basis.images[:, top:bottom, left:right].mean(axis=(1, 2), dtype=np.float64)
+    if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
+        part, enough = luminance(there * solution.weights), DOES_MUCH
+        whole = np.full(len(part), part.sum())
+    else:
+        part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
+        every = luminance(basis.images[:, ::THINNED, ::THINNED])
+        whole = np.percentile(every.reshape(len(part), -1), 99, axis=1)
+    share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
+    names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
+    return tuple(names), bool(share.max() > DOES_MUCH)

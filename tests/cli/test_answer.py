@@ -1,0 +1,197 @@
+"""What a solve prints: for people, in 80 columns, and colours only where a terminal has them."""
+
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import run, succeed
+from rich.cells import cell_len
+
+from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.file import write_basis
+from lightpaint.cli import main, terminal
+from lightpaint.cli.answer import change
+from lightpaint.images.exr import write_rgb
+from lightpaint.images.png import png_bytes
+from lightpaint.lighting.setting import LightSetting
+
+PRESENT = [[0.5, 0.5, 0.5], [0.4, 0.3, 0.2], [0.2, 0.3, 0.4], [0, 0, 0]]
+WEIGHTS = np.array([[1, 1, 1], [0, 0, 0], [0.2, 0.3, 0.4], [0.6, 0.2, 0.1]], np.float32)
+NAMES = ("key", "a lamp with a name that goes on and on, as those of exporters do", "fill", "red")
+SOLVE = ("solve", "b.basis.exr", "p.exr", "-o", "out", "--no-correct-noise")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, make_basis: Any) -> Path:
+    """Four lights, and a painting that they make."""
+    basis = make_basis(4, (16, 20), names=NAMES, emission=PRESENT)
+    write_basis(tmp_path / "b.basis.exr", basis)
+    write_rgb(tmp_path / "p.exr", basis.mix(WEIGHTS))
+    return tmp_path
+
+
+def _row(output: str, name: str) -> str:
+    [row] = [line for line in output.splitlines() if line.startswith(name)]
+    return row
+
+
+def test_the_table_is_in_stops_and_fits_80_columns(folder: Path):
+    said = succeed(folder, *SOLVE)
+    lines = said.splitlines()
+    start = next(k for k, line in enumerate(lines) if line.startswith("light "))
+    # With room for the swatch.
+    assert max(cell_len(line) for line in lines[start : start + 5]) <= 77
+    assert _row(said, "key").split()[1:4] == ["+1.0", "6504", "K"]
+    assert _row(said, "a lamp").split("…")[1].split()[0] == "off"
+    assert _row(said, "fill").split()[1] == "0.0"
+    assert _row(said, "red").split()[1] == "on"
+    assert not re.search(r"W/|\bplugin\b|KKT|RMS", said)
+    full = succeed(folder, *SOLVE, "--table", "full")
+    for word in (NAMES[1], "plugin", "emission now", "unit"):
+        assert word in full
+
+
+def test_the_headline_comes_first_and_the_folder_last(folder: Path):
+    lines = succeed(folder, *SOLVE).strip().splitlines()
+    assert lines[0].startswith("Close: it looks as painted.")
+    assert lines[-1] == "results in out/"
+
+
+@pytest.mark.parametrize(
+    ("isatty", "variables", "swatches"),
+    [
+        (True, {"COLORTERM": "truecolor"}, 3),
+        (True, {"COLORTERM": "24bit", "NO_COLOR": ""}, 3),
+        (True, {"COLORTERM": "truecolor", "NO_COLOR": "1"}, 0),
+        (True, {}, 0),
+        (False, {"COLORTERM": "truecolor"}, 0),
+    ],
+)
+def test_swatches_only_where_the_terminal_has_colours(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    isatty: bool,
+    variables: dict[str, str],
+    swatches: int,
+):
+    monkeypatch.chdir(folder)
+    for name in ("COLORTERM", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in {**variables, "COLUMNS": "80", "TERM": "xterm"}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: isatty)
+    assert main([*SOLVE]) == 0
+    said = capsys.readouterr().out
+    assert len(re.findall(r"\x1b\[38;2;\d+;\d+;\d+m██\x1b\[0m ", said)) == swatches
+    assert (said.count("\x1b") > 0) == (swatches > 0)
+    if isatty:
+        plain = re.sub(r"\x1b\[[\d;]*m", "", said)
+        assert max(map(cell_len, plain.splitlines())) <= 80
+
+
+def test_a_swatch_is_the_colour_that_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    made = terminal.table("light")
+    made.row("lamp")
+    monkeypatch.setattr(terminal, "has_truecolour", lambda: True)
+    terminal.print_table(made, ["#ff8000"])
+    assert capsys.readouterr().out.splitlines() == [
+        "   light",
+        "\x1b[38;2;255;128;0m██\x1b[0m lamp",
+    ]
+
+
+def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Path, make_basis: Any):
+    rng = np.random.default_rng(2)
+    power = np.where(np.arange(302) % 31 == 5, 1, 0.01)[:, None, None, None]
+    names = [f"light_{k:03d}" for k in range(302)]
+    images = power * rng.random((302, 8, 40, 3))
+    basis = make_basis(images=images, names=names, emission=[[0.1] * 3] * 302)
+    write_basis(tmp_path / "b.basis.exr", basis)
+    write_rgb(tmp_path / "p.exr", basis.mix(np.full((302, 3), 0.2)))
+    said = succeed(tmp_path, *SOLVE)
+    rows = [line for line in said.splitlines() if line.startswith("light_")]
+    assert [row.split()[0] for row in rows] == [f"light_{k:03d}" for k in range(5, 302, 31)]
+    [rest] = [line for line in said.splitlines() if line.startswith("and 292 more")]
+    shown = sum(float(re.findall(r"([\d.]+) %", row)[-1]) for row in rows)
+    told = float(re.findall(r"together ([\d.]+) % of the picture", rest)[0])
+    assert shown + told == pytest.approx(100, abs=1.2)
+    counts = re.findall(r"(\d+) (?:off|switched|kept|brighter|dimmer|as)", rest)
+    assert sum(map(int, counts)) == 292
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ((), "The painting is taken at its word: linear light, nothing held, any colour."),
+        (
+            ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
+            "Fitted as the eye sees it (srgb); what you did not paint is held (0.5); lamps keep "
+            "their colour (gentle); --literal for none of this.",
+        ),
+        (("--colors", "white"), "Lamps are white; --literal for none of this."),
+        (
+            ("--unpainted", "0.1"),
+            "Each pixel that you did not paint counts 0.1; --literal for none of this.",
+        ),
+    ],
+)
+def test_one_line_says_what_else_was_asked(folder: Path, options: tuple[str, ...], said: str):
+    assert said in succeed(folder, *SOLVE, *options).splitlines()
+
+
+def test_a_picture_of_eight_bits_says_what_it_was_fitted_in(folder: Path):
+    (folder / "p.png").write_bytes(png_bytes(np.full((16, 20, 3), 120, np.uint8)))
+    said = succeed(folder, "solve", "b.basis.exr", "p.png", "-o", "out")
+    [line] = [x for x in said.splitlines() if "--literal" in x]
+    assert line.startswith("Fitted as the eye sees it (srgb); lamps keep their colour (gentle)")
+
+
+def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis: Any):
+    images = np.random.default_rng(1).random((5, 8, 8, 3))
+    images[1] = images[0]
+    images[2], images[3, :, :4] = 0, 0
+    names = ["one", "twin", "dark", "right", "key"]
+    write_basis(tmp_path / "b.basis.exr", make_basis(images=images, names=names))
+    write_rgb(tmp_path / "p.exr", images.sum(axis=0).astype(np.float32))
+    mask = np.zeros((8, 8, 3), np.uint8)
+    mask[:, :4] = 255
+    (tmp_path / "m.png").write_bytes(png_bytes(mask))
+    done = run(tmp_path, *SOLVE, "--mask", "m.png")
+    assert done.returncode == 0, done.stderr
+    [line] = [x for x in done.stderr.splitlines() if "leaves lights open" in x]
+    for words in (
+        "the picture holds nothing of dark: kept as it is",
+        "no painted pixel sees right: kept as it is",
+        "one and twin light the painted part alike",
+    ):
+        assert words in line
+    assert "kept as it is" not in done.stderr.replace(line, "")
+
+
+def _setting(r: float, g: float, b: float) -> LightSetting:
+    return LightSetting("x", "area", "radiance", "W/(m² sr)", (r, g, b), (r, g, b))
+
+
+@pytest.mark.parametrize(
+    ("now", "new", "said"),
+    [
+        ((1.0, 1.0, 1.0), (2, 2, 2), "+1.0"),
+        ((1.0, 1.0, 1.0), (0.5, 0.5, 0.5), "−1.0"),
+        ((1.0, 1.0, 1.0), (1.01, 1, 1), "0.0"),
+        ((0.0, 0.0, 0.0), (1, 1, 1), "on"),
+        ((1.0, 1.0, 1.0), (0, 0, 0), "off"),
+        ((1.0, 1.0, 1.0), (1e-6, 0, 0), "off"),
+        ((0.0, 0.0, 0.0), (0, 0, 0), "off"),
+    ],
+)
+def test_what_became_of_a_light(now: Any, new: Any, said: str):
+    light = BasisLight("x", "area", "radiance", "W/(m² sr)", now)
+    assert change(light, _setting(*new)) == said
+    assert change(light, replace(_setting(*new), reached=(False,) * 3)) == "kept"

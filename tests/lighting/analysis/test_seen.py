@@ -1,0 +1,181 @@
+"""How far an answer looks from what was painted, where, and why."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.colour.difference import delta_e
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.lighting.analysis.seen import CLOSE, Seen, what_is_seen
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (24, 48)
+
+
+def _left_and_right(make_basis: Any, *, spill: float = 0.0, noise: float = 0.0) -> Any:
+    """A light for each half of the picture, of which a share falls on the other."""
+    images = np.full((2, *SIZE, 3), spill)
+    images[0, :, :24] = images[1, :, 24:] = 1
+    grain = np.random.default_rng(2).normal(0, noise, (2, *images.shape))
+    return make_basis(
+        images=images + grain[0],
+        half_differences=grain[1],
+        names=["left", "right"],
+        emission=[[0.2] * 3] * 2,
+    )
+
+
+def _over(look: Any, where: Any, color: Any, *, alpha: float = 1.0) -> Target:
+    """Painted over the current look, through a display."""
+    image, importance = look.copy(), np.zeros(look.shape[:2], np.float32)
+    image[where], importance[where] = color, alpha
+    painted = Target.of(image, importance, name="painting")
+    return replace(painted, over_look=True, through_view=True, transform=ViewTransform())
+
+
+def _look(basis: Any) -> Any:
+    return basis.mix(basis.present_weights)
+
+
+def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: Any):
+    """Whatever the solve held: in closed form."""
+    basis = _left_and_right(make_basis)
+    where = (slice(None), slice(0, 24))
+    target = _over(_look(basis), where, (0.5, 0.4, 0.3))
+    target.importance[:12, :24] = 0.25
+    target.image[:12, :24] = 0.6
+    solution = solve(basis, target, constraints=Constraints.of({"left": {"lock": True}}))
+    predicted = combine(basis, solution.lighting).image
+    np.testing.assert_allclose(predicted, 0.2, rtol=1e-6)
+    upper, lower = (
+        float(delta_e(np.array(painted), np.full(3, 0.2)))
+        for painted in ((0.6, 0.6, 0.6), (0.5, 0.4, 0.3))
+    )
+    seen = what_is_seen(solution)
+    assert seen.delta_e == pytest.approx((0.25 * upper + lower) / 1.25, rel=1e-5)
+    assert seen.asked == pytest.approx(seen.delta_e, rel=1e-5)
+    assert seen.noise == 0
+
+
+def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis: Any):
+    basis = _left_and_right(make_basis, spill=0.5)
+    dark = make_basis(images=basis.images, names=basis.names, emission=[[0.2 / 64] * 3] * 2)
+    bright = ViewTransform("srgb", 6.0)
+    where = (slice(None), slice(0, 24))
+    found = []
+    for its, scale, view in ((basis, 1, ViewTransform()), (dark, 64, bright)):
+        target = replace(_over(_look(its), where, 0.5 / scale), transform=view)
+        found.append(what_is_seen(solve(its, target, constraints=_locked())))
+    assert found[0].delta_e > 1
+    assert found[1].delta_e == pytest.approx(found[0].delta_e, rel=1e-3)
+
+
+def test_a_painting_that_is_made_is_close(make_basis: Any):
+    basis = _left_and_right(make_basis)
+    seen = what_is_seen(solve(basis, _over(_look(basis), (slice(None), slice(0, 24)), 0.5)))
+    assert seen.is_close
+    assert not seen.is_far
+    assert seen.delta_e < 0.1 < 10 < seen.asked
+    assert seen.held == ()
+
+
+def test_an_untouched_picture_is_close(make_basis: Any):
+    basis = _left_and_right(make_basis)
+    seen = what_is_seen(solve(basis, _over(_look(basis), (slice(None), slice(None)), 0.2)))
+    assert seen.is_close
+    assert seen.delta_e < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("asked", "held"),
+    [
+        ({"hold": 50.0}, ("hold",)),
+        ({"hold": 0.0, "constraints": {"*": {"limits": {"max": 0.21}}}}, ("constraints",)),
+        ({"hold": 0.0}, ()),
+    ],
+)
+def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: Any):
+    """What was asked for is swallowed: that is no success, and what swallowed it is told."""
+    basis = _left_and_right(make_basis, spill=0.5)
+    target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
+    limits = Constraints.of(asked.get("constraints", {}))
+    seen = what_is_seen(solve(basis, target, hold=asked["hold"], constraints=limits))
+    assert seen.is_close == (not held)
+    assert seen.held == held
+
+
+def test_a_small_wish_that_is_swallowed_is_not_close(make_basis: Any):
+    basis = _left_and_right(make_basis, spill=0.9)
+    target = _over(_look(basis), (slice(8, 12), slice(4, 8)), 0.415)
+    seen = what_is_seen(solve(basis, target, hold=100.0))
+    assert seen.missed < CLOSE
+    assert seen.is_far
+    assert not seen.is_close
+
+
+def test_colours_that_hold_are_told(make_basis: Any):
+    """A white lamp cannot be green."""
+    basis = _left_and_right(make_basis)
+    target = _over(_look(basis), (slice(None), slice(0, 24)), (0.1, 0.6, 0.1))
+    seen = what_is_seen(solve(basis, target, colors="white"))
+    assert seen.is_far
+    assert seen.held == ("colors",)
+    assert what_is_seen(solve(basis, target, colors="free")).is_close
+
+
+def test_where_no_light_gets(make_basis: Any):
+    """The bottom right third is black whatever is on."""
+    images = _left_and_right(make_basis).images.copy()
+    images[:, 16:, 32:] = 0
+    basis = make_basis(images=images, names=["left", "right"], emission=[[0.2] * 3] * 2)
+    image = np.full((*SIZE, 3), 0.4, np.float32)
+    seen = what_is_seen(solve(basis, Target.of(image, name="even"), hold=0.0, space="display"))
+    assert seen.place is not None
+    assert seen.place.region == (2, 2)
+    assert seen.is_spot
+    assert seen.there == ()
+    top, left, bottom, right = seen.place.box
+    assert 16 <= top < bottom <= 24
+    assert 32 <= left < right <= 48
+
+
+def test_noise_that_the_painting_does_not_share_is_told_from_a_miss(make_basis: Any):
+    basis = _left_and_right(make_basis, noise=0.05)
+    where = (slice(None), slice(0, 24))
+    seen = what_is_seen(solve(basis, _over(_look(basis), where, 0.5)))
+    assert seen.delta_e > 2
+    assert seen.missed < 0.4 * seen.delta_e
+    # A painting over the same samples shares it: then what is missed is no noise.
+    look = _look(basis)
+    target = _over(look, where, 2.5 * look[where])
+    seen = what_is_seen(solve(basis, target, hold=0.0, constraints=_locked()))
+    assert seen.noise < 0.1 * seen.delta_e
+
+
+def _locked() -> Constraints:
+    return Constraints.of({"left": {"lock": True}, "right": {"lock": True}})
+
+
+def test_words_do_not_depend_on_how_finely_it_is_rendered(make_basis: Any):
+    """Beyond enough pixels every second one is looked at."""
+    basis = _left_and_right(make_basis)
+    target = _over(_look(basis), (slice(None), slice(0, 24)), 0.5)
+    large = make_basis(
+        images=np.kron(basis.images, np.ones((1, 16, 16, 1))), emission=basis.present_weights
+    )
+    painted = replace(
+        target,
+        image=np.kron(target.image, np.ones((16, 16, 1), np.float32)),
+        importance=np.kron(target.importance, np.ones((16, 16), np.float32)),
+    )
+    one, other = (
+        what_is_seen(solve(b, t, hold=3.0, space="linear"))
+        for b, t in ((basis, target), (large, painted))
+    )
+    assert isinstance(one, Seen)
+    assert other.delta_e == pytest.approx(one.delta_e, rel=1e-3)

@@ -1,0 +1,132 @@
+"""The headline: what was painted, in words, and everywhere the same."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import run
+
+from lightpaint.basis.file import write_basis
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.solve import solve
+from lightpaint.relit.verification import compare
+from lightpaint.report.verdict import headline, verdict
+from lightpaint.target.target import Target
+
+DARK, LIT = (0.1, 0.1, 0.1), (0.4, 0.4, 0.4)
+
+
+def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
+    region, painted, reached = about.pop("at", ((1, 1), LIT, DARK))
+    place = Place(region, 0.9, (0, 0, 8, 8), painted, reached)
+    return replace(Seen(missed, 0.0, asked, place), **about)
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (Seen(0.0, 0.0, 0.0), "Close: it looks as painted."),
+        (_seen(2.9), "Close: it looks as painted."),
+        (
+            _seen(2.0, is_spot=True),
+            "Close, but the brighter light in the middle is out of reach: no light gets there.",
+        ),
+        (
+            _seen(2.0, is_spot=True, there=("lamp", "sun"), does_much=False),
+            "Close, but the brighter light in the middle is out of reach: lamp and sun do little "
+            "there.",
+        ),
+        (
+            _seen(5.0, there=("lamp",), at=((0, 2), LIT, DARK)),
+            "Part of the way, but the brighter light at the top right is out of reach: lamp would "
+            "light too much else.",
+        ),
+        (
+            _seen(5.0, there=("sky",), at=((1, 0), DARK, LIT)),
+            "Part of the way, but the darker shade on the left is out of reach: sky lights it too.",
+        ),
+        (
+            _seen(14.0),
+            "These lights cannot make this: in the middle it is painted brighter than they make "
+            "it; no light gets there.",
+        ),
+        (
+            _seen(2.8, 3.0, held=("hold",)),
+            "What else is asked keeps the lights from this: in the middle it is painted brighter "
+            "than they make it; what you did not paint is held as it is.",
+        ),
+        (
+            _seen(5.0, held=("colors", "constraints")),
+            "Part of the way, but the brighter light in the middle is out of reach: lamps are held "
+            "to their colours and limits and locks hold the lights.",
+        ),
+        (
+            Seen(14.0, 0.0, 20.0),
+            "These lights cannot make this: too much of what was painted is out of reach.",
+        ),
+    ],
+)
+def test_the_headline_in_words(seen: Seen, said: str):
+    assert headline(seen) == said
+
+
+def test_noise_is_no_fault_of_the_lighting():
+    assert headline(replace(_seen(4.0), noise=1.5)).startswith("Close:")
+
+
+def test_darkness_that_is_painted_dark_is_close(make_basis: Any):
+    basis = make_basis(2, (4, 6))
+    black = Target.of(np.zeros((4, 6, 3), np.float32), name="night")
+    solution = solve(basis, black)
+    said = verdict(solution, combine(basis, solution.lighting), None)
+    assert said.startswith("Close: it looks as painted. Mean ΔE 0.0 over what was painted (")
+    assert said.endswith(" Not checked by a render.")
+
+
+@pytest.mark.parametrize("bias", [1.0, 1.2])
+def test_the_verdict_tells_of_the_verification(make_basis: Any, bias: float):
+    rng = np.random.default_rng(1)
+    basis = make_basis(2, (16, 16))
+    target = Target.of(basis.images.sum(axis=0), name="sum")
+    solution = solve(basis, target)
+    predicted = combine(basis, solution.lighting)
+    noise = rng.normal(0, 0.02, (3, *predicted.image.shape)).astype(np.float32)
+    rendered = Estimate(bias * predicted.image + noise[0], noise[1])
+    checked = compare(replace(predicted, half_difference=noise[2]), rendered)
+    said = verdict(solution, predicted, checked)
+    if bias == 1:
+        assert said.endswith("A render confirms it.")
+    else:
+        assert "A render does NOT confirm it" in said
+        assert "standard errors apart, limit 5" in said
+
+
+def test_one_number_everywhere(tmp_path: Path, make_basis: Any):
+    """Console, report, lighting.json read back."""
+    basis = make_basis(3, (24, 32), emission=[[0.3, 0.2, 0.1]] * 3)
+    write_basis(tmp_path / "b.basis.exr", basis)
+    rng = np.random.default_rng(5)
+    write_rgb(tmp_path / "p.exr", rng.random((24, 32, 3)).astype(np.float32))
+    done = run(tmp_path, "solve", "b.basis.exr", "p.exr", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    [told] = re.findall(r"Mean ΔE ([\d.]+) over what was painted", done.stdout)
+    certificate = read_lighting(tmp_path / "out" / "lighting.json").certificate
+    assert certificate is not None
+    assert certificate.delta_e is not None
+    assert f"{certificate.delta_e:.1f}" == told
+    written = json.loads((tmp_path / "out" / "lighting.json").read_text(encoding="utf-8"))
+    assert written["solve"]["delta_e"] == certificate.delta_e
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"Mean ΔE {told} over what was painted" in page
+    for line in (done.stdout, page.split("</header>")[0]):
+        assert "meets" not in line
+        assert "RMS" not in line.split("missed of the painting")[0]
