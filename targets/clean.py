@@ -54,7 +54,7 @@ class Surfaces:
 
 
 def see(
-    scene: str | Path, *, size: tuple[int, int], sensor: str | None = None, spp: int = 16
+    scene: str | Path, *, size: tuple[int, int], sensor: str | None = None, spp: int = 64
 ) -> Surfaces:
     """The surfaces of a scene. size: (width, height); sensor: its id, or None for the first."""
     use_variant()
@@ -77,6 +77,7 @@ def denoise(look: Floats, surfaces: Surfaces) -> Floats:
         albedo=np.ascontiguousarray(np.clip(surfaces.albedo, 0, 1)),
         normal=np.ascontiguousarray(surfaces.normal),
         hdr=True,
+        clean_aux=True,
     )
     return np.maximum(clean, 0)
 

@@ -629,11 +629,11 @@ def brick(size: int = 432, courses: int = 24, bricks: int = 8) -> tuple[Array, A
     which = course * bricks + along.astype(int)
     across, down = along % 1, (y * courses) % 1
     edge = np.minimum(np.minimum(across, 1 - across) * 0.225, np.minimum(down, 1 - down) * 0.075)
-    face = _step(0.0015, 0.0095, edge + 0.0015 * noise(size, size, (60, 60), 80, 2))
+    face = _step(0.0005, 0.0135, edge + 0.0015 * noise(size, size, (60, 60), 80, 2))
     out, lean, tone = rng.normal(0, 1, (3, courses * bricks))[:, which]
     tooth = noise(size, size, (54, 54), 81, 2)
-    height = face * (0.80 + 0.05 * out + 0.05 * lean * (across - 0.5) + 0.035 * tooth)
-    shade = 0.012 * tone + 0.010 * tooth + 0.05 * (face - 1)
+    height = face * (0.80 + 0.05 * out + 0.05 * lean * (across - 0.5) + 0.015 * tooth)
+    shade = 0.012 * tone + 0.008 * tooth + 0.06 * (face - 1)
     return np.array((0.89, 0.88, 0.86)) + shade[..., None], np.repeat(height[..., None], 3, axis=2)
 
 
