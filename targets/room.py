@@ -11,7 +11,7 @@ nothing rendered. Positions are metres, y up.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from brush import Mark
@@ -46,15 +46,6 @@ class Room:
     """Marks over the surfaces of one picture."""
 
     surfaces: Surfaces
-
-    def flat(self, mark: Painted, *, share: float = 0.8) -> Room:
-        """With the relief of upright and level surfaces under the mark pressed flat."""
-        normal = self.surfaces.normal
-        axis = np.abs(normal).argmax(axis=-1)[..., None] == np.arange(3)
-        smooth = np.where(axis, np.sign(normal), 0.0)
-        normal = normal + share * mark.amount[..., None] * (smooth - normal)
-        length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-        return Room(replace(self.surfaces, normal=(normal / length).astype(np.float32)))
 
     def beam(self, at: Vector, towards: Vector, *, cutoff: float, full: float = 0.0) -> Painted:
         """A spot: 1 where it points, on a surface that faces it; full and cutoff in degrees."""
@@ -129,8 +120,8 @@ class Room:
         return path / np.maximum(distance, 1e-6)[..., None], distance
 
     def _facing(self, away: Floats) -> Floats:
-        """How far a surface faces the light that comes along `away`; rough ones a little more."""
-        facing: Floats = np.clip(0.1 - 0.9 * (self.surfaces.normal * away).sum(axis=-1), 0, 1)
+        """How far a surface faces the light that comes along `away`."""
+        facing: Floats = np.clip(-(self.surfaces.normal * away).sum(axis=-1), 0, 1)
         return facing
 
 

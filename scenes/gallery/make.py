@@ -618,8 +618,8 @@ def plaster(color: Sequence[float], seed: int, size: int = 320) -> Array:
     return np.asarray(color, float) + shade[..., None]
 
 
-def brick(size: int = 432, courses: int = 24, bricks: int = 8) -> tuple[Array, Array]:
-    """1.8 m of whitewashed brickwork, colour and height; every other course is half a brick on."""
+def brick(size: int = 432, courses: int = 24, bricks: int = 8) -> Array:
+    """1.8 m of whitewashed brickwork; every other course is half a brick further on."""
     rng = np.random.default_rng(77)
     y, x = np.meshgrid(np.arange(size) / size, np.arange(size) / size, indexing="ij")
     # Laid by hand: courses and joints wander by some millimetres.
@@ -633,11 +633,13 @@ def brick(size: int = 432, courses: int = 24, bricks: int = 8) -> tuple[Array, A
     out, lean, tone = rng.normal(0, 1, (3, courses * bricks))[:, which]
     tooth = noise(size, size, (54, 54), 81, 2)
     height = face * (0.80 + 0.05 * out + 0.05 * lean * (across - 0.5) + 0.015 * tooth)
-    shade = 0.012 * tone + 0.008 * tooth + 0.06 * (face - 1)
-    return np.array((0.89, 0.88, 0.86)) + shade[..., None], np.repeat(height[..., None], 3, axis=2)
+    # Relief is painted: lower edges of bricks catch less light than upper ones, joints least.
+    edges = np.clip(np.roll(height, -1, axis=0) - np.roll(height, 1, axis=0), -1, 1)
+    shade = 0.016 * tone + 0.008 * tooth + 0.13 * (face - 1) + 0.045 * edges
+    return np.array((0.88, 0.87, 0.85)) + shade[..., None]
 
 
-def concrete(width: int = 680, height: int = 380) -> tuple[Array, Array]:
+def concrete(width: int = 680, height: int = 380) -> Array:
     """Two by two panels of fair-faced concrete, 3.4 m by 1.9 m, with the holes of their ties."""
     y, x = np.meshgrid(np.arange(height) / height, np.arange(width) / width, indexing="ij")
     cloud = noise(height, width, (2, 4), 91, 4)
@@ -651,9 +653,7 @@ def concrete(width: int = 680, height: int = 380) -> tuple[Array, Array]:
     # Water ran down the shuttering; air left pinholes.
     streak = noise(height, width, (2, 68), 92, 2)
     shade = tone + 0.030 * cloud + 0.008 * streak - 0.20 * open_joint - 0.24 * hole
-    depth = 0.85 - 0.35 * open_joint - 0.5 * hole
-    color = np.array((0.735, 0.728, 0.712)) + shade[..., None]
-    return color, np.repeat(depth[..., None], 3, axis=2)
+    return np.array((0.735, 0.728, 0.712)) + shade[..., None]
 
 
 def oak(height: int = 800, width: int = 640, planks: int = 20, rows: int = 3) -> Array:
@@ -819,9 +819,8 @@ def main() -> None:
 
     pair = tide()
     half = pair.shape[1] // 2
-    for name, (color, relief) in {"brick": brick(), "concrete": concrete()}.items():
-        write_png(name, color, steps=170)
-        write_png(f"{name}_relief", relief, steps=85 if name == "brick" else 255)
+    write_png("brick", brick(), steps=170)
+    write_png("concrete", concrete(), steps=170)
     write_png("plaster_blue", plaster((0.50, 0.58, 0.60), 75))
     write_png("oak", oak())
     write_png("field", field())

@@ -657,8 +657,8 @@ def boards_texture(size: int = 768, boards: int = 32) -> NDArray[np.uint8]:
     return encode(image)
 
 
-def masonry_textures(size: int = 512) -> dict[str, NDArray[np.uint8]]:
-    """3 m x 3 m of a painted wall: courses of stone under worn plaster; colour and height."""
+def masonry_texture(size: int = 512) -> NDArray[np.uint8]:
+    """3 m x 3 m of a painted wall: courses of stone under worn plaster."""
     rng = np.random.default_rng(8)
     y, x = np.mgrid[0:size, 0:size] / size
 
@@ -691,9 +691,10 @@ def masonry_textures(size: int = 512) -> dict[str, NDArray[np.uint8]]:
     cover = np.clip(0.5 + 2.2 * (cloud([2, 3, 5]) + 0.10 * grain - 0.85), 0, 1)
     height = face * (0.60 + out + 0.05 * grain)
     height += cover * (0.85 + 0.012 * cloud([5, 11]) - height)
-    relief = np.round(np.clip(height, 0, 1)[..., None] * 127 * np.ones(3)).astype(np.uint8) * 2
-    color = encode(stone + cover[..., None] * (plaster - stone))
-    return {"masonry": color, "masonry_relief": relief}
+    # Relief is painted, as scene painters do: light from above on every edge.
+    edges = np.clip(np.roll(height, -1, axis=0) - np.roll(height, 1, axis=0), -0.5, 0.5)
+    color = stone + cover[..., None] * (plaster - stone)
+    return encode(color * np.exp2(0.9 * edges)[..., None])
 
 
 def encode(linear: Floats) -> NDArray[np.uint8]:
@@ -749,7 +750,7 @@ def main() -> None:
         write_ply(path, mesh)
         triangles, size = triangles + len(mesh.faces), size + path.stat().st_size
         print(f"{path.name:22} {len(mesh.faces):6} triangles {path.stat().st_size:8} bytes")
-    for name, image in ({"boards": boards_texture()} | masonry_textures()).items():
+    for name, image in {"boards": boards_texture(), "masonry": masonry_texture()}.items():
         path = HERE / "textures" / f"{name}.png"
         write_png(path, image)
         size += path.stat().st_size

@@ -87,8 +87,6 @@ class Sheet:
         # To a painter bronze has a colour; in the scene it has an index of refraction.
         bronze = room.within((0.8, 1.025, 2.5), (1.75, 1.8, 3.5)).amount[..., None]
         albedo = room.surfaces.albedo * (1 + bronze * (np.array(BRONZE, np.float32) - 1))
-        # Nobody paints the light on every brick.
-        room = room.flat(~room.within((-3.385, 0.0, 0.005), (3.385, 3.79, 12.0), soft=1e-3))
         return cls(canvas, room, canvas.image.copy(), albedo)
 
     def begin(self, tint: Color, stops: float, air: Color, *, share: float) -> None:
