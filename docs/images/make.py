@@ -11,7 +11,7 @@ writes beside itself
 
 Each scene's basis is rendered once at 1280 x 720, and kept in FOLDER for the next time if there is
 one. Each look is the sum of that basis for the lighting found; its noise is taken away by Open
-Image Denoise. Two cores take about four minutes for 64 samples.
+Image Denoise. Two cores take about five minutes for 64 samples.
 """
 
 from __future__ import annotations
