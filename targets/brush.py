@@ -26,6 +26,7 @@ from typing import Protocol
 import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
+from PIL import Image
 
 Floats = NDArray[np.float32]
 Point = tuple[float, float]
@@ -182,6 +183,20 @@ class Canvas:
         factor = np.log2(np.asarray(color, np.float32)) + np.float32(stops)
         self.image *= np.exp2(amount * factor)
 
+    def wash(self, mark: Mark, look: Floats, *, opacity: float = 1.0, say: float = 1.0) -> None:
+        """Draw the picture towards another, (h, w, 3), in stops: what both have in common stays.
+
+        image <- image^(1 - a) look^a with a = opacity coverage.
+        """
+        amount = self._touch(mark, opacity, say)[..., None]
+        there = np.log2(np.maximum(self.image, 1e-6))
+        self.image[:] = np.exp2(there + amount * (np.log2(np.maximum(look, 1e-6)) - there))
+
+    def light(self, mark: Mark, color: Color, on: Floats, *, say: float = 1.0) -> None:
+        """Add light of a colour that falls on a surface of albedo `on`, (h, w, 3)."""
+        amount = self._touch(mark, 1.0, say)[..., None]
+        self.image += amount * np.asarray(color, np.float32) * on
+
     def keep(self, mark: Mark, *, opacity: float = 1.0) -> None:
         """Ask for what is there already: raises the weight and changes no colour."""
         self._touch(mark, opacity, 1.0)
@@ -195,6 +210,12 @@ class Canvas:
         alpha = self.weight[..., None]
         _write_exr(path, {"RGBA": np.concatenate([self.image * alpha, alpha], axis=-1)})
 
+    def write_png(self, path: str | Path) -> None:
+        """The picture alone, in 8 bits of sRGB; what is brighter than white is white."""
+        linear = np.clip(self.image, 0, 1)
+        shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        Image.fromarray(np.rint(255 * shown).astype(np.uint8)).save(path, optimize=True)
+
     def write_mask(self, path: str | Path) -> None:
         """The weight alone: one half channel, Y."""
         _write_exr(path, {"Y": self.weight})
@@ -207,9 +228,15 @@ class Canvas:
 
 
 def _write_exr(path: str | Path, channels: dict[str, Floats]) -> None:
-    """Write channels as half floats, ZIP compressed."""
+    """Write channels as half floats, ZIP compressed.
+
+    They are rounded to 8 significant bits, finer than an eye can tell, which makes small files.
+    """
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    halves = {name: np.ascontiguousarray(data, np.float16) for name, data in channels.items()}
+    halves = {}
+    for name, data in channels.items():
+        mantissa, exponent = np.frexp(np.asarray(data, np.float32))
+        halves[name] = np.ldexp(np.rint(mantissa * 256) / 256, exponent).astype(np.float16)
     OpenEXR.File(header, halves).write(str(path))
 
 

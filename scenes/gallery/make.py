@@ -192,23 +192,21 @@ class Mesh:
         """How many triangles there are."""
         return sum(len(f) for f in self.faces)
 
-    def write(self, name: str) -> None:
-        """Write meshes/<name>.ply: binary, little endian."""
-        vertices = np.concatenate(
-            [np.concatenate(part) for part in (self.positions, self.normals, self.uvs)], axis=1
-        ).astype("<f4")
+    def write(self, name: str, *, bare: bool = False) -> None:
+        """Write meshes/<name>.ply: binary, little endian; `bare` without normals and uvs."""
+        columns = ["x", "y", "z"] if bare else ["x", "y", "z", "nx", "ny", "nz", "u", "v"]
+        parts = (self.positions,) if bare else (self.positions, self.normals, self.uvs)
+        vertices = np.concatenate([np.concatenate(part) for part in parts], axis=1)
         faces = np.concatenate(self.faces)
         packed = np.zeros(len(faces), dtype=[("count", "u1"), ("index", "<i4", 3)])
         packed["count"], packed["index"] = 3, faces
-        columns = "".join(
-            f"property float {c}\n" for c in ("x", "y", "z", "nx", "ny", "nz", "u", "v")
-        )
+        properties = "".join(f"property float {c}\n" for c in columns)
         header = (
-            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{columns}"
+            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{properties}"
             f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
         )
         path = HERE / "meshes" / f"{name}.ply"
-        path.write_bytes(header.encode() + vertices.tobytes() + packed.tobytes())
+        path.write_bytes(header.encode() + vertices.astype("<f4").tobytes() + packed.tobytes())
 
 
 def _frame(axis: Array) -> tuple[Array, Array]:
@@ -416,6 +414,7 @@ def works() -> dict[str, Mesh]:
         legs.box((x - 0.02, 0, z0 + 0.04), (x + 0.02, 0.40, z0 + 0.08), 0.003)
         legs.box((x - 0.02, 0, z1 - 0.08), (x + 0.02, 0.40, z1 - 0.04), 0.003)
         legs.box((x - 0.02, 0, z0 + 0.08), (x + 0.02, 0.03, z1 - 0.08), 0.003)
+    stone, hollow = figure()
     return meshes | {
         "frames": frames,
         "labels": labels,
@@ -424,9 +423,13 @@ def works() -> dict[str, Mesh]:
         "bench_legs": legs,
         "knot": knot(),
         "vase": vase(),
-        "figure": figure(),
+        "figure": stone,
+        "figure_hollow": hollow,
     }
 
+
+# Mitsuba makes smooth normals for these, and they carry no texture.
+SMOOTH = ("knot", "vase", "figure", "figure_hollow")
 
 KNOT = (1.28, 1.02, 3.0)
 VASE = (2.72, 0.95, 2.25)
@@ -493,30 +496,52 @@ def vase() -> Mesh:
     return mesh
 
 
-def figure() -> Mesh:
-    """A standing form in pale stone: an oval section that turns and leans as it rises."""
-    rows, segments = 44, 40
-    s = np.linspace(0, 1, rows)[:, None]
-    radius = 0.03 + 0.27 * np.sin(np.pi * s**0.8) ** 0.75 * (1 - 0.30 * s)
-    radius *= (
-        1 - 0.32 * np.exp(-(((s - 0.66) / 0.09) ** 2)) + 0.10 * np.exp(-(((s - 0.84) / 0.07) ** 2))
-    )
-    radius = np.where(s == 0, 0.0, np.where(s == 1, 0.0, radius + 0.03 * (1 - s) ** 6))
-    angle = np.linspace(0, -2 * np.pi, segments, endpoint=False)[None, :]
-    turn = 1.9 * s
-    x, z = radius * np.cos(angle), 0.66 * radius * np.sin(angle)
-    lean = 0.05 * np.sin(2.4 * np.pi * s)
-    points = np.stack(
-        [
-            np.cos(turn) * x - np.sin(turn) * z + lean,
-            1.32 * s + 0 * angle,
-            np.sin(turn) * x + np.cos(turn) * z,
-        ],
-        axis=-1,
-    )
-    mesh = Mesh()
-    mesh.surface(points + np.array(FIGURE))
-    return mesh
+def figure() -> tuple[Mesh, Mesh]:
+    """An upright pierced form in two parts: the stone, and its hollow, which meet in a sharp rim.
+
+    It is described about the axis of its hole: for every direction there is a radius of the
+    outline, of the rim and of the narrowest place. The hole is not in the middle, and leans.
+    """
+    turns = 72
+    angle = np.linspace(0, 2 * np.pi, turns, endpoint=False)
+    # The outline is an egg that stands on its narrow end; the axis of the hole is above its middle.
+    reach = _egg(angle, middle=(0.0, 0.56), hole=(0.035, 0.80))
+    rim = np.minimum(0.205 + 0.055 * np.sin(angle - 0.5) ** 2, 0.80 * reach)
+    waist = 0.085 + 0.045 * np.sin(angle - 0.75) ** 2
+    depth = 0.205 - 0.035 * np.sin(angle)
+
+    def form(radius: Array, z: Array) -> Mesh:
+        """The surface with these radii and depths, (rows, turns), turned and on its plinth."""
+        x = 0.035 + 0.22 * z + radius * np.cos(angle)
+        y = 0.80 + 0.30 * z + radius * np.sin(angle)
+        swing = np.radians(34.0) + 0.30 * (y - 0.6)
+        points = np.stack(
+            [
+                np.cos(swing) * x + np.sin(swing) * z,
+                np.maximum(y, 0.0),
+                np.cos(swing) * z - np.sin(swing) * x,
+            ],
+            axis=-1,
+        )
+        mesh = Mesh()
+        mesh.surface(points + np.array(FIGURE))
+        return mesh
+
+    over = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 23))[:, None] * np.pi / 2
+    stone = form(rim + (reach - rim) * np.cos(over) ** 0.9, depth * np.sin(over))
+    through = np.linspace(1, -1, 15)[:, None]
+    hollow = form(waist + (rim - waist) * np.abs(through) ** 1.7, depth * through)
+    return stone, hollow
+
+
+def _egg(angle: Array, middle: tuple[float, float], hole: tuple[float, float]) -> Array:
+    """How far the outline of the pierced form is from its hole, in each direction."""
+    turn = np.linspace(0, 2 * np.pi, 721)
+    broad = 0.245 + 0.085 * np.sin(turn)
+    x = middle[0] + broad * np.cos(turn) + 0.045 * np.sin(2 * turn - 0.4)
+    y = middle[1] + 0.76 * np.sin(turn) - 0.05 * np.cos(turn)
+    towards = np.unwrap(np.arctan2(y - hole[1], x - hole[0]))
+    return np.interp(angle, towards, np.hypot(x - hole[0], y - hole[1]), period=2 * np.pi)
 
 
 def _curve(points: Array, count: int) -> Array:
@@ -591,6 +616,44 @@ def plaster(color: Sequence[float], seed: int, size: int = 320) -> Array:
         size, size, (80, 80), seed + 1, 1
     )
     return np.asarray(color, float) + shade[..., None]
+
+
+def brick(size: int = 432, courses: int = 24, bricks: int = 8) -> Array:
+    """1.8 m of whitewashed brickwork; every other course is half a brick further on."""
+    rng = np.random.default_rng(77)
+    y, x = np.meshgrid(np.arange(size) / size, np.arange(size) / size, indexing="ij")
+    # Laid by hand: courses and joints wander by some millimetres.
+    y = (y + 0.0009 * noise(size, size, (2, 6), 78, 2)) % 1
+    course = np.minimum((y * courses).astype(int), courses - 1)
+    along = (x * bricks + 0.5 * (course % 2) + 0.02 * noise(size, size, (24, 8), 79, 1)) % bricks
+    which = course * bricks + along.astype(int)
+    across, down = along % 1, (y * courses) % 1
+    edge = np.minimum(np.minimum(across, 1 - across) * 0.225, np.minimum(down, 1 - down) * 0.075)
+    face = _step(0.0005, 0.0135, edge + 0.0015 * noise(size, size, (60, 60), 80, 2))
+    out, lean, tone = rng.normal(0, 1, (3, courses * bricks))[:, which]
+    tooth = noise(size, size, (54, 54), 81, 2)
+    height = face * (0.80 + 0.05 * out + 0.05 * lean * (across - 0.5) + 0.015 * tooth)
+    # Relief is painted: lower edges of bricks catch less light than upper ones, joints least.
+    edges = np.clip(np.roll(height, -1, axis=0) - np.roll(height, 1, axis=0), -1, 1)
+    shade = 0.016 * tone + 0.008 * tooth + 0.13 * (face - 1) + 0.045 * edges
+    return np.array((0.88, 0.87, 0.85)) + shade[..., None]
+
+
+def concrete(width: int = 680, height: int = 380) -> Array:
+    """Two by two panels of fair-faced concrete, 3.4 m by 1.9 m, with the holes of their ties."""
+    y, x = np.meshgrid(np.arange(height) / height, np.arange(width) / width, indexing="ij")
+    cloud = noise(height, width, (2, 4), 91, 4)
+    column, row = (x * 2).astype(int), (y * 2).astype(int)
+    tone = np.array([[0.012, -0.010], [-0.014, 0.008]])[row, column]
+    u, v = (x * 2) % 1 * 1.7, (y * 2) % 1 * 0.95
+    joint = np.minimum(np.minimum(u, 1.7 - u), np.minimum(v, 0.95 - v))
+    open_joint = _step(0.0075, 0.0025, joint)
+    tie = np.hypot(np.abs(u - 0.85) - 0.50, np.abs(v - 0.475) - 0.24)
+    hole = _step(0.019, 0.012, tie)
+    # Water ran down the shuttering; air left pinholes.
+    streak = noise(height, width, (2, 68), 92, 2)
+    shade = tone + 0.030 * cloud + 0.008 * streak - 0.20 * open_joint - 0.24 * hole
+    return np.array((0.735, 0.728, 0.712)) + shade[..., None]
 
 
 def oak(height: int = 800, width: int = 640, planks: int = 20, rows: int = 3) -> Array:
@@ -715,9 +778,13 @@ def sun(height: int = 320, width: int = 251) -> Array:
     return _mix(picture, (0.90, 0.50, 0.30), 0.8 * glint)
 
 
-def write_png(name: str, picture: Array) -> None:
-    """Write textures/<name>.png: 8 bits, RGB, rows stored as differences downwards."""
-    pixels = np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)
+def write_png(name: str, picture: Array, *, steps: int = 255) -> None:
+    """Write textures/<name>.png: 8 bits, RGB, rows stored as differences downwards.
+
+    Fewer `steps` than 255 make a smaller file.
+    """
+    coarse = np.rint(steps * np.clip(picture, 0, 1)) / steps
+    pixels = np.rint(255 * coarse).astype(np.uint8)
     height, width = pixels.shape[:2]
     rows = pixels.reshape(height, -1)
     rows = np.concatenate(
@@ -746,14 +813,14 @@ def main() -> None:
 
     meshes = building() | fixtures() | works()
     for name, mesh in meshes.items():
-        mesh.write(name)
+        mesh.write(name, bare=name in SMOOTH)
         print(f"{name:22s}{mesh.triangles:7d} triangles")
     print(f"{'in all':22s}{sum(m.triangles for m in meshes.values()):7d} triangles")
 
     pair = tide()
     half = pair.shape[1] // 2
-    write_png("plaster_white", plaster((0.89, 0.88, 0.86), 71))
-    write_png("plaster_grey", plaster((0.74, 0.73, 0.71), 73))
+    write_png("brick", brick(), steps=170)
+    write_png("concrete", concrete(), steps=170)
     write_png("plaster_blue", plaster((0.50, 0.58, 0.60), 75))
     write_png("oak", oak())
     write_png("field", field())

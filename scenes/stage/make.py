@@ -282,8 +282,9 @@ def door_trim() -> Mesh:
     slope = np.concatenate([np.linspace(a, b, 8) for a, b in pairwise(knots)])
     slope = np.unique(np.round(slope, 9), axis=0)
     coping = tube(slope, np.full(len(slope), 0.10), sides=10)
-    flattened = coping.points * (1, 1, 1.7)
-    coping = Mesh(flattened, coping.normals, coping.faces)
+    across = coping.normals / (1, 1, 1.7)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    coping = Mesh(coping.points * (1, 1, 1.7), across, coping.faces)
     return join([moulding, key, *feet, coping]).placed(DOOR_AT, turn=DOOR_TURN)
 
 
@@ -498,8 +499,8 @@ def gown_distance(p: Floats) -> Floats:
     folds = folds + 0.35 * np.cos(17 * angle + 2)
     skirt = 0.75 * (reach - radius - 0.030 * low**1.1 * folds)
     skirt = np.maximum(skirt, np.maximum(-y, y - 1.12))
-    bodice = ellipsoid(p, (0.0, 1.25, 0.0), (0.150, 0.235, 0.108))
-    bust = ellipsoid(p, (0.0, 1.29, 0.055), (0.125, 0.09, 0.085))
+    bodice = ellipsoid(p, (0.0, 1.25, 0.0), (0.142, 0.235, 0.102))
+    bust = ellipsoid(p, (0.0, 1.285, 0.052), (0.112, 0.078, 0.074))
     body = smooth_min(smooth_min(skirt, bodice, 0.05), bust, 0.05)
     for side in (-1, 1):
         upper = limb(p, SHOULDER[side], ELBOW[side], 0.062, 0.055)
@@ -510,16 +511,45 @@ def gown_distance(p: Floats) -> Floats:
     return np.maximum(body, -ellipsoid(p, (0.0, 1.50, 0.05), (0.085, 0.085, 0.10)))
 
 
+def head_distance(p: Floats) -> Floats:
+    """Distance to head and neck: a skull, and the planes of a face in front of it."""
+    q = p - np.array(HEAD)
+    side = np.abs(q[..., 0])
+    m = np.stack([side, q[..., 1], q[..., 2]], axis=-1)  # both halves of the face at once
+    head = ellipsoid(q, (0.0, 0.020, -0.008), (0.073, 0.098, 0.094))
+    face = ellipsoid(q, (0.0, -0.028, 0.024), (0.058, 0.088, 0.066))
+    head = smooth_min(head, face, 0.03)
+    cheek = ellipsoid(m, (0.036, -0.026, 0.058), (0.022, 0.019, 0.021))
+    chin = ellipsoid(q, (0.0, -0.103, 0.060), (0.021, 0.017, 0.019))
+    jaw = limb(m, (0.055, -0.050, -0.002), (0.014, -0.101, 0.050), 0.012, 0.013)
+    for part, soft in ((jaw, 0.035), (cheek, 0.028), (chin, 0.022)):
+        head = smooth_min(head, part, soft)
+    socket = ellipsoid(m, (0.031, 0.003, 0.102), (0.023, 0.013, 0.020))
+    head = -smooth_min(-head, socket, 0.016)
+    brow = limb(m, (0.012, 0.021, 0.085), (0.045, 0.019, 0.069), 0.008, 0.005)
+    lid = ellipsoid(m, (0.030, 0.002, 0.071), (0.017, 0.011, 0.015))
+    bridge = limb(q, (0.0, 0.012, 0.086), (0.0, -0.028, 0.108), 0.0065, 0.0095)
+    wing = ellipsoid(m, (0.010, -0.033, 0.094), (0.0075, 0.007, 0.010))
+    mouth = ellipsoid(q, (0.0, -0.064, 0.078), (0.026, 0.018, 0.016))
+    for part, soft in ((brow, 0.014), (lid, 0.006), (bridge, 0.011), (wing, 0.006), (mouth, 0.02)):
+        head = smooth_min(head, part, soft)
+    neck = limb(p, (0, 1.36, -0.012), (0, 1.58, -0.004), 0.054, 0.045)
+    return smooth_min(head, neck, 0.022)
+
+
+def lips_distance(p: Floats) -> Floats:
+    """Distance to the lips, which stand a little proud of the mouth."""
+    q = p - np.array(HEAD)
+    m = np.stack([np.abs(q[..., 0]), q[..., 1], q[..., 2]], axis=-1)
+    upper = limb(m, (0.004, -0.0600, 0.0945), (0.026, -0.0645, 0.0815), 0.0042, 0.0026)
+    lower = limb(m, (0.000, -0.0685, 0.0940), (0.022, -0.0660, 0.0835), 0.0050, 0.0026)
+    return smooth_min(upper, lower, 0.002)
+
+
 def skin_distance(p: Floats) -> Floats:
-    """Distance to the head, neck, shoulders and hands."""
-    x, y, z = HEAD
-    skull = ellipsoid(p, (x, y + 0.015, z - 0.005), (0.078, 0.100, 0.093))
-    jaw = ellipsoid(p, (x, y - 0.055, z + 0.022), (0.055, 0.068, 0.066))
-    nose = limb(p, (x, y + 0.01, z + 0.082), (x, y - 0.022, z + 0.102), 0.008, 0.013)
-    head = smooth_min(smooth_min(skull, jaw, 0.04), nose, 0.02)
-    neck = limb(p, (0, 1.40, -0.01), (0, 1.57, 0.0), 0.056, 0.046)
-    chest = ellipsoid(p, (0.0, 1.385, 0.0), (0.155, 0.075, 0.085))
-    body = smooth_min(smooth_min(head, neck, 0.03), chest, 0.05)
+    """Distance to the shoulders and hands."""
+    body = ellipsoid(p, (0.0, 1.385, 0.0), (0.155, 0.075, 0.085))
+    body = smooth_min(body, limb(p, (0, 1.40, -0.01), (0, 1.47, -0.006), 0.056, 0.05), 0.05)
     for side in (-1, 1):
         elbow, hand = np.array(ELBOW[side]), np.array(HAND[side])
         forward = (hand - elbow) / np.linalg.norm(hand - elbow)
@@ -531,24 +561,48 @@ def skin_distance(p: Floats) -> Floats:
 
 
 def hair_distance(p: Floats) -> Floats:
-    """Distance to the hair: a cap drawn back into a knot."""
-    x, y, z = HEAD
-    cap = ellipsoid(p, (x, y + 0.032, z - 0.028), (0.091, 0.103, 0.100))
-    face = ellipsoid(p, (x, y - 0.05, z + 0.105), (0.085, 0.125, 0.09))
-    knot = ellipsoid(p, (x, y + 0.045, z - 0.135), (0.058, 0.055, 0.05))
-    cap = np.maximum(cap, -face)
-    return smooth_min(cap, knot, 0.02) + 0.003 * np.sin(90 * p[..., 0]) * (p[..., 1] > y)
+    """Distance to the hair: waved over the ears and drawn back into a knot."""
+    q = p - np.array(HEAD)
+    m = np.stack([np.abs(q[..., 0]), q[..., 1], q[..., 2]], axis=-1)
+    cap = ellipsoid(q, (0.0, 0.031, -0.012), (0.082, 0.100, 0.105))
+    wave = ellipsoid(m, (0.064, -0.004, -0.004), (0.020, 0.050, 0.046))
+    cap = smooth_min(cap, wave, 0.02)
+    # The hairline is an oval round the face.
+    face = ellipsoid(q, (0.0, -0.034, 0.112), (0.064, 0.112, 0.100))
+    cap = -smooth_min(-cap, face, 0.008)
+    coil = ellipsoid(q, (0.0, 0.030, -0.142), (0.060, 0.058, 0.048))
+    strands = 0.0016 * np.sin(170 * m[..., 0] + 90 * q[..., 1] - 60 * q[..., 2])
+    return smooth_min(cap, coil, 0.02) + strands
+
+
+def brow_distance(p: Floats) -> Floats:
+    """Distance to brows and lashes, which are of the hair's colour."""
+    q = p - np.array(HEAD)
+    m = np.stack([np.abs(q[..., 0]), q[..., 1], q[..., 2]], axis=-1)
+    inner = limb(m, (0.015, 0.0285, 0.0890), (0.034, 0.0320, 0.0785), 0.0030, 0.0034)
+    outer = limb(m, (0.034, 0.0320, 0.0785), (0.051, 0.0225, 0.0640), 0.0034, 0.0016)
+    lash = limb(m, (0.018, -0.0005, 0.0850), (0.043, -0.0020, 0.0770), 0.0036, 0.0030)
+    return np.minimum(np.minimum(inner, outer), lash)
 
 
 FIGURE_AT, FIGURE_TURN, FIGURE_SCALE = (0.35, 0.0, -0.75), -24.0, 1.12
 
 
 def woman() -> dict[str, Mesh]:
-    """The standing figure, in the three materials it is made of."""
+    """The standing figure, in the materials it is made of."""
+    x, y, z = HEAD
+    low, high = np.array([x - 0.12, y - 0.16, z - 0.20]), np.array([x + 0.12, y + 0.16, z + 0.13])
     gown = surface_nets(gown_distance, (-0.70, -0.02, -0.85), (0.60, 1.55, 0.60), cell=0.025)
-    skin = surface_nets(skin_distance, (-0.72, 0.85, -0.2), (0.4, 1.85, 0.4), cell=0.013)
-    hair = surface_nets(hair_distance, (-0.16, 1.45, -0.28), (0.16, 1.82, 0.20), cell=0.012)
-    parts = {"figure_gown": gown, "figure_skin": skin, "figure_hair": hair}
+    skin = surface_nets(skin_distance, (-0.72, 0.85, -0.2), (0.4, 1.60, 0.4), cell=0.013)
+    head = surface_nets(head_distance, low, high, cell=0.0065)
+    hair = surface_nets(hair_distance, low, high, cell=0.008)
+    brows = surface_nets(brow_distance, low, high, cell=0.0030)
+    parts = {
+        "figure_gown": gown,
+        "figure_skin": join([skin, head]),
+        "figure_hair": join([hair, brows]),
+        "figure_lips": surface_nets(lips_distance, low, high, cell=0.0030),
+    }
     return {
         name: mesh.placed(FIGURE_AT, turn=FIGURE_TURN, scale=FIGURE_SCALE)
         for name, mesh in parts.items()
@@ -604,7 +658,7 @@ def boards_texture(size: int = 768, boards: int = 32) -> NDArray[np.uint8]:
 
 
 def masonry_texture(size: int = 512) -> NDArray[np.uint8]:
-    """3 m x 3 m of a painted wall: worn plaster, with courses of stone showing through."""
+    """3 m x 3 m of a painted wall: courses of stone under worn plaster."""
     rng = np.random.default_rng(8)
     y, x = np.mgrid[0:size, 0:size] / size
 
@@ -618,21 +672,29 @@ def masonry_texture(size: int = 512) -> NDArray[np.uint8]:
         spread: float = total.std()
         return total / spread
 
-    rows, warp = 14, 0.006 * cloud([2, 4])
-    row = np.floor((y + warp) * rows)
+    rows, warp = 14, 0.0025 * cloud([2, 4, 9])
+    row = np.floor((y + warp) * rows) % rows
     wide = 5 + (row.astype(int) * 7 % 3)
-    column = (x + 0.3 * warp) * wide + 0.37 * row
+    column = (x + 0.5 * warp) * wide + 0.37 * row
     in_row, in_column = ((y + warp) * rows) % 1, column % 1
     joint = np.minimum(
         np.minimum(in_row, 1 - in_row) / rows, np.minimum(in_column, 1 - in_column) / wide
     )
-    mortar = np.clip(1 - joint / 0.006, 0, 1)
-    tone = rng.normal(0, 0.22, 4096)[(row * 31 + np.floor(column) * 17).astype(int) % 4096]
-    stone = np.array([0.40, 0.34, 0.27]) * np.exp2(tone + 0.10 * cloud([6, 11, 19]))[..., None]
-    stone *= (1 - 0.5 * mortar)[..., None]
-    plaster = np.array([0.60, 0.53, 0.43]) * np.exp2(0.10 * cloud([3, 7, 13]))[..., None]
-    cover = np.clip(0.5 + 1.6 * (cloud([2, 3, 5]) + 0.25), 0, 1)[..., None]
-    return encode(stone + cover * (plaster - stone))
+    which = (row * 31 + np.floor(column) % wide * 17).astype(int) % 4096
+    face = np.clip(joint / 0.007 - 0.2 + 0.12 * cloud([17, 29]), 0, 1)
+    face = face * face * (3 - 2 * face)
+    tone, out = rng.normal(0, 0.20, 4096)[which], rng.normal(0, 0.10, 4096)[which]
+    grain = cloud([9, 19, 37])
+    stone = np.array([0.44, 0.37, 0.29]) * np.exp2(tone + 0.10 * grain)[..., None]
+    stone *= (0.45 + 0.55 * face)[..., None]
+    plaster = np.array([0.58, 0.51, 0.41]) * np.exp2(0.09 * cloud([3, 7, 13]))[..., None]
+    cover = np.clip(0.5 + 2.2 * (cloud([2, 3, 5]) + 0.10 * grain - 0.85), 0, 1)
+    height = face * (0.60 + out + 0.05 * grain)
+    height += cover * (0.85 + 0.012 * cloud([5, 11]) - height)
+    # Relief is painted, as scene painters do: light from above on every edge.
+    edges = np.clip(np.roll(height, -1, axis=0) - np.roll(height, 1, axis=0), -0.5, 0.5)
+    color = stone + cover[..., None] * (plaster - stone)
+    return encode(color * np.exp2(0.9 * edges)[..., None])
 
 
 def encode(linear: Floats) -> NDArray[np.uint8]:

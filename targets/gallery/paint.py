@@ -1,208 +1,264 @@
-"""Paints the two targets of the gallery over its current look, stroke by stroke.
+"""Paints six targets of the gallery over a clean picture of its current look.
 
-    lightpaint template scenes/gallery/scene.xml -o targets/gallery/template.exr
+    python targets/clean.py scenes/gallery/scene.xml -o targets/gallery/template.exr
     python targets/gallery/paint.py [template.exr]
 
 writes beside itself
 
-    evening.exr                     the room at dusk; alpha says what was painted and how firmly
-    morning.exr, morning.mask.exr   the first sun; what was painted is in the mask
+    evening.exr                     dusk, the works glow; alpha says how firmly each part is meant
+    morning.exr, morning.mask.exr   the first sun, the lamps off; what was painted is in the mask
+    opening.png                     opening night: everything that can shine does
+    after-hours.png                 a lamp left on in the annex
+    overcast.png                    a white sky and nothing else
+    last-sun.png                    the sun goes down
 
-These are paintings. No light was rendered on its own to make them; each stroke puts brightness and
-colour where it would please the eye and where some light could perhaps put it. Whether the twelve
-lights of the scene can follow is the solver's question.
+These are paintings. Nothing was rendered of one light alone to make them: cones and distances say
+where light would fall, as a painter constructs it, without shadows or anything reflected. Whether
+the twelve lights of the scene can follow is the solver's question.
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from brush import Area, Canvas, Everywhere, Gradient, Stroke  # noqa: E402
-
-# Where things are in the picture. Points are fractions of its width and height.
-FIELD = Area([(0.345, 0.338), (0.563, 0.334), (0.563, 0.622), (0.345, 0.612)], feather=0.012)
-TIDE_LEFT = Area([(0.0, 0.295), (0.112, 0.330), (0.112, 0.630), (0.0, 0.648)], feather=0.012)
-TIDE_RIGHT = Area([(0.124, 0.334), (0.207, 0.358), (0.207, 0.608), (0.124, 0.626)], feather=0.012)
-DOORWAY = Area([(0.647, 0.325), (0.761, 0.322), (0.761, 0.70), (0.647, 0.70)], feather=0.008)
-SKYLIGHT = Area([(0.29, -0.1), (0.65, -0.1), (0.645, 0.068), (0.390, 0.106)], feather=0.012)
-WINDOW_FAR = Area([(0.881, 0.182), (0.914, 0.130), (0.914, 0.795), (0.881, 0.753)], feather=0.008)
-WINDOW_NEAR = Area([(0.984, -0.02), (1.05, -0.1), (1.05, 1.0), (0.984, 0.905)], feather=0.008)
-COVE = Stroke([(-0.02, 0.04), (0.15, 0.155), (0.30, 0.245)], size=0.12)
-BRONZE = Area(
-    [
-        (0.569, 0.505),
-        (0.582, 0.478),
-        (0.612, 0.500),
-        (0.640, 0.478),
-        (0.650, 0.505),
-        (0.643, 0.55),
-        (0.628, 0.618),
-        (0.598, 0.618),
-        (0.580, 0.56),
-    ]
-)
-BRONZE_PLINTH = Area([(0.577, 0.625), (0.641, 0.625), (0.641, 0.868), (0.577, 0.865)])
-VASE = Area(
-    [
-        (0.793, 0.497),
-        (0.808, 0.497),
-        (0.812, 0.53),
-        (0.823, 0.56),
-        (0.822, 0.60),
-        (0.812, 0.63),
-        (0.790, 0.63),
-        (0.778, 0.60),
-        (0.776, 0.565),
-        (0.788, 0.53),
-    ]
-)
-VASE_PLINTH = Area([(0.773, 0.635), (0.829, 0.635), (0.829, 0.842), (0.773, 0.842)])
-FIGURE = Area(
-    [
-        (0.292, 0.475),
-        (0.302, 0.475),
-        (0.304, 0.53),
-        (0.313, 0.60),
-        (0.314, 0.668),
-        (0.282, 0.668),
-        (0.279, 0.56),
-        (0.287, 0.51),
-    ]
-)
-FIGURE_PLINTH = Area([(0.264, 0.673), (0.324, 0.668), (0.324, 0.722), (0.264, 0.729)])
-BENCH = Area([(0.248, 0.735), (0.284, 0.728), (0.453, 0.752), (0.441, 0.774), (0.256, 0.757)])
-SUN_FAR_LEFT = Area([(0.470, 0.745), (0.573, 0.766), (0.573, 0.806), (0.455, 0.782)], feather=0.012)
-SUN_FAR_RIGHT = Area(
-    [(0.646, 0.781), (0.769, 0.806), (0.769, 0.850), (0.646, 0.822)], feather=0.012
-)
-SUN_NEAR = Area(
-    [(0.392, 0.845), (0.900, 0.968), (0.900, 1.06), (0.535, 0.990), (0.335, 0.910)], feather=0.012
-)
-
-WARM = (1.0, 0.72, 0.42)
-AMBER = (1.0, 0.58, 0.26)
-DUSK = (0.42, 0.58, 1.0)
+from brush import Area, Canvas, Color, Everywhere, Floats, Stroke  # noqa: E402
+from clean import Surfaces  # noqa: E402
+from room import Painted, Room, Vector  # noqa: E402
 
 
-def paint_evening(canvas: Canvas) -> None:
+@dataclass(frozen=True)
+class Spot:
+    """Where a track spot hangs, what it points at, and its cone in degrees."""
+
+    at: Vector
+    towards: Vector
+    cutoff: float
+    full: float
+
+
+SPOTS = {
+    "field": Spot((-1.1, 3.55, 1.55), (-1.1, 1.55, 0.0), 45, 16),
+    "tide": Spot((-1.8, 3.5, 2.95), (-3.4, 1.6, 2.95), 40, 14),
+    "figure": Spot((-1.8, 3.5, 2.0), (-2.72, 1.1, 0.95), 22, 9),
+    "knot": Spot((2.2, 3.5, 4.6), (1.28, 1.3, 3.0), 20, 9),
+    "vase": Spot((2.2, 3.5, 3.4), (2.72, 1.2, 2.25), 20, 9),
+}
+PENDANT: Vector = (-0.75, 2.5, 3.35)
+ANNEX_LAMP: Vector = (1.42, 1.55, -3.6)
+SUN: Vector = (-0.80, -0.56, -0.20)
+WINDOWS = (((3.4, 0.35, 1.8), (3.85, 3.05, 2.9)), ((3.4, 0.35, 4.2), (3.85, 3.05, 5.3)))
+PLINTHS = (
+    ((1.05, 0.0, 2.77), (1.51, 1.02, 3.23)),
+    ((2.52, 0.0, 2.05), (2.92, 0.95, 2.45)),
+    ((1.0, 1.02, 2.85), (1.56, 1.58, 3.15)),
+    ((2.57, 0.95, 2.10), (2.87, 1.5, 2.40)),
+)
+SHADE = Stroke([(0.326, 0.3005), (0.371, 0.3005)], size=0.0075, hardness=0.2)
+PANE = Area([(0.29, -0.1), (0.65, -0.1), (0.645, 0.068), (0.390, 0.106)], feather=0.006)
+
+WARM, AMBER, BRONZE = (1.0, 0.70, 0.40), (1.0, 0.55, 0.22), (0.66, 0.43, 0.29)
+
+
+def scaled(color: Color, amount: float) -> Color:
+    """A colour, brighter or darker."""
+    return (amount * color[0], amount * color[1], amount * color[2])
+
+
+@dataclass
+class Sheet:
+    """A canvas over one room, and what is done to it in every mood."""
+
+    canvas: Canvas
+    room: Room
+    template: Floats
+    albedo: Floats
+
+    @classmethod
+    def over(cls, template: Path) -> Sheet:
+        """A fresh one."""
+        canvas, room = Canvas.read_template(template), Room(Surfaces.read(template))
+        # To a painter bronze has a colour; in the scene it has an index of refraction.
+        bronze = room.within((0.8, 1.025, 2.5), (1.75, 1.8, 3.5)).amount[..., None]
+        albedo = room.surfaces.albedo * (1 + bronze * (np.array(BRONZE, np.float32) - 1))
+        return cls(canvas, room, canvas.image.copy(), albedo)
+
+    def begin(self, tint: Color, stops: float, air: Color, *, share: float) -> None:
+        """Underpainting: the present light goes down, and an even air takes its place."""
+        self.canvas.glaze(Everywhere(), tint, stops=stops, say=0.3)
+        self.canvas.wash(Everywhere(), self.albedo * air, opacity=share, say=0.0)
+
+    def light(self, mark: Painted, color: Color, *, say: float = 1.0) -> None:
+        """Light of a colour on what the mark covers."""
+        self.canvas.light(mark, color, self.albedo, say=say)
+
+    def spots(self, **colors: Color) -> None:
+        """The track spots that are on, by the work that they light."""
+        for name, color in colors.items():
+            spot = SPOTS[name]
+            self.light(
+                self.room.beam(spot.at, spot.towards, cutoff=spot.cutoff, full=spot.full), color
+            )
+            # What the work throws back into the room.
+            x, y, z = spot.towards
+            inwards = (x + (0.5 if name == "tide" else 0.0), y, z + 0.5)
+            self.light(self.room.glow(inwards, 1.2), scaled(color, 0.05), say=0.3)
+
+    def pendant(self, color: Color) -> None:
+        """The pool below the pendant, and the rim of its shade."""
+        x, _, z = PENDANT
+        pool = self.room.beam(PENDANT, (x, 0.45, z), cutoff=66, full=22)
+        self.light(pool & self.room.within((-9, -1, -9), (9, 2.4, 9)), color)
+        self.canvas.paint(SHADE, scaled(color, 1.6), opacity=0.9)
+        self.light(self.room.glow((x, 0.4, z), 1.0), scaled(color, 0.10), say=0.3)
+
+    def cove(self, color: Color) -> None:
+        """The strip on its ledge along the left wall, over the ceiling."""
+        high = self.room.within((-3.5, 3.14, -0.1), (9, 3.9, 10), soft=0.01)
+        for z in (0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5):
+            self.light(self.room.glow((-3.22, 3.2, z), 0.42, wrap=0.25) & high, color)
+        self.light(self.room.facing((0.3, 1.0, 0.0)), scaled(color, 0.12), say=0.2)
+
+    def skylight(self, sky: Color, falls: Color) -> None:
+        """What stands in the pane, and what falls from it into the room."""
+        self.canvas.wash(PANE, self.template * scaled(sky, 0.45))
+        shaft = self.room.within((-1.2, 3.79, 1.7), (1.5, 4.52, 5.65), soft=0.02)
+        self.light(shaft, scaled(sky, 0.55))
+        if max(falls) > 0:
+            down = self.room.glow((0.15, 4.3, 3.7), 2.6, wrap=0.12)
+            self.light(down & ~shaft, falls, say=0.6)
+
+    def annex(self, color: Color, *, lamp: bool) -> None:
+        """The room behind the doorway, from its floor lamp or its window."""
+        inside = self.room.within((-0.7, -0.1, -4.7), (4.3, 3.4, -0.01))
+        at = ANNEX_LAMP if lamp else (3.9, 1.8, -2.2)
+        self.light(self.room.glow(at, 1.1 if lamp else 1.7, wrap=0.35) & inside, color)
+
+    def doorstep(self, color: Color) -> None:
+        """What the annex sends through its doorway, over the boards of this room."""
+        boards = self.room.within((0.9, -0.05, -0.3), (3.3, 0.03, 3.0), soft=0.06)
+        self.light(self.room.glow((1.95, 0.6, 0.0), 0.75, wrap=0.0) & boards, color, say=0.8)
+
+    def sun(self, color: Color, *, back: float) -> None:
+        """Through both windows: on boards, plinths and reveals; and what that throws back."""
+        for low, high in WINDOWS:
+            beam = self.room.sunlight(SUN, (low, high), panes=(3, 2), blocks=PLINTHS)
+            self.light(beam, color)
+            there = (1.6, 0.0, (low[2] + high[2]) / 2 - 0.35)
+            self.light(self.room.glow(there, 1.4, wrap=0.2), scaled(color, back), say=0.5)
+
+    def windows(self, color: Color) -> None:
+        """The reveals of the windows, as the sky lights them, and the wall across the room."""
+        for low, high in WINDOWS:
+            reveal = self.room.within(
+                (low[0] - 0.02, low[1] - 0.05, low[2] - 0.05),
+                (high[0] + 0.1, high[1] + 0.05, high[2] + 0.05),
+            )
+            self.light(reveal, color)
+            at = (low[0] - 0.1, 1.7, (low[2] + high[2]) / 2)
+            self.light(self.room.glow(at, 1.5, wrap=0.1) & ~reveal, scaled(color, 0.3), say=0.5)
+
+
+def evening(sheet: Sheet) -> None:
     """The room is dark, the works glow, and the last blue of the day stands in the doorway."""
-    # An underpainting for the eye only: everything sinks into dusk.
-    canvas.glaze(Everywhere(), (0.78, 0.86, 1.0), stops=-2.2, say=0.0)
-
-    # Darkness that is meant: the skylight, the ceiling, the cove, the windows, the floor in front.
-    canvas.glaze(SKYLIGHT, (0.50, 0.66, 1.0), stops=-2.0, say=0.8)
-    canvas.glaze(COVE, stops=-1.2, say=0.6)
-    canvas.glaze(Stroke([(0.62, 0.16), (0.85, 0.20)], size=0.16), stops=-0.5, say=0.5)
-    canvas.glaze(WINDOW_FAR, DUSK, stops=-0.6, say=0.8)
-    canvas.glaze(WINDOW_NEAR, DUSK, stops=-0.6, say=0.8)
-    canvas.glaze(Stroke([(0.50, 0.95), (0.95, 0.99)], size=0.13), stops=-0.6, say=0.6)
-    canvas.glaze(Stroke([(0.02, 0.93), (0.22, 0.98)], size=0.12), stops=-0.4, say=0.5)
-
-    # The big canvas: a scallop of warm light on the wall above it, strongest at the top.
-    canvas.glaze(Stroke([(0.385, 0.29), (0.455, 0.25), (0.525, 0.29)], size=0.13), WARM, stops=2.2)
-    canvas.glaze(FIELD, WARM, stops=2.9)
-    canvas.glaze(Stroke([(0.38, 0.39), (0.53, 0.39)], size=0.10), WARM, stops=0.5)
-    canvas.glaze(Stroke([(0.37, 0.66), (0.54, 0.675)], size=0.05), WARM, stops=1.3, opacity=0.8)
-
-    # The pair on the left, calmer, and the wall round it.
-    canvas.glaze(Stroke([(0.0, 0.24), (0.10, 0.28), (0.19, 0.33)], size=0.10), WARM, stops=1.9)
-    canvas.glaze(TIDE_LEFT, (1.0, 0.80, 0.56), stops=2.4)
-    canvas.glaze(TIDE_RIGHT, (1.0, 0.80, 0.56), stops=2.4)
-
-    # The stone figure, lit from the upper right.
-    canvas.glaze(FIGURE, WARM, stops=2.1)
-    canvas.glaze(Stroke([(0.300, 0.50), (0.305, 0.60)], size=0.03), WARM, stops=0.7)
-    canvas.glaze(FIGURE_PLINTH, WARM, stops=1.5)
-
-    # The bronze is the brightest thing in the room; its light runs down the plinth onto the floor.
-    canvas.glaze(BRONZE, AMBER, stops=3.4)
-    canvas.glaze(BRONZE_PLINTH, WARM, stops=2.0)
-    canvas.glaze(Stroke([(0.585, 0.66), (0.632, 0.66)], size=0.06), WARM, stops=0.5)
-    canvas.glaze(Stroke([(0.52, 0.88), (0.60, 0.93), (0.68, 0.90)], size=0.10), AMBER, stops=2.2)
-
-    # The vase keeps its own green: a whiter light.
-    canvas.glaze(VASE, (1.0, 0.88, 0.70), stops=2.6)
-    canvas.glaze(VASE_PLINTH, WARM, stops=1.5)
-    canvas.glaze(Stroke([(0.77, 0.87), (0.84, 0.875)], size=0.06), WARM, stops=1.3, opacity=0.9)
-
-    # The pendant draws an amber pool over the bench.
-    canvas.glaze(BENCH, AMBER, stops=2.6)
-    canvas.glaze(Stroke([(0.22, 0.85), (0.33, 0.88), (0.45, 0.85)], size=0.16), AMBER, stops=2.0)
-
-    # The cool note: dusk in the annex, and a little of it on the boards this side of the door.
-    canvas.glaze(DOORWAY, DUSK, stops=2.5)
-    canvas.glaze(Stroke([(0.705, 0.72), (0.715, 0.80)], size=0.07), DUSK, stops=1.3, opacity=0.8)
+    sheet.begin((0.60, 0.75, 1.0), -4.2, (0.016, 0.020, 0.032), share=0.6)
+    sheet.skylight((0.016, 0.034, 0.085), (0.006, 0.012, 0.030))
+    sheet.windows((0.020, 0.040, 0.095))
+    sheet.spots(
+        field=scaled(WARM, 0.75),
+        tide=scaled((1.0, 0.80, 0.56), 0.42),
+        figure=scaled(WARM, 0.95),
+        knot=scaled((1.0, 0.66, 0.34), 1.15),
+        vase=scaled((1.0, 0.86, 0.66), 0.75),
+    )
+    sheet.pendant(scaled(AMBER, 0.60))
+    sheet.annex((0.07, 0.15, 0.42), lamp=False)
+    sheet.doorstep((0.03, 0.06, 0.16))
 
 
-def paint_morning(canvas: Canvas) -> None:
+def morning(sheet: Sheet) -> None:
     """Low sun through the window wall, a clear sky, the lamps off."""
-    # Cool air everywhere, for the eye only; brighter towards the windows.
-    canvas.glaze(Everywhere(), (0.74, 0.88, 1.08), stops=-0.35, say=0.0)
-    canvas.glaze(Gradient((1.0, 0.4), (0.2, 0.6)), (1.0, 0.98, 0.95), stops=0.3, say=0.0)
+    sheet.begin((0.80, 0.92, 1.10), -0.9, (0.215, 0.25, 0.30), share=0.78)
+    sheet.skylight((0.80, 0.95, 1.15), (0.08, 0.10, 0.13))
+    sheet.windows((0.24, 0.27, 0.31))
+    sheet.canvas.glaze(SHADE, stops=-1.5)
+    sheet.sun((2.7, 2.0, 1.15), back=0.05)
+    sheet.annex((0.10, 0.125, 0.16), lamp=False)
 
-    # The sky: in the skylight, and softly over the left wall, the back wall and the pictures.
-    canvas.glaze(SKYLIGHT, (0.86, 0.96, 1.05), stops=0.1, say=0.7)
-    canvas.glaze(
-        Stroke([(0.0, 0.75), (0.20, 0.68)], size=0.12), (0.90, 1.0, 1.06), stops=0.3, say=0.7
-    )
-    canvas.glaze(TIDE_LEFT, (0.92, 1.0, 1.08), stops=0.2, say=0.8)
-    canvas.glaze(TIDE_RIGHT, (0.92, 1.0, 1.08), stops=0.2, say=0.8)
-    canvas.glaze(FIELD, (1.0, 1.0, 1.0), stops=0.1, say=0.8)
-    canvas.glaze(
-        Stroke([(0.66, 0.20), (0.83, 0.26)], size=0.12), (0.92, 1.0, 1.06), stops=0.2, say=0.6
-    )
 
-    # Lamps off: the cove, the scallop over the big canvas, the inside of the pendant.
-    canvas.glaze(COVE, (0.95, 1.0, 1.05), stops=-1.7)
-    canvas.glaze(Stroke([(0.39, 0.29), (0.455, 0.255), (0.525, 0.29)], size=0.09), stops=-0.45)
-    canvas.glaze(Stroke([(0.325, 0.303), (0.372, 0.303)], size=0.024), stops=-1.6)
-
-    # The sun: on the boards in two long patches, on the reveals, on the plinth and the vase.
-    gold = (1.0, 0.76, 0.45)
-    canvas.glaze(SUN_FAR_LEFT, gold, stops=2.3)
-    canvas.glaze(SUN_FAR_RIGHT, gold, stops=2.3)
-    canvas.glaze(SUN_NEAR, gold, stops=2.3)
-    canvas.glaze(WINDOW_FAR, gold, stops=1.2)
-    canvas.glaze(WINDOW_NEAR, gold, stops=1.2)
-    canvas.glaze(
-        Area([(0.776, 0.64), (0.829, 0.64), (0.829, 0.69), (0.776, 0.74)], feather=0.01),
-        gold,
-        stops=2.0,
+def opening(sheet: Sheet) -> None:
+    """Opening night: a rose ceiling, white light on the works, a warm room beyond."""
+    sheet.begin((1.0, 0.86, 0.78), -2.6, (0.10, 0.072, 0.068), share=0.6)
+    sheet.skylight((0.010, 0.012, 0.030), (0.0, 0.0, 0.0))
+    sheet.cove((1.15, 0.22, 0.40))
+    white = (1.0, 0.88, 0.72)
+    sheet.spots(
+        field=scaled(white, 0.95),
+        tide=scaled(white, 0.70),
+        figure=scaled(white, 1.2),
+        knot=scaled(white, 1.3),
+        vase=scaled(white, 1.05),
     )
-    canvas.glaze(
-        Area([(0.776, 0.775), (0.829, 0.72), (0.829, 0.84), (0.776, 0.84)], feather=0.01),
-        gold,
-        stops=2.0,
-    )
-    canvas.glaze(Stroke([(0.807, 0.53), (0.812, 0.59)], size=0.024, hardness=0.2), gold, stops=2.0)
+    sheet.pendant(scaled((1.0, 0.74, 0.46), 0.85))
+    sheet.annex((1.25, 0.60, 0.30), lamp=True)
+    sheet.doorstep((0.55, 0.27, 0.13))
 
-    # What the sunny floor throws back: warm on the bronze, its plinth and the foot of the wall.
-    canvas.glaze(BRONZE, gold, stops=0.8)
-    canvas.glaze(BRONZE_PLINTH, (1.0, 0.88, 0.72), stops=0.4)
-    canvas.glaze(
-        Stroke([(0.38, 0.68), (0.54, 0.69)], size=0.06), (1.0, 0.88, 0.72), stops=0.4, say=0.7
+
+def after_hours(sheet: Sheet) -> None:
+    """Everybody has gone. A lamp burns in the annex; a little moon comes through the roof."""
+    sheet.begin((0.50, 0.68, 1.0), -4.9, (0.013, 0.019, 0.034), share=0.6)
+    sheet.skylight((0.055, 0.085, 0.15), (0.040, 0.062, 0.11))
+    sheet.windows((0.030, 0.048, 0.085))
+    sheet.annex((2.3, 1.0, 0.36), lamp=True)
+    sheet.doorstep((1.3, 0.56, 0.20))
+    sheet.light(
+        sheet.room.beam((1.42, 1.5, -3.6), (2.2, 0.0, 1.6), cutoff=19, full=5)
+        & sheet.room.within((0.5, -0.1, 0.0), (3.4, 2.0, 5.0)),
+        (1.0, 0.43, 0.15),
     )
 
-    # The annex still sleeps: a cool, quiet doorway.
-    canvas.glaze(DOORWAY, (0.80, 0.94, 1.10), stops=0.1, say=0.8)
+
+def overcast(sheet: Sheet) -> None:
+    """A white sky: soft light from the roof and the front, cool and even, and no lamp on."""
+    sheet.begin((0.86, 0.93, 1.0), -0.7, (0.25, 0.27, 0.29), share=0.78)
+    sheet.skylight((0.95, 1.0, 1.06), (0.21, 0.23, 0.245))
+    sheet.light(sheet.room.facing((0.1, 0.55, 0.8)), (0.055, 0.06, 0.064), say=0.4)
+    sheet.windows((0.22, 0.235, 0.25))
+    sheet.canvas.glaze(SHADE, stops=-1.5)
+    sheet.annex((0.16, 0.175, 0.185), lamp=False)
+
+
+def last_sun(sheet: Sheet) -> None:
+    """The sun goes down: red gold on the boards, violet in the shade, rose overhead."""
+    sheet.begin((0.72, 0.60, 0.92), -2.7, (0.058, 0.042, 0.066), share=0.8)
+    sheet.skylight((0.34, 0.17, 0.26), (0.035, 0.020, 0.036))
+    sheet.windows((0.16, 0.060, 0.040))
+    sheet.sun((3.4, 1.15, 0.24), back=0.06)
+    sheet.light(sheet.room.glow((-3.0, 1.4, 3.4), 2.2), (0.11, 0.040, 0.014), say=0.4)
+    sheet.annex((0.34, 0.15, 0.11), lamp=False)
+    sheet.doorstep((0.06, 0.025, 0.016))
 
 
 def main() -> None:
-    """Paint both targets over the template named on the command line."""
+    """Paint all six over the template named on the command line."""
     template = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "template.exr"
-
-    evening = Canvas.read_template(template)
-    paint_evening(evening)
-    evening.write_with_alpha(HERE / "evening.exr")
-
-    morning = Canvas.read_template(template)
-    paint_morning(morning)
-    morning.write(HERE / "morning.exr")
-    morning.write_mask(HERE / "morning.mask.exr")
+    for mood in (evening, morning, opening, after_hours, overcast, last_sun):
+        sheet = Sheet.over(template)
+        mood(sheet)
+        name = mood.__name__.replace("_", "-")
+        if mood is evening:
+            sheet.canvas.write_with_alpha(HERE / f"{name}.exr")
+        elif mood is morning:
+            sheet.canvas.write(HERE / f"{name}.exr")
+            sheet.canvas.write_mask(HERE / f"{name}.mask.exr")
+        else:
+            sheet.canvas.write_png(HERE / f"{name}.png")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Paint the targets of the stage over renders of it as it is now.
 
-    lightpaint template scenes/stage/scene.xml -o targets/stage/template.exr
-    lightpaint template scenes/stage/scene.xml -s box -o targets/stage/box-template.exr
+    python targets/clean.py scenes/stage/scene.xml -o targets/stage/template.exr
+    python targets/clean.py scenes/stage/scene.xml -s box -o targets/stage/box-template.exr
     python targets/stage/paint.py
 
 Writes, beside this file:
@@ -10,7 +10,7 @@ Writes, beside this file:
     sunset.exr, sunset.mask.exr   the sun goes down behind the house; the mask says where
     moonlight-box.exr             that night as it is to be seen from the box at the side
 
-The templates are linear RGB EXRs of 640 x 360, beside this file. The
+The templates are clean pictures of 640 x 360, beside this file. The
 strokes are placed by eye; no pixel comes from a render of one light alone.
 """
 
@@ -27,6 +27,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))  # brush.py lives one folder up
 
 from brush import Area, Canvas, Everywhere, Gradient, Mark, Stroke  # noqa: E402
+from clean import Surfaces  # noqa: E402
+from room import Room  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,11 @@ CYC = Area(
 )
 SKY = Within(CYC, Outside(WOMAN))
 DOORWAY = Area(
-    [(0.693, 0.67), (0.693, 0.44), (0.707, 0.405), (0.727, 0.41), (0.741, 0.45), (0.743, 0.675)],
-    feather=0.008,
+    [
+        *((0.693, 0.68), (0.693, 0.411), (0.705, 0.412), (0.716, 0.420), (0.726, 0.438)),
+        *((0.734, 0.463), (0.738, 0.49), (0.738, 0.68)),
+    ],
+    feather=0.004,
 )
 HOUSE = Area(
     [(0.593, 0.68), (0.593, 0.335), (0.70, 0.222), (0.815, 0.34), (0.815, 0.69), (0.755, 0.69)],
@@ -86,14 +91,17 @@ CURTAIN_RIGHT = Area([(1, 0), (0.77, 0.06), (0.94, 0.58), (0.92, 0.86), (1, 0.86
 VALANCE = Area([(0, 0), (1, 0), (1, 0.09), (0, 0.09)], feather=0.03)
 GOWN = Area([(0.513, 0.57), (0.555, 0.57), (0.585, 0.84), (0.485, 0.85)], feather=0.012)
 CLOTH = Area([(0.345, 0.715), (0.43, 0.715), (0.445, 0.83), (0.333, 0.84)], feather=0.012)
+STEPS = Area([(0.66, 0.695), (0.74, 0.68), (0.745, 0.725), (0.655, 0.725)], 0.015)
+DOORSTEP = Area([(0.645, 0.82), (0.755, 0.82), (0.76, 0.89), (0.60, 0.89)], 0.012)
 MOON, FLAME = (0.378, 0.279), (0.3906, 0.6885)
+LANTERN = (-1.11, 0.93, -0.73)
 
 
 def paint_moonlight(template: Path) -> Canvas:
     """Night: the moon over the tree, a lantern on the table, a house that is still awake."""
-    canvas = Canvas.read_template(template)
+    canvas, room = Canvas.read_template(template), Room(Surfaces.read(template))
+    albedo, below = room.surfaces.albedo, Outside(CYC)
     night, moon = (0.30, 0.50, 1.0), (0.60, 0.82, 1.0)
-    candle, ember = (1.0, 0.38, 0.09), (1.0, 0.32, 0.06)
 
     # Night falls over everything. A wash is only a hint: it gets little say.
     canvas.glaze(Everywhere(), night, stops=-1.6)
@@ -111,36 +119,25 @@ def paint_moonlight(template: Path) -> Canvas:
     canvas.paint(Stroke([MOON], size=0.070, hardness=0.75), (0.62, 0.76, 0.86), opacity=0.92)
 
     # Moonlight comes from behind, on the left: along the boards, the tree, her shoulder.
-    canvas.glaze(
-        Within(Stroke([(0.16, 0.80), (0.40, 0.88), (0.62, 0.88)], size=0.16), BOARDS),
-        moon,
-        stops=1.5,
-    )
+    behind = room.beam((-3.6, 5.6, -4.0), (0.0, 0.4, -0.2), cutoff=30, full=8)
+    canvas.light(behind & below, (0.10, 0.17, 0.30), albedo)
     canvas.glaze(Stroke([(0.228, 0.77), (0.232, 0.55), (0.225, 0.40)], size=0.03), moon, stops=1.2)
-    canvas.glaze(Stroke([(0.505, 0.60), (0.530, 0.55)], size=0.03), moon, stops=0.6)
     canvas.glaze(Stroke([(0.60, 0.36), (0.70, 0.235), (0.80, 0.33)], size=0.035), moon, stops=0.9)
 
-    # The lantern: a pool on the cloth, its warmth on her gown, her hand and the chair.
-    below = Outside(CYC)
-    canvas.glaze(Within(Stroke([(0.391, 0.685)], size=0.30), below), candle, stops=1.7)
-    canvas.glaze(Within(Stroke([(0.39, 0.72)], size=0.16), CLOTH), candle, stops=2.4)
-    canvas.glaze(
-        Within(Stroke([(0.505, 0.60), (0.500, 0.84)], size=0.075), GOWN), candle, stops=2.5
-    )
-    canvas.glaze(Stroke([(0.465, 0.60), (0.505, 0.605)], size=0.034), candle, stops=2.4)
-    canvas.glaze(Stroke([(0.529, 0.530)], size=0.030), candle, stops=2.2)
-    canvas.glaze(Stroke([(0.275, 0.68), (0.30, 0.78)], size=0.06), candle, stops=1.6)
-    canvas.glaze(Within(Stroke([(0.33, 0.88), (0.46, 0.87)], size=0.12), BOARDS), candle, stops=1.1)
+    # The lantern: a pool on the cloth and the boards, its warmth on her, the chair and the tree.
+    canvas.light(room.glow(LANTERN, 0.32, wrap=0.10) & below, (1.3, 0.43, 0.09), albedo)
+    around = room.within((-3.0, -0.5, -2.2), (1.2, 2.4, 1.0), soft=1.6)
+    canvas.light(room.glow(LANTERN, 1.0, wrap=0.02) & around & below, (1.9, 0.58, 0.11), albedo)
+    canvas.glaze(Within(Stroke([(0.39, 0.72)], size=0.16), CLOTH), (1.0, 0.38, 0.09), stops=2.2)
 
     # Its flame is as bright as it has to be for that.
     canvas.paint(Stroke([FLAME], size=0.011, hardness=0.7), (24.0, 11.0, 2.8))
 
     # Somebody is at home: a low light through the arch, down the steps, over the boards.
-    canvas.glaze(DOORWAY, ember, stops=2.2)
-    canvas.glaze(Area([(0.66, 0.695), (0.74, 0.68), (0.745, 0.725), (0.655, 0.725)], 0.02), ember,
-                 stops=3.0)  # fmt: skip
-    canvas.glaze(Area([(0.645, 0.82), (0.755, 0.82), (0.76, 0.89), (0.60, 0.89)], 0.02), ember,
-                 stops=2.2)  # fmt: skip
+    canvas.paint(DOORWAY, (0.085, 0.036, 0.014), opacity=0.8)
+    home = room.beam((3.55, 3.4, -6.1), (2.2, 0.5, -2.4), cutoff=28, full=18)
+    canvas.light(home & STEPS, (3.6, 1.15, 0.20), albedo)
+    canvas.light(home & DOORSTEP, (3.6, 1.15, 0.20), albedo)
 
     # The cloth that frames it all almost disappears.
     for frame in (CURTAIN_LEFT, CURTAIN_RIGHT, VALANCE):
@@ -206,7 +203,8 @@ def paint_sunset(template: Path) -> Canvas:
     canvas.weight[:] = 0.2
 
     # The sky, from violet at the top through rose to gold on the hills, and brighter to the right.
-    canvas.glaze(Stroke([MOON], size=0.084, hardness=0.5), stops=-1.3)
+    sky = canvas.image[90:112, 282:300].mean(axis=(0, 1))
+    canvas.paint(Stroke([MOON], size=0.13, hardness=0.55), (sky[0], sky[1], sky[2]))
     canvas.glaze(Within(Gradient((0.4, 0.10), (0.4, 0.48)), SKY), violet, stops=0.2)
     canvas.glaze(Within(Stroke([(0.10, 0.40), (0.90, 0.40)], size=0.20), SKY), rose, stops=0.7)
     canvas.glaze(Within(Stroke([(0.10, 0.60), (0.62, 0.60)], size=0.24), SKY), orange, stops=1.4)

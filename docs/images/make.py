@@ -1,0 +1,136 @@
+"""Makes the pictures of the scenes that the README and the documentation show.
+
+    pip install pyoidn
+    python docs/images/make.py [--spp 64] [--bases FOLDER] [gallery] [stage] [six-looks]
+
+writes beside itself
+
+    gallery.jpg     the gallery with the lighting found for its evening
+    stage.jpg       the stage with the lighting found for its sunset
+    six-looks.jpg   the gallery with the lightings found for six paintings, which are in the corners
+
+Each scene's basis is rendered once at 1280 x 720, and kept in FOLDER for the next time if there is
+one. Each look is the sum of that basis for the lighting found; its noise is taken away by Open
+Image Denoise. Two cores take about five minutes for 64 samples.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.insert(0, str(ROOT / "targets"))
+
+from clean import Floats, Surfaces, denoise, see  # noqa: E402
+
+import lightpaint as lp  # noqa: E402
+
+SIZE = (1280, 720)
+CELL, INSET, GAP = (640, 360), (176, 99), 8
+LOOKS = ("morning.exr", "overcast.png", "last-sun.png", "evening.exr", "opening.png",
+         "after-hours.png")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Set:
+    """A scene ready to be lit: what its lights do, and what its pixels see."""
+
+    name: str
+    basis: lp.Basis
+    surfaces: Surfaces
+
+    @classmethod
+    def built(cls, name: str, spp: int, bases: Path | None) -> Set:
+        """Render it, or take what an earlier run kept."""
+        path = ROOT / "scenes" / name / "scene.xml"
+        kept = bases and bases / f"{name}.basis.exr"
+        if kept and kept.exists():
+            return cls(name, lp.read_basis(kept), see(path, size=SIZE))
+        scene = lp.load_scene(path, parameters={"width": SIZE[0], "height": SIZE[1]})
+        print(f"{name}: {len(scene.lights)} lights, {spp} samples per pixel", flush=True)
+        basis = lp.render_basis(scene, spp=spp)
+        if kept:
+            lp.write_basis(kept, basis)
+        return cls(name, basis, see(path, size=SIZE))
+
+    def painting(self, name: str) -> Path:
+        """A shipped painting of it."""
+        return ROOT / "targets" / self.name / name
+
+    def lit_as(self, painting: str) -> Image.Image:
+        """How it looks with the lighting that comes closest to a painting."""
+        path = self.painting(painting)
+        mask = path.with_suffix(".mask.exr")
+        with tempfile.TemporaryDirectory() as folder:
+            look = lp.paint_with_light(
+                None,
+                path,
+                Path(folder) / "look",
+                basis=self.basis,
+                mask=mask if mask.exists() else None,
+                resize=True,
+            )
+        print(f"{self.name}: {painting}", flush=True)
+        return shown(denoise(look.predicted.image, self.surfaces))
+
+
+def shown(image: Floats) -> Image.Image:
+    """Linear light as sRGB, as it is: no exposure, no curve."""
+    linear = np.clip(image, 0, 1)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return Image.fromarray(np.rint(255 * curve).astype(np.uint8))
+
+
+def read_painting(path: Path) -> Image.Image:
+    """A painting as a person sees it."""
+    if path.suffix == ".png":
+        return Image.open(path).convert("RGB")
+    return shown(lp.read_target(path, find=False).image)
+
+
+def six_looks(room: Set) -> Image.Image:
+    """Two rows of three looks, each with its painting in a corner."""
+    width, height = CELL
+    sheet = Image.new("RGB", (3 * width + 2 * GAP, 2 * height + GAP), "white")
+    draw = ImageDraw.Draw(sheet)
+    for k, name in enumerate(LOOKS):
+        x, y = k % 3 * (width + GAP), k // 3 * (height + GAP)
+        sheet.paste(room.lit_as(name).resize(CELL, Image.Resampling.LANCZOS), (x, y))
+        small = read_painting(room.painting(name)).resize(INSET, Image.Resampling.LANCZOS)
+        left, top = x + 10, y + height - INSET[1] - 10
+        draw.rectangle((left - 2, top - 2, left + INSET[0] + 1, top + INSET[1] + 1), fill="white")
+        sheet.paste(small, (left, top))
+    return sheet
+
+
+def main() -> None:
+    """Make those that the command line names, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("pictures", nargs="*", help="gallery, stage, six-looks; all by default")
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--bases", type=Path, metavar="FOLDER")
+    asked = parser.parse_args()
+    wanted = set(asked.pictures) or {"gallery", "stage", "six-looks"}
+    made: dict[str, Image.Image] = {}
+    if wanted & {"gallery", "six-looks"}:
+        gallery = Set.built("gallery", asked.spp, asked.bases)
+        if "gallery" in wanted:
+            made["gallery"] = gallery.lit_as("evening.exr")
+        if "six-looks" in wanted:
+            made["six-looks"] = six_looks(gallery)
+    if "stage" in wanted:
+        made["stage"] = Set.built("stage", asked.spp, asked.bases).lit_as("sunset.exr")
+    for name, picture in made.items():
+        picture.save(HERE / f"{name}.jpg", quality=88, optimize=True, progressive=True)
+
+
+if __name__ == "__main__":
+    main()
