@@ -10,14 +10,6 @@ from types import FrameType
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-class Ended(KeyboardInterrupt):
-    """Raised by what ends a process.
-
-    Of KeyboardInterrupt itself Python remembers that it came through some `exec`, as of a
-    dataclass that is just being made, and ends by SIGINT however it was handled.
-    """
-
-
 @contextmanager
 def hearing(came: list[int]) -> Iterator[None]:
     """Raise KeyboardInterrupt for Ctrl-C and the like, and add the signal's number to `came`.
@@ -32,7 +24,7 @@ def hearing(came: list[int]) -> Iterator[None]:
 
     def end(number: int, _frame: FrameType | None) -> None:
         came.append(number)
-        raise Ended
+        raise KeyboardInterrupt
 
     before = {
         number: signal.signal(number, end)

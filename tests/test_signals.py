@@ -1,8 +1,6 @@
 """Ctrl-C between two pieces of work, and whose handler stands meanwhile."""
 
 import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -99,18 +97,3 @@ def test_what_ends_a_process_otherwise_waits_too():
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_exit_code_is_kept_wherever_the_signal_came(number: signal.Signals):
-    code = f"""
-import signal, sys
-from lightpaint.signals import hearing
-came = []
-with hearing(came):
-    try:
-        exec("signal.raise_signal({int(number)})")
-    except KeyboardInterrupt:
-        sys.exit(128 + came[0])
-"""
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + number

@@ -91,7 +91,7 @@ def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
     same_basis(exact, fresh)
     # The one with more samples is not thrown away.
     assert [entry.path.read_bytes() for entry in cache.entries()] == before
-    cache.clear()
+    cache.drop(cache.entries())
     obtain_basis(scene, spp=8)
     same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
     [entry] = cache.entries()
@@ -127,7 +127,7 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
         log: list[int] = []
         same_basis(obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log)), fresh)
         assert 0 < sum(now > 0 for now in log) < max(whole)
-        cache.clear()
+        cache.drop(cache.entries())
     # One that fewer samples ended has other passes.
     assert not is_on_the_way(scene, obtain_basis(scene, spp=6, use_cache=False), 64)
 

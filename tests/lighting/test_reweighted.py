@@ -389,7 +389,8 @@ def test_what_each_of_several_views_misses_is_split_on_one_scale(
         # Pixels in float32, sums of 72 of them.
         close = partial(pytest.approx, abs=1e-5 * energy)
         assert found.total == close(energy)
-        assert found.unreachable == close(free)
+        # Random pixels are what a painting has of noise.
+        assert found.unreachable + found.painting_noise == close(free)
         assert found.forbidden == close(alone - free)
         assert found.compromise == close(energy - alone)
         assert found.missed == pytest.approx(
