@@ -24,13 +24,13 @@ from lightpaint.relit.relight import scene_of
 from lightpaint.remarks import remarks_of_memory, remarks_of_scene
 from lightpaint.renders import relight_look, render_look, render_template
 from lightpaint.results import result_folders, verify_result
-from lightpaint.scene.quality import on_film
+from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
-from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
+from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, earlier_files
 
 
 def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int:
@@ -76,20 +76,26 @@ def template(
 ) -> int:
     """`lightpaint template SCENE -o DIR`"""
     _check_template(output, force=force)
-    loaded = _loaded(scene)
-    if settings.resolution:
-        loaded = loaded.reduced(settings.resolution)
-    how: dict[str, Any] = {"transform": transform, "spp": settings.spp, "seed": settings.seed}
+    loaded = on_film(scene.content, settings.quality, settings.resolution)
+    how: dict[str, Any] = {
+        "transform": transform,
+        "spp": samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
+        "time_s": settings.time_s,
+        "seed": settings.seed,
+        "use_cache": settings.use_cache,
+    }
     linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:
+        for remark in (*remarks_of_scene(loaded), *remarks_of_memory(loaded)):
+            listen.say(remark)
         if is_folder(output):
             render_template(loaded, output, progress=listen, **how)
         else:
             linear, picture = output, render_look(loaded, output, progress=listen, **how)
-    terminal.write(f"{linear}: paint over it in linear light, in a program that knows EXR")
-    terminal.write(
-        f"{picture}: the same in 16 bits, for any program: paint over it and save as PNG"
-    )
+    terminal.write(f"{picture}: paint over it, in any program, and save as PNG; it is denoised")
+    if is_folder(output):
+        terminal.write(f"{output / CLEAN}: the same in linear light, for programs that know EXR")
+    terminal.write(f"{linear}: as it was rendered, with its grain")
     if is_folder(output):
         terminal.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
     return 0

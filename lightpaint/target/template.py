@@ -28,7 +28,13 @@ FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
 #: The files of a template: what says how it was made, what is painted on, what helps.
 ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
-NORMALS, DEPTH, MATTES, LIGHTS = "normals.exr", "depth.exr", "mattes", "lights"
+CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
+    "clean.exr",
+    "normals.exr",
+    "depth.exr",
+    "mattes",
+    "lights",
+)
 
 #: Longest template.json that is read, in bytes.
 MAX_ABOUT = 2**20
@@ -38,9 +44,11 @@ MAX_ABOUT = 2**20
 class Template:
     """The look that is painted over.
 
-    image: (h, w, 3) linear Rec.709. transform: how template.png shows it. scene: name of the file,
-    content: its hash (see `Scene.content`), sensor: what it is seen through.
-    albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
+    image: (h, w, 3) linear Rec.709, as it was rendered. transform: how template.png shows it.
+    scene: name of the file, content: its hash (see `Scene.content`), sensor: what it is seen
+    through. albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
+    clean: (h, w, 3), `image` without its grain, which template.png shows; None if that shows
+    `image` itself.
     """
 
     image: Floats
@@ -49,6 +57,7 @@ class Template:
     content: str = ""
     sensor: str = ""
     albedo: Floats | None = None
+    clean: Floats | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -56,9 +65,14 @@ class Template:
         return self.image.shape[0], self.image.shape[1]
 
     @property
+    def looks(self) -> list[Floats]:
+        """What may have been painted on, in linear light: what template.png shows comes first."""
+        return [self.image] if self.clean is None else [self.clean, self.image]
+
+    @property
     def shown(self) -> Floats:
         """The values in [0, 1] that template.png holds, rounded to its 16 bits."""
-        return np.round(self.transform.encode(self.image) * 65535) / 65535
+        return np.round(self.transform.encode(self.looks[0]) * 65535) / 65535
 
 
 @dataclass(frozen=True)
@@ -89,18 +103,30 @@ def write_template(
     depth: Floats,
     mattes: Mapping[str, Floats],
     lights: Mapping[str, Floats],
+    texts: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[Path]:
     """Write a template into `folder`, in place of an earlier one, wholly or not at all.
 
     Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
-    [0, 1]; lights: by name, (h', w', 3) linear, what each does alone.
+    [0, 1]; lights: by name, (h', w', 3) linear, what each does alone. texts: what pictures
+    say of themselves, under SHOWN and LIGHTS.
     """
+    said = texts or {}
     matte_files = [folder / MATTES / f"{name}.png" for name in file_names(mattes)]
     light_files = [folder / LIGHTS / f"{name}.png" for name in file_names(lights)]
     plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    plain += [folder / CLEAN] if template.clean is not None else []
     written = [*plain, *matte_files, *light_files]
     with restoring(folder, [*written, *earlier_files(folder)]):
-        write_look(folder / LIGHT, template.image, template.transform)
+        write_look(
+            folder / LIGHT,
+            template.image,
+            template.transform,
+            clean=template.clean,
+            texts=said.get(SHOWN),
+        )
+        if template.clean is not None:
+            write_rgb(folder / CLEAN, template.clean, attributes=said.get(SHOWN))
         if template.albedo is not None:
             write_rgb(folder / ALBEDO, template.albedo)
         write_rgb(folder / NORMALS, normals)
@@ -108,17 +134,17 @@ def write_template(
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
-            write_bytes(file, _thumbnail(look, template.transform.name))
+            write_bytes(file, _thumbnail(look, template.transform.name, said.get(LIGHTS)))
         # Last: a folder without it is no template.
         write_text(folder / ABOUT, _about(template))
     return written
 
 
-def _thumbnail(look: Floats, transform: str) -> bytes:
+def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) -> bytes:
     """A linear picture as PNG, whatever its brightness."""
     bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
     shown = ViewTransform(transform, float(np.clip(-np.log2(bright), -60, 60)))
-    return png_bytes(to_8_bit(shown.encode(look)))
+    return png_bytes(to_8_bit(shown.encode(look)), texts)
 
 
 def _about(template: Template) -> str:
@@ -133,15 +159,26 @@ def earlier_files(folder: Path) -> list[Path]:
     """Those of a template that stands in `folder`; none if it is somebody else's."""
     if not (folder / ABOUT).is_file():
         return []
-    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    plain = [folder / name for name in (LIGHT, SHOWN, CLEAN, ALBEDO, NORMALS, DEPTH, ABOUT)]
     return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
 
 
-def write_look(path: Path, image: Floats, transform: ViewTransform) -> Path:
-    """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG."""
+def write_look(
+    path: Path,
+    image: Floats,
+    transform: ViewTransform,
+    *,
+    clean: Floats | None = None,
+    texts: Mapping[str, str] | None = None,
+) -> Path:
+    """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG.
+
+    clean: what the PNG shows instead of `image`; texts: what it says of that.
+    """
     write_rgb(path, image)
     picture = path.with_suffix(".png")
-    write_png_16(picture, transform.encode(image), texts=_texts(transform))
+    shown = transform.encode(image if clean is None else clean)
+    write_png_16(picture, shown, texts=_texts(transform) | dict(texts or {}))
     return picture
 
 
@@ -152,15 +189,16 @@ def read_template(folder: Path) -> Template:
         about = read_record(_About, strict_json(text), others=True)
         transform = ViewTransform(about.view.name, about.view.stops)
         image = _read_picture(folder / LIGHT, about.size)
-        albedo = None
-        if (folder / ALBEDO).exists():
-            albedo = _read_picture(folder / ALBEDO, about.size)
+        albedo, clean = (
+            _read_picture(folder / name, about.size) if (folder / name).exists() else None
+            for name in (ALBEDO, CLEAN)
+        )
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
         said = one_line(str(error) or type(error).__name__)
         raise TargetError(
             f"{folder} is no template: {said}; make one with lightpaint template"
         ) from None
-    return Template(image, transform, about.scene, about.content, about.sensor, albedo)
+    return Template(image, transform, about.scene, about.content, about.sensor, albedo, clean)
 
 
 def _read_picture(path: Path, size: tuple[int, int]) -> Floats:

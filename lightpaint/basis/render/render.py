@@ -12,6 +12,7 @@ from lightpaint.progress import Interrupted, Progress, interruptible_between_pie
 from lightpaint.scene.emission import ENVIRONMENTS
 from lightpaint.scene.render import SAMPLES_PER_PASS, view_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.surfaces import render_features
 from lightpaint.scene.variant import use_variant
 
 #: Camera samples that choices of emitters are learned from before any counts.
@@ -89,7 +90,9 @@ def render_basis(
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
-    return render_all(scene, budget, seed, start, Keeper(keep), progress)
+    made = render_all(scene, budget, seed, start, Keeper(keep), progress)
+    known = None if start is None else start.features
+    return replace(made, features=known or render_features(scene, seed=seed))
 
 
 def memory_needed(scene: Scene) -> int:
