@@ -23,7 +23,12 @@ from lightpaint.placement.suggest import check_suggestible
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.relight import check_relightable
-from lightpaint.remarks import remarks_of_memory, remarks_of_scene, remarks_of_target
+from lightpaint.remarks import (
+    remarks_of_memory,
+    remarks_of_pictures,
+    remarks_of_scene,
+    remarks_of_target,
+)
 from lightpaint.results import ALWAYS, RESULTS, VIEW_RESULTS, earlier_results, view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
@@ -268,7 +273,8 @@ class Job:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))
         for target, view in zip(targets, self.views, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit)
-        return remarks + [x for scene in rendered for x in remarks_of_memory(scene)]
+        remarks += [x for scene in rendered for x in remarks_of_memory(scene)]
+        return remarks + remarks_of_pictures()
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:

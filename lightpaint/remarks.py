@@ -1,6 +1,7 @@
 """What is worth saying to a person before a job is run, in plain text."""
 
 from lightpaint.basis.render.render import memory_needed, why_not_one_pass
+from lightpaint.images.denoise import LACKING, is_there
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import some_names
@@ -28,6 +29,11 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
             f"{reason}: every light is rendered separately, {len(scene.lights)} times the work"
         )
     return remarks
+
+
+def remarks_of_pictures() -> list[str]:
+    """Says so where pictures are denoised less well than they could be."""
+    return [] if is_there() else [LACKING]
 
 
 def remarks_of_memory(scene: Scene) -> list[str]:

@@ -10,13 +10,14 @@ from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.files import restoring
 from lightpaint.images.blocks import block_mean
-from lightpaint.images.denoise import LACKING, Features, denoised, how_denoised, is_there
+from lightpaint.images.denoise import Features, denoised, how_denoised
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.png import write_png
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.remarks import remarks_of_pictures
 from lightpaint.scene.quality import Preset
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
@@ -115,8 +116,8 @@ def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | Non
     None where it would cost a render for each light, and nobody has paid for it yet: then a look
     rendered by itself is there n times sooner, and of several paintings only the last is solved.
     """
-    if not is_there():
-        listen.say(LACKING)
+    for remark in remarks_of_pictures():
+        listen.say(remark)
     why = why_not_one_pass(scene)
     if why is None or len(scene.lights) == 1 or settings.time_s is not None:
         return obtain(scene, settings, listen)
@@ -178,8 +179,8 @@ def relight_look(
     progress: Progress = silent,
 ) -> Scene:
     """Write relit.xml to `folder`, and its render as relit.exr and, denoised, as relit.png."""
-    if not is_there():
-        listener(progress).say(LACKING)
+    for remark in remarks_of_pictures():
+        listener(progress).say(remark)
     path = folder / "relit.xml"
     files = [*check_relightable(scene, path), folder / "relit.exr", folder / "relit.png"]
     with restoring(folder, files):

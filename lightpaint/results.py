@@ -23,11 +23,13 @@ from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.emitters import emitters_in_view
+from lightpaint.report.looks import Looks
 from lightpaint.report.notebook import look_html
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.surfaces import render_features
 from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
@@ -148,16 +150,21 @@ def write_predicted(path: Path, predicted: Estimate, *, sensor: str, spp: int) -
 
 
 def write_report(folder: Path, look: Look, *, command: str) -> None:
-    """Write the pictures people look at: comparison.png and report.html."""
+    """Write the pictures people look at: comparison.png and report.html, denoised."""
     verified = look.verification.verified.image if look.verification else None
+    larger = None
+    if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
+        larger = render_features(look.relit)
+    looks = Looks.clean(look.basis, look.predicted.image, verified, larger=larger)
     sheet = comparison_image(
         basis=look.basis,
         target=look.target,
         solution=look.solution,
         predicted=look.predicted.image,
         verified=verified,
+        looks=looks,
     )
-    write_bytes(folder / "comparison.png", png_bytes(sheet))
+    write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
     page = report_page(
         basis=look.basis,
         target=look.target,
@@ -169,6 +176,7 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         diagnosis=look.diagnosis,
         unconstrained=look.analysis.unconstrained,
         suggestions=look.suggestions,
+        looks=looks,
     )
     write_text(folder / "report.html", page)
 

@@ -86,7 +86,7 @@ def template(
     }
     linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:
-        for remark in (*remarks_of_scene(loaded), *remarks_of_memory(loaded)):
+        for remark in remarks_of_scene(loaded, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
             render_template(loaded, output, progress=listen, **how)

@@ -18,19 +18,27 @@ from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import share_cell
+from lightpaint.report.looks import MOST_THUMBNAILS
 from lightpaint.report.sentences import spoken_errors, unreached_channels
 from lightpaint.report.verdict import energy_shares
 
 
-def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:
-    """One row per light, in document order."""
+def lights_table(
+    basis: Basis,
+    solution: Solution,
+    uncertainty: Uncertainty | None = None,
+    *,
+    is_clean: bool = False,
+) -> str:
+    """One row per light, in document order. is_clean: whether its pictures are denoised."""
+    is_clean = is_clean and len(basis.lights) <= MOST_THUMBNAILS
     shares = energy_shares(basis, solution.lighting)
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in solution.lighting.lights}
     rows = []
     for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
         share = shares[k]
-        picture, stops = thumbnail(image, basis.emitters_seen)
+        picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
         name, setting = escape(light.name), settings[light.name]
         error = f"<small>{errors[k]}</small>" if errors[k] else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
