@@ -29,6 +29,10 @@ LACKING = (
 #: `fast` takes a quarter of the time of `high`, and leaves half again as much error.
 Quality = Literal["fast", "high"]
 
+#: Pixels put around a picture for Open Image Denoise, which is off by a third at borders: even a
+#: flat picture comes out 0.7 to 1.2 times as bright there, and with them within half a percent.
+MARGIN = 16
+
 #: Of the plain filter: pixels on either side; ratio of light, as a natural logarithm, and distance
 #: in pixels at which a neighbour counts 1/√e; how sharply normals part; least albedo divided by.
 RADIUS, RATIO, NEAR, SHARPNESS, DARKEST = 3, 0.3, 2.0, 32, 0.02
@@ -106,16 +110,19 @@ def _version() -> str:
 def _by_oidn(image: Floats, features: Features | None, quality: Quality) -> Floats:
     import pyoidn
 
+    def wider(picture: Floats) -> Floats:
+        around = ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0))
+        return np.pad(picture.astype(np.float32, copy=False), around, mode="symmetric")
+
     guides: dict[str, Any] = {}
     if features is not None:
-        # The larger network that takes features at their word is that of `high`.
-        guides = {
-            "albedo": np.ascontiguousarray(features.albedo, np.float32),
-            "normal": np.ascontiguousarray(features.normal, np.float32),
-            "clean_aux": quality == "high",
-        }
-    clean = pyoidn.denoise(image, hdr=True, quality=quality, **guides)
-    return np.maximum(np.asarray(clean, np.float32), 0)
+        guides = {"albedo": wider(features.albedo), "normal": wider(features.normal)}
+        # `high` has a network of its own for features that have no noise.
+        guides["clean_aux"] = quality == "high"
+    clean = pyoidn.denoise(wider(image), hdr=True, quality=quality, **guides)
+    height, width = image.shape[:2]
+    inside = clean[MARGIN : MARGIN + height, MARGIN : MARGIN + width]
+    return np.maximum(np.ascontiguousarray(inside, np.float32), 0)
 
 
 def _by_filter(image: Floats, features: Features | None) -> Floats:

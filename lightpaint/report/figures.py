@@ -110,7 +110,7 @@ def wipe(looks: list[Picture]) -> str:
     images += "".join(
         f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
         f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
-        f'src="{data_uri(to_8_bit(look.raw), quality=RAW_QUALITY)}">'
+        f'src="{data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)}">'
         for k, look in enumerate(looks)
         if look.raw is not None
     )

@@ -130,7 +130,7 @@ def look_html(
     transform = target.transform or _transform(images[-1])
     said = verdict(solution, predicted, verification)
     return (
-        _picture(", ".join(names), images, transform)
+        _picture(", ".join(names), images, transform, paintings=1)
         + f"<p>{', '.join(names)}</p><p>{escape(said)}</p>{solution_html(solution)}"
     )
 
@@ -229,12 +229,18 @@ def _on_grey(image: Floats, importance: Floats) -> Floats:
     return np.asarray(share * image + (1 - share) * 0.2 * luminance(image)[..., None])
 
 
-def _picture(alt: str, images: Sequence[Floats], transform: ViewTransform) -> str:
-    """Linear pictures side by side, at one size, as an element of HTML."""
+def _picture(
+    alt: str, images: Sequence[Floats], transform: ViewTransform, *, paintings: int = 0
+) -> str:
+    """Linear pictures side by side, at one size, as an element of HTML.
+
+    paintings: how many of them, the first, were not rendered.
+    """
     height, width = images[0].shape[:2]
     wide = int(min(WIDTH, np.sqrt(PIXELS * width / (height * len(images)))))
     # Pictures for people: without their grain, once they are small.
-    small = (denoised(_sized(image, wide)) for image in images)
+    small = [_sized(image, wide) for image in images]
+    small[paintings:] = map(denoised, small[paintings:])
     shown = [_wide(transform.encode(image), wide) for image in small]
     height = min(x.shape[0] for x in shown)
     strip = to_8_bit(np.concatenate([x[:height] for x in shown], axis=1))

@@ -10,6 +10,7 @@ from command import run, succeed
 from PIL import Image
 from renderer import write_room
 
+from lightpaint.basis.render.render import render_basis
 from lightpaint.images.denoise import (
     DENOISED_KEY,
     LACKING,
@@ -67,8 +68,19 @@ def test_features_of_another_size_are_not_used(method: str):
 @pytest.mark.parametrize("value", [0.0, 0.5])
 def test_nothing_comes_of_nothing(method: str, value: float):
     flat = np.full((5, 7, 3), value, np.float32)
-    # The network is trained on half floats, and so are its weights.
-    np.testing.assert_allclose(denoised(flat), flat, rtol=0.02)
+    # A network is no arithmetic: half a percent is what it makes of a flat picture at its best.
+    np.testing.assert_allclose(denoised(flat), flat, rtol=0.01)
+
+
+def test_borders_are_as_good_as_the_rest():
+    """Without a margin Open Image Denoise is off by a third there."""
+    if not is_there():
+        pytest.skip("pyoidn is not installed here")
+    flat = np.full((180, 320, 3), 0.5, np.float32)
+    normal = np.broadcast_to(np.float32([0, 0, 1]), flat.shape)
+    for quality in ("fast", "high"):
+        shown = denoised(flat, Features(flat, normal), quality=quality)
+        np.testing.assert_allclose(shown, flat, rtol=0.01)
 
 
 def test_it_says_how(method: str):
@@ -88,14 +100,19 @@ def test_features_are_what_surfaces_are(tmp_path: Path):
         assert np.abs(mine - its).mean() < 0.05
 
 
-def test_a_render_is_closer_to_one_of_many_samples(small_room: Any, small_room_basis: Any):
-    """Against 4096 samples per pixel, whose own noise is a 500th in energy."""
-    few, many = (small_room_basis(spp=spp, seed=seed) for spp, seed in ((8, 0), (4096, 1)))
+def test_a_render_is_closer_to_one_of_many_samples(tmp_path: Path):
+    """Against a render of 64 times the samples, whose own noise is a 64th in energy."""
+    if not is_there():
+        pytest.skip("pyoidn is not installed here")
+    scene = load_scene(write_room(tmp_path), parameters={"width": "96"})
+    few, many = (render_basis(scene, spp=spp, seed=seed) for spp, seed in ((8, 0), (512, 1)))
     raw, truth = (basis.mix(basis.present_weights) for basis in (few, many))
-    shown = denoised(raw, few.features, quality="high")
-    left, noise = (np.square(image - truth).mean() for image in (shown, raw))
-    # On this small a picture every third pixel is an edge; half is far from either side.
-    assert left < 0.5 * noise
+    noise = np.square(raw - truth).mean()
+    for quality in ("fast", "high"):
+        left = np.square(denoised(raw, few.features, quality=quality) - truth).mean()
+        # Measured: 0.16 to 0.2. A picture twenty pixels high is edges for a good part, where a
+        # denoiser gains nothing; twice that leaves room for other versions of its networks.
+        assert left < 0.4 * noise
 
 
 def test_without_the_library_one_line_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
