@@ -22,7 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room, its template, and nothing but what the template left in the cache."""
     folder = tmp_path_factory.mktemp("template")
     write_room(folder)
-    succeed(folder, "template", "scene.xml", "--spp", 16)
+    succeed(folder, "template", "room.xml", "--spp", 16)
     return folder
 
 
@@ -30,7 +30,7 @@ def test_the_first_solve_renders_no_basis(folder: Path):
     done = run(
         folder,
         "solve",
-        "scene.xml",
+        "room.xml",
         "template/template.exr",
         "--no-template",
         "--spp",
@@ -47,7 +47,7 @@ def test_the_first_solve_renders_no_basis(folder: Path):
 def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
     """The look is the basis's own sum in float32, so only its rounding is missed, 6e-8."""
     target = lp.read_target(folder / "template" / "template.exr", find=False)
-    look = lp.paint_with_light(folder / "scene.xml", target, folder / "b", spp=16)
+    look = lp.paint_with_light(folder / "room.xml", target, folder / "b", spp=16)
     weights, present = look.solution.weights, look.basis.present_weights
     assert np.abs(weights - present).max() < 1e-5 * present.max()
     missed = look.basis.mix(weights).astype(np.float64) - target.image
@@ -60,13 +60,13 @@ def test_files_that_other_seeds_and_lights_need_are_theirs(folder: Path):
     """What is kept is that of the same lights, groups, film and seed."""
     for option in (("--seed", 1), ("--lights", "panel"), ("--resolution", "1/2")):
         kept = len(cache.entries())
-        succeed(folder, "template", "scene.xml", "--spp", 4, "--force", "-o", "other", *option)
+        succeed(folder, "template", "room.xml", "--spp", 4, "--force", "-o", "other", *option)
         assert len(cache.entries()) == kept + 1
     kept = len(cache.entries())
     succeed(
         folder,
         "template",
-        "scene.xml",
+        "room.xml",
         "--spp",
         4,
         "--force",
@@ -117,7 +117,7 @@ def test_only_paint_counts_whichever_look_it_was_painted_on(folder: Path, name: 
 
 def test_nothing_painted_is_said_of_either(folder: Path):
     for name in ("template.png", "template.exr", "clean.exr"):
-        with pytest.raises(TargetError, match="nothing in .* differs from the template"):
+        with pytest.raises(TargetError, match=r"nothing in .* differs from the template"):
             lp.read_target(folder / "template" / name, template=folder / "template")
 
 
@@ -141,7 +141,7 @@ def test_results_have_their_raw_twins(folder: Path):
     succeed(
         folder,
         "solve",
-        "scene.xml",
+        "room.xml",
         "template/template.exr",
         "--no-template",
         "--spp",
@@ -157,6 +157,6 @@ def test_results_have_their_raw_twins(folder: Path):
     assert page.count('data-raw=""') == 3
     assert 'id="raw"' in page
     assert "Denoised by" in page
-    succeed(folder, "relight", "scene.xml", "c/lighting.json", "-o", "d", "--spp", 4)
+    succeed(folder, "relight", "room.xml", "c/lighting.json", "-o", "d", "--spp", 4)
     with Image.open(folder / "d" / "relit.png") as file:
         assert file.text[DENOISED_KEY].endswith("; raw: relit.exr")
