@@ -37,6 +37,8 @@ RAW_QUALITY = 75
 
 #: Width of the lights' pictures in the table, in pixels.
 THUMBNAIL = 144
+#: Pixels in a row that one of such a picture averages, from which on it is not denoised.
+ENOUGH = 4
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,10 @@ def thumbnail(
             for c in range(3)
         ]
         image = np.stack(planes, axis=-1)
-    return encode_display(denoised(image) if is_clean else image, stops=stops), stops
+    # Where many pixels make one, their mean has hardly any noise left to take out.
+    if is_clean and width < ENOUGH * THUMBNAIL:
+        image = denoised(image)
+    return encode_display(image, stops=stops), stops
 
 
 def wipe(looks: list[Picture]) -> str:
