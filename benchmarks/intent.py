@@ -1,7 +1,7 @@
 """How well an answer guesses what somebody meant, who painted it the way people paint.
 
     python benchmarks/intent.py [--scenes gallery stage cornell] [--styles spot blob all full]
-                                [--cases 12] [--first 0] [--settings literal default ...]
+                                [--cases 12] [--first 0] [--settings literal default ...] [--clean]
 
 A case means a lighting: the present one with one to three lights changed by 1 to 2.5 stops, up or
 down, most of them warmer or cooler, in a quarter of the cases everything else dimmed by 1 to 3
@@ -29,6 +29,7 @@ from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.difference import delta_e
 from lightpaint.colour.display import choose_exposure
+from lightpaint.images.denoise import denoised
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "cornell": "64x64"}
@@ -72,6 +73,9 @@ def main() -> None:
     parser.add_argument("--settings", nargs="+", default=list(SETTINGS), choices=SETTINGS)
     parser.add_argument("--cases", type=int, default=12, metavar="N", help="of each style")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
+    parser.add_argument(
+        "--clean", action="store_true", help="painted over the denoised look, as in template.png"
+    )
     options = parser.parse_args()
     for name in options.scenes:
         scene = lp.load_scene(SCENES / name / "scene.xml").reduced(SIZES[name])
@@ -82,7 +86,12 @@ def main() -> None:
         print(f"{'':22s}{shown}{'mean':>8s}{'harm':>7s}{'s':>6s}")
         cases = {
             style: [
-                painted(basis, style, np.random.default_rng([STYLES.index(style), k]))
+                painted(
+                    basis,
+                    style,
+                    np.random.default_rng([STYLES.index(style), k]),
+                    is_clean=options.clean,
+                )
                 for k in range(options.first, options.first + options.cases)
             ]
             for style in options.styles
@@ -121,8 +130,13 @@ def answer(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
     return basis.mix(solution.weights)
 
 
-def painted(basis: lp.Basis, style: str, rng: np.random.Generator) -> Case:
-    """A lighting that somebody means, and a painting of it in that style."""
+def painted(
+    basis: lp.Basis, style: str, rng: np.random.Generator, *, is_clean: bool = False
+) -> Case:
+    """A lighting that somebody means, and a painting of it in that style.
+
+    is_clean: whether it is painted over the denoised look.
+    """
     current = basis.mix(basis.present_weights)
     meant, ratio = next(
         (image, ratio)
@@ -133,7 +147,8 @@ def painted(basis: lp.Basis, style: str, rng: np.random.Generator) -> Case:
     ratio = np.dstack([gaussian_filter(plane, soft) for plane in np.moveaxis(ratio, -1, 0)])
     strong = np.abs(ratio).max(axis=-1)
     off = rng.normal(0, 0.15, 3) * (strong > 0.2)[..., None]
-    image = current * 2 ** (ratio * rng.uniform(0.75, 1.35) + off)
+    look = denoised(current, basis.features, quality="high") if is_clean else current
+    image = look * 2 ** (ratio * rng.uniform(0.75, 1.35) + off)
     mask = np.ones(basis.size)
     if style != "full":
         mask = gaussian_filter(region(strong, style).astype(float), soft)

@@ -26,6 +26,7 @@ from lightpaint.relit.relight import check_relightable
 from lightpaint.remarks import (
     remarks_of_film,
     remarks_of_memory,
+    remarks_of_pictures,
     remarks_of_scene,
     remarks_of_target,
 )
@@ -290,7 +291,7 @@ class Job:
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit)
         for scene in rendered:
             remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
-        return remarks
+        return remarks + remarks_of_pictures()
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:

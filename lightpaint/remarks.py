@@ -3,6 +3,7 @@
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.images.blocks import left_over, whole_factor
+from lightpaint.images.denoise import LACKING, is_there
 from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
@@ -60,6 +61,11 @@ def _spoken_rest(rest: tuple[int, int]) -> str:
     parts = [f"{columns} column{'s' * (columns > 1)} of pixels at the right"] * bool(columns)
     parts += [f"{rows} row{'s' * (rows > 1)} at the bottom"] * bool(rows)
     return f"{' and '.join(parts)} {'is' if columns + rows == 1 else 'are'}"
+
+
+def remarks_of_pictures() -> list[str]:
+    """Says so where pictures are denoised less well than they could be."""
+    return [] if is_there() else [LACKING]
 
 
 def remarks_of_memory(scene: Scene) -> list[str]:

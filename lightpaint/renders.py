@@ -2,20 +2,29 @@
 
 from pathlib import Path
 
-from lightpaint.basis.render.render import render_basis
+from lightpaint.arrays import Floats
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.render import is_of, render_basis
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import block_mean
+from lightpaint.images.denoise import Features, denoised, how_denoised
 from lightpaint.images.estimate import write_estimate
 from lightpaint.images.png import write_png
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.progress import Progress, silent
+from lightpaint.pipeline import obtain
+from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.relight import check_relightable, relight, settle
+from lightpaint.remarks import remarks_of_pictures
 from lightpaint.result_folder import ResultFolder
 from lightpaint.scene.quality import Preset
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import render_surfaces
-from lightpaint.target.template import Template, write_look, write_template
+from lightpaint.scene.surfaces import render_features, render_surfaces
+from lightpaint.settings import Settings
+from lightpaint.target.template import LIGHTS, SHOWN, Template, write_look, write_template
 
 #: Rendering of what each light does alone, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)
@@ -27,10 +36,14 @@ def render_template(
     *,
     transform: ViewTransform | None = None,
     spp: int | None = None,
+    time_s: float | None = None,
     seed: int = 0,
+    use_cache: bool = True,
     progress: Progress = silent,
 ) -> list[Path]:
     """Render something to paint on into `folder`, and return its files (docs/targets.md).
+
+    The look is the sum of the basis that `solve` will ask for, which is kept for it.
 
     Args:
         scene: What is to be painted.
@@ -38,8 +51,10 @@ def render_template(
         transform: How the look becomes a picture; sRGB by default, at an exposure that shows
             something.
         spp: Samples per pixel (the scene's own number by default).
+        time_s: Instead of spp, seconds in which the basis is rendered.
         seed: Any number >= 0.
-        progress: Hears how far the work has come.
+        use_cache: Whether a basis from an earlier run is taken, and this one kept.
+        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -47,19 +62,20 @@ def render_template(
         >>> "template.png" in [file.name for file in files]
         True
     """
-    look = render(
-        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
-    ).image
+    listen = listener(progress)
+    settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
+    basis = _basis_of(scene, settings, listen)
+    look, features = _look(scene, basis, settings, listen)
+    clean = denoised(look, features, quality="high")
     surfaces = render_surfaces(scene, seed=seed, progress=progress)
-    small = scene.reduced(f"1/{THUMBNAIL.reduction(scene.film)}")
-    lights = render_basis(small, spp=THUMBNAIL.spp, seed=seed, progress=progress)
     template = Template(
         look,
-        transform or ViewTransform("srgb", choose_exposure(look)),
+        transform or ViewTransform("srgb", choose_exposure(clean)),
         scene=scene.path.name,
         content=scene.content,
         sensor=scene.sensor_names[scene.sensor],
         albedo=surfaces.albedo,
+        clean=clean,
     )
     return write_template(
         Path(folder),
@@ -67,7 +83,11 @@ def render_template(
         normals=surfaces.normal,
         depth=surfaces.depth,
         mattes=surfaces.coverage,
-        lights=dict(zip(lights.names, lights.images, strict=True)),
+        lights=_thumbnails(scene, basis, settings, progress),
+        texts={
+            SHOWN: how_denoised(features, raw="template.exr"),
+            LIGHTS: how_denoised(features, raw="the basis of the scene"),
+        },
     )
 
 
@@ -77,14 +97,77 @@ def render_look(
     *,
     transform: ViewTransform | None = None,
     spp: int | None = None,
+    time_s: float | None = None,
     seed: int = 0,
+    use_cache: bool = True,
     progress: Progress = silent,
 ) -> Path:
-    """Only the look to paint on, as EXR at `path`; returns the PNG beside it."""
-    look = render(
-        scene, spp=spp, seed=seed, stream=Stream.TEMPLATE, label="template", progress=progress
+    """Only the look to paint on, as EXR at `path`; returns the PNG beside it, which is denoised."""
+    listen = listener(progress)
+    settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
+    look, features = _look(scene, _basis_of(scene, settings, listen), settings, listen)
+    clean = denoised(look, features, quality="high")
+    shown = transform or ViewTransform("srgb", choose_exposure(clean))
+    return write_look(path, look, shown, clean=clean, texts=how_denoised(features, raw=path.name))
+
+
+def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | None:
+    """The basis whose sum is the look, kept for the solve.
+
+    None where it would cost a render for each light, and nobody has paid for it yet: then a look
+    rendered by itself is there n times sooner, and of several paintings only the last is solved.
+    """
+    for remark in remarks_of_pictures():
+        listen.say(remark)
+    why = why_not_one_pass(scene)
+    if why is None or len(scene.lights) == 1 or settings.time_s is not None:
+        return obtain(scene, settings, listen)
+    if settings.use_cache:
+        # One that has all the samples that are asked for needs no further render.
+        sensor = scene.sensor_names[scene.sensor]
+        kept = cache.find(scene.identity, sensor, settings.seed, scene.size)
+        asked = scene.spp if settings.spp is None else settings.spp
+        if kept is not None and is_of(scene, kept, settings.seed) and kept.origin.spp >= asked:
+            return obtain(scene, settings, listen)
+    listen.say(
+        f"{why}, so that each light takes a render of its own: the template is one of all lights "
+        "together, and solve renders the lights; after lightpaint basis the template is their sum"
+    )
+    return None
+
+
+def _look(
+    scene: Scene, basis: Basis | None, settings: Settings, listen: Listener
+) -> tuple[Floats, Features]:
+    """The scene as it is, (h, w, 3) linear, and what to denoise it by."""
+    if basis is not None:
+        features = basis.features or render_features(scene, seed=settings.seed)
+        return basis.mix(basis.present_weights), features
+    image = render(
+        scene,
+        spp=settings.spp,
+        seed=settings.seed,
+        stream=Stream.TEMPLATE,
+        label="template",
+        progress=listen,
     ).image
-    return write_look(path, look, transform or ViewTransform("srgb", choose_exposure(look)))
+    return image, render_features(scene, seed=settings.seed)
+
+
+def _thumbnails(
+    scene: Scene, basis: Basis | None, settings: Settings, progress: Progress
+) -> dict[str, Floats]:
+    """By name, what each light does alone at unit emission, (h', w', 3) linear, denoised."""
+    factor = THUMBNAIL.reduction(scene.film)
+    if basis is None:
+        small = scene.reduced(f"1/{factor}")
+        basis = render_basis(small, spp=THUMBNAIL.spp, seed=settings.seed, progress=progress)
+        factor = 1
+    features = None if basis.features is None else basis.features.reduced(factor)
+    return {
+        name: denoised(block_mean(image, factor), features)
+        for name, image in zip(basis.names, basis.images, strict=True)
+    }
 
 
 def relit_folder(
@@ -106,7 +189,9 @@ def relight_look(
     seed: int = 0,
     progress: Progress = silent,
 ) -> None:
-    """Write relit.xml, and its render as relit.exr and relit.png."""
+    """Write relit.xml, and its render as relit.exr and, denoised, as relit.png."""
+    for remark in remarks_of_pictures():
+        listener(progress).say(remark)
     results.check()
     with results.filled() as folder:
         relit = relight(scene, lighting, folder / "relit.xml")
@@ -114,5 +199,8 @@ def relight_look(
             relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
         )
         write_estimate(folder / "relit.exr", image, {})
-        write_png(folder / "relit.png", image.image, stops=choose_exposure(image.image))
+        features = render_features(relit, seed=seed)
+        clean = denoised(image.image, features, quality="high")
+        texts = how_denoised(features, raw="relit.exr")
+        write_png(folder / "relit.png", clean, stops=choose_exposure(clean), texts=texts)
         settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")

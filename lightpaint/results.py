@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
@@ -23,12 +24,14 @@ from lightpaint.relit.verification import Verification
 from lightpaint.relit.verify import verify
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.emitters import emitters_in_view
+from lightpaint.report.looks import Looks
 from lightpaint.report.notebook import look_html
 from lightpaint.report.numbers import report_numbers
 from lightpaint.report.page import report_page
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.surfaces import render_features
 from lightpaint.screen import some_names
 from lightpaint.staging import finish
 from lightpaint.target.target import Target
@@ -155,8 +158,15 @@ def write_predicted(path: Path, predicted: Estimate, *, origin: Origin, spp: int
 
 
 def write_report(folder: Path, look: Look, *, command: str) -> None:
-    """Write what people look at, comparison.png and report.html, and its numbers, report.json."""
+    """Write what people look at, denoised, and its numbers.
+
+    These are comparison.png and report.html, and report.json.
+    """
     verified = look.verification.verified.image if look.verification else None
+    larger = None
+    if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
+        larger = render_features(look.relit)
+    looks = Looks.clean(look.basis, look.predicted.image, verified, larger=larger)
     sheet = comparison_image(
         basis=look.basis,
         target=look.target,
@@ -164,23 +174,24 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         predicted=look.predicted.image,
         verified=verified,
         seen=look.analysis.seen,
+        looks=looks,
     )
-    write_bytes(folder / "comparison.png", png_bytes(sheet))
-    for name, written in (("report.json", report_numbers), ("report.html", report_page)):
-        text = written(
-            basis=look.basis,
-            target=look.target,
-            solution=look.solution,
-            predicted=look.predicted,
-            verification=look.verification,
-            command=command,
-            uncertainty=look.uncertainty,
-            diagnosis=look.diagnosis,
-            unconstrained=look.analysis.unconstrained,
-            suggestions=look.suggestions,
-            seen=look.analysis.seen,
-        )
-        write_text(folder / name, text)
+    write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
+    how: dict[str, Any] = {
+        "basis": look.basis,
+        "target": look.target,
+        "solution": look.solution,
+        "predicted": look.predicted,
+        "verification": look.verification,
+        "command": command,
+        "uncertainty": look.uncertainty,
+        "diagnosis": look.diagnosis,
+        "unconstrained": look.analysis.unconstrained,
+        "suggestions": look.suggestions,
+        "seen": look.analysis.seen,
+    }
+    write_text(folder / "report.json", report_numbers(**how))
+    write_text(folder / "report.html", report_page(**how, looks=looks))
 
 
 def verify_result(

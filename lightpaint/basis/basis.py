@@ -11,6 +11,7 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
 from lightpaint.expected import BRIGHTEST, is_amount
+from lightpaint.images.denoise import Features
 from lightpaint.scene.lights_file import Asked
 from lightpaint.screen import Listed, Shown, some_names, some_of
 from lightpaint.version import __version__
@@ -118,6 +119,7 @@ class Basis(Shown):
             emitter matters where, or None. Going on needs it, nobody else.
         asked: What the lights file of the scene asks of the lights, for whoever solves; of memory
             only, since that file may change.
+        features: Albedo and normals of what is seen, to denoise pictures by, or None.
 
     Examples:
         >>> basis.names
@@ -133,6 +135,7 @@ class Basis(Shown):
     origin: Origin
     learned: Floats | None = None
     asked: Asked = field(default_factory=Asked)
+    features: Features | None = None
 
     def __post_init__(self) -> None:
         n = len(self.lights)
@@ -144,6 +147,8 @@ class Basis(Shown):
             raise BasisError("half differences and images differ in shape")
         if self.emitters_seen.shape != self.size:
             raise BasisError("the mask of seen emitters has another size than the images")
+        if self.features is not None and self.features.size != self.size:
+            raise BasisError("albedo and normals have another size than the images")
         if len(set(self.names)) != n:
             raise BasisError(f"light names repeat: {some_names(self.names)}")
         if len(self.origin.each_light) not in (0, n):

@@ -15,6 +15,7 @@ from lightpaint.basis.basis import Basis, BasisLight, Origin, free_name
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
+from lightpaint.images.denoise import Features
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
 from lightpaint.records import fields_of, read_record, strict_json
@@ -25,6 +26,7 @@ ORIGIN_KEY = "lightpaint.origin"
 LIGHT_KEY = "lightpaint.light"
 EMITTERS_SEEN = "emitters seen"
 LEARNED = "learned"
+FEATURES, FEATURES_KEY = "features", "lightpaint.features"
 
 #: Longest basis file that is read, in bytes.
 MAX_BYTES = 2**36
@@ -59,6 +61,10 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         learned = dict(zip(("received", "asked"), basis.learned, strict=True))
         # A table and no picture; the format wants one display window for all parts.
         parts.append(Part(free_name(LEARNED, basis.names), learned, display=basis.size))
+    if basis.features is not None:
+        its = _feature_channels(basis.features)
+        about_them = {FEATURES_KEY: checksum("", its)}
+        parts.append(Part(free_name(FEATURES, basis.names), its, about_them))
     # Without `each_light` and `integrator` as in files from before there was any.
     of_origin = json.dumps(fields_of(basis.origin, "each_light", "integrator"), ensure_ascii=False)
     checksums = Checksums(
@@ -130,6 +136,7 @@ def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
             emitters_seen=seen[0] > 0,
             origin=origin,
             learned=_learned(others, checksums),
+            features=_features(others, lit[0].size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
@@ -163,6 +170,24 @@ def _learned(others: Sequence[Part], checksums: Checksums | None) -> Floats | No
         if checksums is not None and checksum("", channels) != checksums.learned:
             return None
         return np.stack([channels["received"], channels["asked"]])
+    return None
+
+
+def _feature_channels(features: Features) -> dict[str, Floats]:
+    """In half floats, which is what they were rendered to."""
+    albedo = rgb_channels(features.albedo, "albedo")
+    normal = {f"normal.{c}": features.normal[..., k] for k, c in enumerate("XYZ")}
+    return {name: plane.astype(np.float16) for name, plane in (albedo | normal).items()}
+
+
+def _features(others: Sequence[Part], size: tuple[int, int]) -> Features | None:
+    """Albedo and normals; None if there are none or not as they were, which nothing needs."""
+    for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
+        channels = part.channels
+        if checksum("", channels) != part.attributes[FEATURES_KEY] or part.size != size:
+            return None
+        normal = np.stack([channels[f"normal.{c}"] for c in "XYZ"], axis=-1)
+        return Features(part.rgb("albedo"), normal.astype(np.float32))
     return None
 
 

@@ -25,14 +25,14 @@ from lightpaint.relit.relight import scene_of
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.renders import relight_look, relit_folder, render_look, render_template
 from lightpaint.results import result_folders, verify_result
-from lightpaint.scene.quality import on_film
+from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
 from lightpaint.staging import finish
-from lightpaint.target.template import LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
+from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
 
 
 def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int:
@@ -80,26 +80,32 @@ def template(
 ) -> int:
     """`lightpaint template SCENE -o DIR`"""
     _check_template(output, force=force)
-    loaded = _loaded(scene)
+    loaded = on_film(scene.content, settings.quality, settings.resolution)
     replaced = (
         files_in_the_way(output) if is_folder(output) else [output, output.with_suffix(".png")]
     )
     check_files(replaced, loaded.read_files)
-    if settings.resolution:
-        loaded = loaded.reduced(settings.resolution)
-        for remark in remarks_of_film(loaded, settings):
-            terminal.say(remark)
-    how: dict[str, Any] = {"transform": transform, "spp": settings.spp, "seed": settings.seed}
+    for remark in remarks_of_film(loaded, settings):
+        terminal.say(remark)
+    how: dict[str, Any] = {
+        "transform": transform,
+        "spp": samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
+        "time_s": settings.time_s,
+        "seed": settings.seed,
+        "use_cache": settings.use_cache,
+    }
     linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:
+        for remark in remarks_of_scene(loaded, is_rendered=False):
+            listen.say(remark)
         if is_folder(output):
             render_template(loaded, output, progress=listen, **how)
         else:
             linear, picture = output, render_look(loaded, output, progress=listen, **how)
-    terminal.write(f"{linear}: paint over it in linear light, in a program that knows EXR")
-    terminal.write(
-        f"{picture}: the same in 16 bits, for any program: paint over it and save as PNG"
-    )
+    terminal.write(f"{picture}: paint over it, in any program, and save as PNG; it is denoised")
+    if is_folder(output):
+        terminal.write(f"{output / CLEAN}: the same in linear light, for programs that know EXR")
+    terminal.write(f"{linear}: as it was rendered, with its grain")
     if is_folder(output):
         terminal.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
     return 0

@@ -40,6 +40,7 @@ def examine(variant: str | None = None) -> list[Finding]:
         Finding("cores", "info", str(len(_usable_cores()))),
     ]
     findings += [_package(name) for name in PACKAGES]
+    findings.append(_denoiser())
     findings.append(_extra("OpenColorIO", "opencolorio", "ocio"))
     findings.append(_extra("shell completion", "argcomplete", "completion"))
     findings += _llvm()
@@ -67,6 +68,14 @@ def _extra(what: str, package: str, extra: str) -> Finding:
     if found.state == "ok":
         return Finding(what, "ok", found.found)
     return Finding(what, "info", f"not installed, optional: pip install 'lightpaint[{extra}]'")
+
+
+def _denoiser() -> Finding:
+    """What takes the grain out of pictures. Nothing here needs it."""
+    found = _package("pyoidn")
+    if found.state == "ok":
+        return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {found.found})")
+    return Finding("denoiser", "info", "a plain filter; a better one: pip install pyoidn")
 
 
 def _llvm() -> list[Finding]:

@@ -41,10 +41,8 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             return {"scene": scene_of(options), "output": output, "settings": settings}
         case "template":
             output, transform = output or Path("template"), transform_of(options)
-            # Which lights go together is shown in the folder, and nowhere else.
-            tied = is_folder(output)
             return {
-                "scene": scene_of(options, is_to_solve=False, use_lights_file=tied),
+                "scene": scene_of(options),
                 "output": output,
                 "transform": None if transform.is_open else transform.over(None),
                 "settings": settings,

@@ -9,7 +9,6 @@ from lightpaint.cli.option_groups import (
     add_force,
     add_lights,
     add_output,
-    add_resolution,
     add_sampling,
     add_scene,
     add_spp,
@@ -57,8 +56,9 @@ def _basis(parser: argparse.ArgumentParser) -> None:
 
 def _template(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
-    add_sampling(parser)
-    add_resolution(parser)
+    add_lights(parser)
+    add_budget(parser)
+    add_cache(parser)
     add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
     add_output(
         parser, "DIR|F.exr", "folder to write, or only an EXR and a PNG (default: template/)"

@@ -78,9 +78,11 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
     return Image.fromarray(np.kron(pixels, np.ones((zoom, zoom, 1), np.uint8)))
 
 
-def write_png(path: Path, image: Floats, *, stops: float = 0.0) -> None:
+def write_png(
+    path: Path, image: Floats, *, stops: float = 0.0, texts: Mapping[str, str] | None = None
+) -> None:
     """Write a linear image display-encoded as 8-bit sRGB PNG, whole or not at all."""
-    write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops))))
+    write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
 
 
 def read_png_head(path: Path) -> tuple[str | None, Profile | None]:

@@ -13,10 +13,11 @@ from lightpaint.colour.display import to_8_bit
 from lightpaint.images.blocks import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
+from lightpaint.report.looks import Looks
 from lightpaint.report.pictures import (
     diverging,
     painted,
-    residual_limit,
+    residual_of,
     residual_picture,
     spoken_view,
     target_picture,
@@ -51,17 +52,19 @@ def comparison_image(
     predicted: Floats,
     verified: Floats | None,
     seen: Seen | None = None,
+    looks: Looks | None = None,
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
     predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
-    residual is false-coloured luminance of prediction minus target; pixels that do not
-    count are grey, dim and hatched. seen: what `what_is_seen` says, where somebody has looked.
+    residual is false-coloured luminance of prediction minus target, of raw data; pixels that
+    do not count are grey, dim and hatched. seen: what `what_is_seen` says, where somebody has
+    looked. looks: what to show instead of raw renders.
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    current = basis.present_look
+    looks = looks or Looks.raw(basis, predicted, verified)
     transform = transform_of(target, predicted, verified)
     share = float(painted(target, solution).mean())
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
@@ -69,15 +72,15 @@ def comparison_image(
         Tile(
             f"target: {target.name}",
             f"{_percent(share)} painted{', the rest hatched' if share < 0.995 else ''}",
-            target_picture(target, solution, current, transform=transform),
+            target_picture(target, solution, looks.current, transform=transform),
         ),
         Tile(
             f"predicted{at}",
             _in_short(seen or what_is_seen(solution)),
-            transform.encode(predicted),
+            transform.encode(looks.predicted),
         ),
     ]
-    if verified is not None:
+    if verified is not None and looks.verified is not None:
         factor = whole_factor(verified.shape[:2], predicted.shape[:2])
         assert factor is not None
         gap = predicted.astype(np.float64) - block_mean(verified, factor)
@@ -86,12 +89,13 @@ def comparison_image(
             Tile(
                 f"verified{at}",
                 f"independent render, {rmse:.2g} RMS off the prediction",
-                transform.encode(verified),
+                transform.encode(looks.verified),
             )
         )
-    limit = residual_limit(solution, predicted, transform=transform)
-    picture = residual_picture(solution, predicted, current, transform=transform, limit=limit)
-    tiles.append(Tile("residual", "luminance, predicted - target", picture, limit))
+    missed = residual_of(solution, predicted, transform=transform)
+    picture = residual_picture(missed, solution, looks.current, transform=transform)
+    detail = f"luminance, predicted - target{missed.spoken}"
+    tiles.append(Tile("residual", detail, picture, missed.limit))
     return compose(tiles)
 
 

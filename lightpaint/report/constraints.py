@@ -6,9 +6,11 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
+from lightpaint.images.denoise import denoised
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import Picture, figure
 from lightpaint.report.html import SHOWN, SPARE, row, share_cell, table
+from lightpaint.report.looks import Looks
 from lightpaint.report.measures import relative_residual
 from lightpaint.report.sentences import spoken_percent
 
@@ -20,7 +22,12 @@ AROUND = 2
 
 
 def constraints_section(
-    basis: Basis, solution: Solution, free: Solution | None, *, transform: ViewTransform
+    basis: Basis,
+    solution: Solution,
+    free: Solution | None,
+    *,
+    transform: ViewTransform,
+    looks: Looks | None = None,
 ) -> str:
     """The best lighting without constraints, `free`, beside the one as asked, from the basis.
 
@@ -39,8 +46,8 @@ def constraints_section(
         f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
         f"painted light (RMS). As asked, they miss {asked}. Both pictures are sums of the "
         f"basis images.</p></div>{_curve(solution, free)}</div>"
-        f'<div class="maps">{_figures(basis, pictures, transform)}'
-        f"{_numbers(basis, solution, transform)}"
+        f'<div class="maps">{_figures(basis, pictures, transform, looks)}'
+        f"{_numbers(basis, solution, transform, looks)}"
         "</div></section>"
     )
 
@@ -63,7 +70,9 @@ def _curve(solution: Solution, free: Solution) -> str:
     return f"<div>{table(heads, rows, shown=len(near) + 1)}</div>"
 
 
-def _numbers(basis: Basis, solution: Solution, transform: ViewTransform) -> str:
+def _numbers(
+    basis: Basis, solution: Solution, transform: ViewTransform, looks: Looks | None
+) -> str:
     """With `sparse`, pictures with fewer and with more lights."""
     used, missed_with = _used(solution), dict(solution.certificate.curve)
     pictures = [
@@ -71,18 +80,22 @@ def _numbers(basis: Basis, solution: Solution, transform: ViewTransform) -> str:
         for count, weights in solution.tried
         if count in missed_with and 0 < abs(count - used) <= AROUND
     ]
-    return _figures(basis, pictures, transform)
+    return _figures(basis, pictures, transform, looks)
 
 
 def _figures(
-    basis: Basis, pictures: list[tuple[Doubles, str, str]], transform: ViewTransform
+    basis: Basis,
+    pictures: list[tuple[Doubles, str, str]],
+    transform: ViewTransform,
+    looks: Looks | None,
 ) -> str:
     """Pictures of weights (n, 3), each with its name and a caption."""
     factor = max(1, min(basis.size[1] // WIDTH, *basis.size))
     figures = []
     for weights, name, caption in pictures:
-        image = block_mean(basis.mix(weights), factor)
-        pixels = transform.encode(np.asarray(image, np.float32))
+        # Reduced it is quick to denoise, and needs no features.
+        image = np.asarray(block_mean(basis.mix(weights), factor), np.float32)
+        pixels = transform.encode(denoised(image) if looks and looks.is_clean else image)
         figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
     return "".join(figures)
 

@@ -11,6 +11,7 @@ from PIL import Image
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.denoise import denoised
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
@@ -18,7 +19,7 @@ from lightpaint.report.pictures import (
     DIVERGING,
     diverging,
     importance_picture,
-    residual_limit,
+    residual_of,
     residual_picture,
 )
 
@@ -30,25 +31,37 @@ SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGIN
 
 #: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
 LARGEST_PNG = 150_000
+
+#: JPEG quality of pictures with their noise, which is what takes the room.
+RAW_QUALITY = 75
+
 #: Width of the lights' pictures in the table, in pixels.
 THUMBNAIL = 144
+#: Pixels in a row that one of such a picture averages, from which on it is not denoised.
+ENOUGH = 4
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of the page, (h, w, 3) in display values. alt: what it shows, in words."""
+    """A picture of the page, (h, w, 3) in display values. alt: what it shows, in words.
+
+    raw: the same as it was rendered, where `pixels` were denoised.
+    """
 
     name: str
     alt: str
     pixels: Floats
+    raw: Floats | None = None
 
 
-def data_uri(image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = LARGEST_PNG) -> str:
+def data_uri(
+    image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = LARGEST_PNG, quality: int = 91
+) -> str:
     """An (h, w, 3) picture as a data: URI: lossless while it is small, else a good JPEG."""
     data, kind = _small_png(image_8_bit, largest_png), "png"
     if data is None:
         buffer = io.BytesIO()
-        Image.fromarray(image_8_bit).save(buffer, "JPEG", quality=91, subsampling=0)
+        Image.fromarray(image_8_bit).save(buffer, "JPEG", quality=quality, subsampling=0)
         data, kind = buffer.getvalue(), "jpeg"
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
@@ -63,11 +76,13 @@ def _small_png(image_8_bit: npt.NDArray[np.uint8], largest: int) -> bytes | None
     return data if len(data) <= largest else None
 
 
-def thumbnail(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> tuple[Floats, float]:
+def thumbnail(
+    image: Floats, emitters_seen: npt.NDArray[np.bool_], *, is_clean: bool = False
+) -> tuple[Floats, float]:
     """A small display-encoded picture of what one light does, and its exposure in stops.
 
     image: (h, w, 3) linear. The 98th percentile of what it lights, seen emitters aside, is
-    brought to white; reduced in linear light.
+    brought to white; reduced in linear light. is_clean: whether it is denoised then.
     """
     height, width = image.shape[:2]
     bright = image.max(axis=-1)
@@ -82,6 +97,9 @@ def thumbnail(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> tuple[Floa
             for c in range(3)
         ]
         image = np.stack(planes, axis=-1)
+    # Where many pixels make one, their mean has hardly any noise left to take out.
+    if is_clean and width < ENOUGH * THUMBNAIL:
+        image = denoised(image)
     return encode_display(image, stops=stops), stops
 
 
@@ -99,11 +117,20 @@ def wipe(looks: list[Picture]) -> str:
         )
 
     images = "".join(
-        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" width="{width}" '
-        f'height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
+        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
+        f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
         f'src="{data_uri(to_8_bit(look.pixels))}">'
         for k, look in enumerate(looks)
     )
+    images += "".join(
+        f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
+        f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
+        f'src="{data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)}">'
+        for k, look in enumerate(looks)
+        if look.raw is not None
+    )
+    switch = '<label><input type="checkbox" id="raw"> Raw, as rendered</label>'
+    switch = switch if any(look.raw is not None for look in looks) else ""
     return (
         f'<figure class="wipe" id="wipe" style="--aspect: {width / height:.5f}">'
         f'<div class="stage" id="stage" style="aspect-ratio: {width} / {height}">{images}'
@@ -114,7 +141,7 @@ def wipe(looks: list[Picture]) -> str:
         f'<label>Left <select id="a">{choices(a)}</select></label>'
         '<label class="slide">Wipe <input type="range" id="split" min="0" max="100" step="1" '
         'value="50"></label>'
-        f'<label>Right <select id="b">{choices(b)}</select></label></figcaption></figure>'
+        f'<label>Right <select id="b">{choices(b)}</select></label>{switch}</figcaption></figure>'
     )
 
 
@@ -128,15 +155,16 @@ def maps(
 ) -> str:
     """False-colour pictures: what is missed, what counts, and where the render disagrees.
 
-    predicted, current: (h, w, 3) linear.
+    predicted: (h, w, 3) linear, as rendered; current: behind what does not count.
     """
-    limit = residual_limit(solution, predicted, transform=transform)
-    picture = residual_picture(solution, predicted, current, transform=transform, limit=limit)
+    missed = residual_of(solution, predicted, transform=transform)
+    picture = residual_picture(missed, solution, current, transform=transform)
     figures = [
         figure(
             Picture("Residual", "False-colour map of the residual.", picture),
-            "Luminance, predicted − target. Hatched pixels do not count.",
-            signed_scale(limit),
+            f"Luminance, predicted − target, as rendered{missed.spoken}. Hatched pixels do not "
+            "count.",
+            signed_scale(missed.limit),
         ),
         figure(
             Picture(

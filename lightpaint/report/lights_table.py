@@ -19,6 +19,7 @@ from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
+from lightpaint.report.looks import MOST_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
 
@@ -36,12 +37,20 @@ COLUMNS = (
 )
 
 
-def lights_table(basis: Basis, solution: Solution, uncertainty: Uncertainty | None = None) -> str:
+def lights_table(
+    basis: Basis,
+    solution: Solution,
+    uncertainty: Uncertainty | None = None,
+    *,
+    is_clean: bool = False,
+) -> str:
     """One row per light, in document order; of many those that do most, and the rest folded.
 
     What a light does is its part of the picture's energy, now or as solved, whichever is more.
+    is_clean: whether its pictures are denoised.
     """
-    rows = _rows(basis, solution, uncertainty)
+    is_clean = is_clean and len(basis.lights) <= MOST_THUMBNAILS
+    rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
     if len(rows) <= SHOWN + SPARE:
         return _table(rows, solution)
     shares = np.maximum(
@@ -73,13 +82,15 @@ def _table(rows: list[str], solution: Solution) -> str:
     )
 
 
-def _rows(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> list[str]:
+def _rows(
+    basis: Basis, solution: Solution, uncertainty: Uncertainty | None, *, is_clean: bool
+) -> list[str]:
     shares = energy_shares(basis, solution.lighting)
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in solution.lighting.lights}
     rows = []
     for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
-        picture, stops = thumbnail(image, basis.emitters_seen)
+        picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
         name, setting = escape(light.name), settings[light.name]
         error = f" <small>{errors[k]}</small>" if errors[k] else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"

@@ -19,6 +19,7 @@ from lightpaint.colour.display import choose_exposure, to_8_bit
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import covered, enlarged
+from lightpaint.images.denoise import denoised
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.png import png_bytes
 from lightpaint.lighting.analysis.seen import Seen
@@ -135,7 +136,7 @@ def look_html(
     transform = target.transform or _transform(images[-1])
     said = verdict(solution, predicted, verification, seen=seen)
     return (
-        _picture(", ".join(names), images, transform)
+        _picture(", ".join(names), images, transform, paintings=1)
         + f"<p>{', '.join(names)}</p><p>{escape(said)}</p>{solution_html(solution)}"
     )
 
@@ -145,7 +146,9 @@ def basis_png(basis: Basis) -> bytes:
     """A contact sheet: what each light does alone, at exposures of their own."""
     power = (basis.present_weights * basis.totals) @ LUMINANCE
     chosen = _most(power, SHEET)
-    pictures = [_wide(thumbnail(basis.images[k], basis.emitters_seen)[0]) for k in chosen]
+    pictures = [
+        _wide(thumbnail(basis.images[k], basis.emitters_seen, is_clean=True)[0]) for k in chosen
+    ]
     height, width = pictures[0].shape[:2]
     text = 12
     rows, columns = -(-len(chosen) // ACROSS), min(ACROSS, len(chosen))
@@ -232,11 +235,19 @@ def _on_grey(image: Floats, importance: Floats) -> Floats:
     return np.asarray(share * image + (1 - share) * 0.2 * luminance(image)[..., None])
 
 
-def _picture(alt: str, images: Sequence[Floats], transform: ViewTransform) -> str:
-    """Linear pictures side by side, at one size, as an element of HTML."""
+def _picture(
+    alt: str, images: Sequence[Floats], transform: ViewTransform, *, paintings: int = 0
+) -> str:
+    """Linear pictures side by side, at one size, as an element of HTML.
+
+    paintings: how many of them, the first, were not rendered.
+    """
     height, width = images[0].shape[:2]
     wide = int(min(WIDTH, np.sqrt(PIXELS * width / (height * len(images)))))
-    shown = [_wide(transform.encode(_sized(image, wide)), wide) for image in images]
+    # Pictures for people: without their grain, once they are small.
+    small = [_sized(image, wide) for image in images]
+    small[paintings:] = map(denoised, small[paintings:])
+    shown = [_wide(transform.encode(image), wide) for image in small]
     height = min(x.shape[0] for x in shown)
     strip = to_8_bit(np.concatenate([x[:height] for x in shown], axis=1))
     return f'<img alt="{escape(alt)}" src="{data_uri(strip, largest_png=2**13)}">'

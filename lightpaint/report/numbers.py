@@ -30,7 +30,7 @@ from lightpaint.report.measures import (
     noise_residual,
     relative_residual,
 )
-from lightpaint.report.pictures import brighter_than_white, residual_limit, transform_of
+from lightpaint.report.pictures import brighter_than_white, residual_of, transform_of
 from lightpaint.report.sentences import brightness, halving_spp, most_uncertain, relative_errors
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
@@ -55,6 +55,7 @@ def report_numbers(
     """JSON of the numbers of `report_page`, whose arguments these are."""
     verified = None if verification is None else verification.verified.image
     transform = transform_of(target, predicted.image, verified)
+    residual = residual_of(solution, predicted.image, transform=transform)
     told = {
         "format": FORMAT,
         "lightpaint": __version__,
@@ -66,7 +67,8 @@ def report_numbers(
             "name": transform.name,
             "stops": transform.stops,
             "brighter_than_white": brighter_than_white(predicted.image, transform),
-            "residual_limit": residual_limit(solution, predicted.image, transform=transform),
+            "residual_limit": residual.limit,
+            "residual_pixels": 2 * residual.radius + 1,
         },
         "seen": _seen(seen or what_is_seen(solution, predicted)),
         "fit": _fit(solution, predicted, unconstrained),

@@ -25,6 +25,7 @@ from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import lights_table
+from lightpaint.report.looks import Looks
 from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
@@ -45,6 +46,7 @@ def report_page(
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
+    looks: Looks | None = None,
 ) -> str:
     """The page as HTML text.
 
@@ -52,14 +54,16 @@ def report_page(
     command: the shell command that made the result.
     uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
     what they tell. seen: what `what_is_seen` says, where somebody has looked.
+    looks: the pictures without their grain, which then have it on a switch.
 
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    current = basis.present_look
     verified = None if verification is None else verification.verified.image
     transform = transform_of(target, predicted.image, verified)
-    looks = _looks(target, solution, current, predicted.image, verified, transform=transform)
+    raw = Looks.raw(basis, predicted.image, verified)
+    looks = looks or raw
+    current = looks.current
     template = resources.files("lightpaint.report").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(f"{target.name} · {basis.origin.scene}"),
@@ -67,18 +71,21 @@ def report_page(
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
         verdict=escape(verdict(solution, predicted, verification, seen=seen)),
         banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
-        wipe=wipe(looks),
-        exposure=_exposure(transform, predicted.image),
+        wipe=wipe(_pictures(target, solution, looks, raw, transform=transform)),
+        exposure=_exposure(transform, predicted.image, looks.how),
         maps=maps(
             solution, predicted.image, current, verification=verification, transform=transform
         ),
         missed=missed_section(solution, diagnosis, current, transform=transform)
-        + constraints_section(basis, solution, unconstrained, transform=transform),
+        + constraints_section(basis, solution, unconstrained, transform=transform, looks=looks),
         suggestions=suggestion_section(
-            suggestions, transform=transform, cd_per_unit=solution.lighting.cd_per_unit
+            suggestions,
+            transform=transform,
+            cd_per_unit=solution.lighting.cd_per_unit,
+            is_clean=looks.is_clean,
         ),
         sure=sure_section(basis, solution, uncertainty),
-        lights=lights_table(basis, solution, uncertainty),
+        lights=lights_table(basis, solution, uncertainty, is_clean=looks.is_clean),
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, predicted, verification),
@@ -88,33 +95,34 @@ def report_page(
     )
 
 
-def _looks(
-    target: Target,
-    solution: Solution,
-    current: Floats,
-    predicted: Floats,
-    verified: Floats | None,
-    *,
-    transform: ViewTransform,
+def _pictures(
+    target: Target, solution: Solution, looks: Looks, raw: Looks, *, transform: ViewTransform
 ) -> list[Picture]:
     """What can be put side by side under the wipe, in the order of its lists."""
-    looks = [
-        Picture("current look", "The scene as it is.", transform.encode(current)),
+
+    def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> Picture:
+        both = transform.encode(clean), transform.encode(noisy)
+        return Picture(name, alt, both[0], both[1] if looks.is_clean else None)
+
+    pictures = [
+        picture("current look", "The scene as it is.", looks.current, raw.current),
         Picture(
             "target",
             "The painting. Unpainted pixels are grey, dim and hatched.",
-            target_picture(target, solution, current, transform=transform),
+            target_picture(target, solution, looks.current, transform=transform),
         ),
-        Picture(
+        picture(
             "predicted",
             "The solved lighting, as the sum of the basis images.",
-            transform.encode(predicted),
+            looks.predicted,
+            raw.predicted,
         ),
     ]
-    if verified is not None:
-        shown = transform.encode(covered(verified, predicted.shape[:2]))
-        looks.append(Picture("verified", "An independent render of the relit scene.", shown))
-    return looks
+    if looks.verified is not None and raw.verified is not None:
+        about, size = "An independent render of the relit scene.", looks.predicted.shape[:2]
+        clean, grainy = (covered(x, size) for x in (looks.verified, raw.verified))
+        pictures.append(picture("verified", about, clean, grainy))
+    return pictures
 
 
 def _banner(verification: Verification | None) -> str:
@@ -138,13 +146,15 @@ def _notes(remarks: list[str]) -> str:
     return "".join(f'<p class="note">{escape(remark)}.</p>' for remark in remarks)
 
 
-def _exposure(transform: ViewTransform, predicted: Floats) -> str:
+def _exposure(transform: ViewTransform, predicted: Floats, how: str) -> str:
     """How linear light became these pictures, and what of it they cannot show."""
     at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
     clipped = brighter_than_white(predicted, transform)
     text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
+    if how:
+        text += f" Denoised by {escape(how)}; all numbers and maps are of the raw renders."
     return text
 
 

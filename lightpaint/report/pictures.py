@@ -5,13 +5,16 @@ current look, grey, dim and hatched, so that they cannot be taken for paint.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.basis.basis import mix
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.estimate import box_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 
@@ -29,6 +32,10 @@ DIVERGING = np.array(
 
 #: A residual below this part of display white cannot be seen, so no scale is finer.
 FINEST_SCALE = 0.01
+
+#: Pixels on either side over which a residual may be averaged, and the part of its scale that
+#: noise may have then.
+RADII, FAINT = (0, 1, 2, 3, 4, 6, 8), 0.1
 
 
 def transform_of(target: Target, predicted: Floats, verified: Floats | None) -> ViewTransform:
@@ -99,27 +106,61 @@ def importance_picture(importance: Floats, current: Floats, *, transform: ViewTr
     return over_unpainted(counted, coverage(importance), current, transform=transform)
 
 
-def residual(solution: Solution, predicted: Floats) -> Floats:
-    """Luminance of prediction minus what was solved for, (h, w), in scene units."""
-    return luminance(predicted.astype(np.float64) - solution.meant(predicted))
+@dataclass(frozen=True)
+class Residual:
+    """What is missed, as a map.
+
+    values: (h, w), luminance of prediction minus what was solved for, in scene units, averaged over
+    (2 radius + 1)² pixels. limit: end of its scale, its 99th percentile where it counts, rounded
+    up.
+    """
+
+    values: Floats
+    limit: float
+    radius: int
+
+    @property
+    def spoken(self) -> str:
+        """`, averaged over 5x5 pixels`, or nothing where it is not."""
+        side = 2 * self.radius + 1
+        return f", averaged over {side}x{side} pixels" if self.radius else ""
 
 
-def residual_limit(solution: Solution, predicted: Floats, *, transform: ViewTransform) -> float:
-    """The end of the residual's scale: its 99th percentile where it counts, rounded up."""
-    counted = np.abs(residual(solution, predicted))[solution.importance > 0]
-    return round_up(max(float(np.percentile(counted, 99)), FINEST_SCALE * 2.0**-transform.stops))
+def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransform) -> Residual:
+    """The residual of raw data, averaged over as few pixels as its noise allows.
+
+    That is until the noise's standard deviation is a tenth of the scale, so that what shows is
+    missed and no grain.
+    """
+    counts = (solution.importance > 0).astype(np.float64)
+    exact = luminance(predicted.astype(np.float64) - solution.meant(predicted))
+
+    def averaged(radius: int) -> tuple[Floats, float]:
+        if radius == 0:
+            values = exact
+        else:
+            # Only what counts, so that nothing bleeds into paint from beside it.
+            share = box_mean(counts, radius)
+            values = box_mean(exact * counts, radius) / np.where(share > 0, share, 1)
+            values = np.where(counts > 0, values, exact)
+        end = float(np.percentile(np.abs(values[counts > 0]), 99))
+        return values, round_up(max(end, FINEST_SCALE * 2.0**-transform.stops))
+
+    noise = luminance(mix(solution.basis.half_differences, solution.weights).astype(np.float64))
+    spread = float(np.sqrt((np.square(noise) * counts).sum() / max(counts.sum(), 1)))
+    if spread == 0:
+        return Residual(*averaged(0), 0)
+    aim = FAINT * averaged(RADII[len(RADII) // 2])[1]
+    enough = (radius for radius in RADII if spread <= aim * (2 * radius + 1))
+    radius = next(enough, RADII[-1])
+    return Residual(*averaged(radius), radius)
 
 
 def residual_picture(
-    solution: Solution,
-    predicted: Floats,
-    current: Floats,
-    *,
-    transform: ViewTransform,
-    limit: float,
+    residual: Residual, solution: Solution, current: Floats, *, transform: ViewTransform
 ) -> Floats:
-    """False colours of the residual from −limit to +limit, dimmed where it does not count."""
-    colours = diverging(residual(solution, predicted) / limit)
+    """False colours of the residual over its scale, dimmed where it does not count."""
+    colours = diverging(residual.values / residual.limit)
     return over_unpainted(colours, coverage(solution.importance), current, transform=transform)
 
 

@@ -1,11 +1,13 @@
 """Lights that would help, in words and as a part of the report. Sections are HTML."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.denoise import denoised
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.figures import data_uri
 from lightpaint.report.html import facts
@@ -41,10 +43,11 @@ def suggestion_section(
     *,
     transform: ViewTransform,
     cd_per_unit: float | None = None,
+    is_clean: bool = False,
 ) -> str:
     """Each suggested light: the picture without and with it, where it is, what to paste.
 
-    None, where nobody asked, is no section. stops: exposure of all pictures.
+    None, where nobody asked, is no section. is_clean: whether the pictures are denoised.
     """
     if suggestions is None:
         return ""
@@ -56,7 +59,12 @@ def suggestion_section(
         else ""
     )
     shown = "".join(
-        _shown(x, before=k > 0, transform=transform, cd_per_unit=cd_per_unit)
+        _shown(
+            replace(x, without=denoised(x.without), with_it=denoised(x.with_it)) if is_clean else x,
+            before=k > 0,
+            transform=transform,
+            cd_per_unit=cd_per_unit,
+        )
         for k, x in enumerate(suggestions)
     )
     return (

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.images.blocks import block_pixels
+from lightpaint.images.denoise import Features
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.render import Stream, largest_pass, pass_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.signals import interruptible_between_pieces
 
@@ -41,6 +42,31 @@ class Surfaces:
 def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent) -> Surfaces:
     """Look at `scene` without its light."""
     return scene.while_loaded(lambda loaded: _surfaces(scene, loaded, seed, progress))
+
+
+def render_features(scene: Scene, *, seed: int = 0) -> Features:
+    """What a denoiser asks of `scene`: albedo and normals, as half floats can hold them."""
+    return scene.while_loaded(lambda loaded: _features(scene, loaded, seed))
+
+
+def _features(scene: Scene, loaded: Any, seed: int) -> Features:
+    import mitsuba as mi
+
+    height, width = scene.size
+    integrator = mi.load_dict({"type": "aov", "aovs": "a:albedo,n:sh_normal"})
+    spp = min(SAMPLES, largest_pass(height * width))
+    seed = pass_seed(seed, Stream.SURFACES, SAMPLES)
+    camera = scene.camera(loaded)
+    with interruptible_between_pieces():
+        image = mi.render(loaded, sensor=camera, integrator=integrator, spp=spp, seed=seed)
+    seen = np.nan_to_num(np.array(image)[..., -6:], nan=0, posinf=1, neginf=0)
+    length = np.linalg.norm(seen[..., 3:], axis=-1, keepdims=True)
+    normal = seen[..., 3:] / np.where(length > 0, length, 1)
+    return Features(*(_in_half(x) for x in (np.clip(seen[..., :3], 0, 1), normal)))
+
+
+def _in_half(image: Floats) -> Floats:
+    return image.astype(np.float16).astype(np.float32)
 
 
 def _surfaces(scene: Scene, loaded: Any, seed: int, progress: Progress) -> Surfaces:

@@ -10,6 +10,7 @@ profiles are taken off and put on again. And so a painting counts the same in ev
 """
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -62,20 +63,32 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
 def _difference(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
     """(h, w), in display values, largest of the channels; and what the file alone makes."""
     if picture.codes is None:
-        # It may have been painted on the EXR, or on the PNG, without what is brighter than white.
-        looks = template.image, template.transform.decode(template.shown)
+        # It may have been painted on an EXR, or on the PNG, without what is brighter than white.
+        looks = [*template.looks, template.transform.decode(template.shown)]
         found = [_difference_of_light(picture, look, template) for look in looks]
-        return max(found, key=lambda one: float((one <= ROUNDING).mean())), ROUNDING
+        return _closest(found, ROUNDING), ROUNDING
+    found = [_difference_of_codes(path, picture, look) for look in template.looks]
+    tolerance = LOSSY if picture.lossy else ROUNDING
+    return _closest(found, tolerance), tolerance
+
+
+def _closest(differences: Sequence[Floats], tolerance: float) -> Floats:
+    """Of several looks that it may have been painted on, the one that shows in most pixels."""
+    return max(differences, key=lambda one: float((one <= tolerance).mean()))
+
+
+def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
+    """As the painting's own display shows it."""
     transform = picture.transform
     assert transform is not None  # That of a file of integers is known.
-    mine, its = transform.encode(picture.image), transform.encode(template.image)
+    mine, its = transform.encode(picture.image), transform.encode(look)
     if picture.lossy:
         rough = np.asarray(mine - _compressed_like(path, its), np.float64)
         near, wide = (
             np.abs(box_mean(rough, radius)).max(axis=-1) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
         )
-        return np.minimum(near, wide), LOSSY
-    return np.abs(mine - its).max(axis=-1).astype(np.float64), ROUNDING
+        return np.asarray(np.minimum(near, wide))
+    return np.asarray(np.abs(mine - its).max(axis=-1), np.float64)
 
 
 def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:

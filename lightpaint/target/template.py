@@ -24,7 +24,16 @@ FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
 #: The files of a template: what says how it was made, what is painted on, what helps.
 ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
-NORMALS, DEPTH, MATTES, LIGHTS = "normals.exr", "depth.exr", "mattes", "lights"
+CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
+    "clean.exr",
+    "normals.exr",
+    "depth.exr",
+    "mattes",
+    "lights",
+)
+
+#: Those that are not pictures of single things.
+PLAIN = (LIGHT, SHOWN, CLEAN, ALBEDO, NORMALS, DEPTH, ABOUT)
 
 #: Longest template.json that is read, in bytes.
 MAX_ABOUT = 2**20
@@ -34,9 +43,11 @@ MAX_ABOUT = 2**20
 class Template:
     """The look that is painted over.
 
-    image: (h, w, 3) linear Rec.709. transform: how template.png shows it. scene: name of the file,
-    content: its hash (see `Scene.content`), sensor: what it is seen through.
-    albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
+    image: (h, w, 3) linear Rec.709, as it was rendered. transform: how template.png shows it.
+    scene: name of the file, content: its hash (see `Scene.content`), sensor: what it is seen
+    through. albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
+    clean: (h, w, 3), `image` without its grain, which template.png shows; None if that shows
+    `image` itself.
     """
 
     image: Floats
@@ -45,6 +56,7 @@ class Template:
     content: str = ""
     sensor: str = ""
     albedo: Floats | None = None
+    clean: Floats | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -52,9 +64,14 @@ class Template:
         return self.image.shape[0], self.image.shape[1]
 
     @property
+    def looks(self) -> list[Floats]:
+        """What may have been painted on, in linear light: what template.png shows comes first."""
+        return [self.image] if self.clean is None else [self.clean, self.image]
+
+    @property
     def shown(self) -> Floats:
         """The values in [0, 1] that template.png holds, rounded to its 16 bits."""
-        return np.round(self.transform.encode(self.image) * 65535) / 65535
+        return np.round(self.transform.encode(self.looks[0]) * 65535) / 65535
 
 
 @dataclass(frozen=True)
@@ -86,18 +103,30 @@ def write_template(
     depth: Floats,
     mattes: Mapping[str, Floats],
     lights: Mapping[str, Floats],
+    texts: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[Path]:
     """Write a template into `folder`, in place of an earlier one, wholly or not at all.
 
     Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
-    [0, 1]; lights: by name, (h', w', 3) linear, what each does alone.
+    [0, 1]; lights: by name, (h', w', 3) linear, what each does alone. texts: what pictures
+    say of themselves, under SHOWN and LIGHTS.
     """
+    said = texts or {}
     matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
     light_files = [f"{LIGHTS}/{name}.png" for name in file_names(lights)]
-    albedo = [] if template.albedo is None else [ALBEDO]
-    written = [LIGHT, SHOWN, *albedo, NORMALS, DEPTH, ABOUT, *matte_files, *light_files]
+    given = {ALBEDO: template.albedo, CLEAN: template.clean}
+    optional = [name for name, image in given.items() if image is not None]
+    written = [LIGHT, SHOWN, *optional, NORMALS, DEPTH, ABOUT, *matte_files, *light_files]
     with staged(folder, earlier_files(folder)) as stage:
-        write_look(stage / LIGHT, template.image, template.transform)
+        write_look(
+            stage / LIGHT,
+            template.image,
+            template.transform,
+            clean=template.clean,
+            texts=said.get(SHOWN),
+        )
+        if template.clean is not None:
+            write_rgb(stage / CLEAN, template.clean, attributes=said.get(SHOWN))
         if template.albedo is not None:
             write_rgb(stage / ALBEDO, template.albedo)
         write_rgb(stage / NORMALS, normals)
@@ -105,16 +134,16 @@ def write_template(
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(stage / file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
-            write_bytes(stage / file, _thumbnail(look, template.transform.name))
+            write_bytes(stage / file, _thumbnail(look, template.transform.name, said.get(LIGHTS)))
         write_text(stage / ABOUT, _about(template, written))
     return [folder / name for name in written]
 
 
-def _thumbnail(look: Floats, transform: str) -> bytes:
+def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) -> bytes:
     """A linear picture as PNG, whatever its brightness."""
     bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
     shown = ViewTransform(transform, float(np.clip(-np.log2(bright), -60, 60)))
-    return png_bytes(to_8_bit(shown.encode(look)))
+    return png_bytes(to_8_bit(shown.encode(look)), texts)
 
 
 def _about(template: Template, files: Iterable[str]) -> str:
@@ -135,13 +164,13 @@ def earlier_files(folder: Path) -> list[Path]:
         named = ()
     if named:
         return [folder / name for name in named if is_below(name)]
-    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    plain = [folder / name for name in PLAIN]
     return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
 
 
 def files_in_the_way(folder: Path) -> list[Path]:
     """What a template in `folder` may take the place of, an earlier one's files and others'."""
-    plain = [folder / name for name in (LIGHT, SHOWN, ALBEDO, NORMALS, DEPTH, ABOUT)]
+    plain = [folder / name for name in PLAIN]
     # What things and lights are called is not known yet.
     pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
     there = [*earlier_files(folder), *plain, *pictures]
@@ -150,14 +179,25 @@ def files_in_the_way(folder: Path) -> list[Path]:
 
 def template_files(folder: Path) -> list[Path]:
     """What is read of the template in `folder`."""
-    return [folder / name for name in (ABOUT, LIGHT, ALBEDO)]
+    return [folder / name for name in (ABOUT, LIGHT, CLEAN, ALBEDO)]
 
 
-def write_look(path: Path, image: Floats, transform: ViewTransform) -> Path:
-    """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG."""
+def write_look(
+    path: Path,
+    image: Floats,
+    transform: ViewTransform,
+    *,
+    clean: Floats | None = None,
+    texts: Mapping[str, str] | None = None,
+) -> Path:
+    """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG.
+
+    clean: what the PNG shows instead of `image`; texts: what it says of that.
+    """
     write_rgb(path, image)
     picture = path.with_suffix(".png")
-    write_png_16(picture, transform.encode(image), texts=_texts(transform))
+    shown = transform.encode(image if clean is None else clean)
+    write_png_16(picture, shown, texts=_texts(transform) | dict(texts or {}))
     return picture
 
 
@@ -167,16 +207,17 @@ def read_template(folder: Path) -> Template:
         about = _read_about(folder)
         transform = ViewTransform(about.view.name, about.view.stops)
         image = _read_picture(folder / LIGHT, about.size)
-        albedo = None
-        if (folder / ALBEDO).exists():
-            albedo = _read_picture(folder / ALBEDO, about.size)
+        albedo, clean = (
+            _read_picture(folder / name, about.size) if (folder / name).exists() else None
+            for name in (ALBEDO, CLEAN)
+        )
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
         # Its files are named as they are called in it.
         said = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
         raise TargetError(
             f"{folder} is no template: {one_line(said)}; make one with lightpaint template"
         ) from None
-    return Template(image, transform, about.scene, about.content, about.sensor, albedo)
+    return Template(image, transform, about.scene, about.content, about.sensor, albedo, clean)
 
 
 def _read_about(folder: Path) -> _About:

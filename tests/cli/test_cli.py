@@ -529,8 +529,9 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
     line = refused(tmp_path, "basis", room)
     assert "room.lights.toml is not TOML" in line
     assert "line 1" in line
-    # What has no use for lights does not read it.
-    succeed(tmp_path, "template", room, "--spp", 2, "-o", "t.exr")
+    # The look is the sum of the basis of these lights, which the first solve is to find.
+    assert "room.lights.toml is not TOML" in refused(tmp_path, "template", room, "-o", "t.exr")
+    succeed(tmp_path, "template", room, "--spp", 2, "-o", "t.exr", "--no-lights-file")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """comparison.png and the pictures in it: what is shown where, and at which exposure."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.png import png_bytes
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
@@ -22,7 +24,7 @@ from lightpaint.report.pictures import (
     coverage,
     diverging,
     importance_picture,
-    residual_limit,
+    residual_of,
     residual_picture,
     round_up,
     target_picture,
@@ -257,8 +259,11 @@ def test_residual_is_prediction_minus_target(make_basis: Any):
     offset = np.zeros((*SIZE, 3))
     offset[:12], offset[12:] = 0.2, -0.2
     predicted = solution.image + offset
-    assert residual_limit(solution, predicted, transform=ViewTransform()) == pytest.approx(0.2)
-    picture = residual_picture(solution, predicted, current, transform=ViewTransform(), limit=0.4)
+    missed = residual_of(solution, predicted, transform=ViewTransform())
+    assert missed.limit == pytest.approx(0.2)
+    assert missed.spoken == ""  # of images that have no noise
+    missed = replace(missed, limit=0.4)
+    picture = residual_picture(missed, solution, current, transform=ViewTransform())
     above, below = diverging(np.array([0.5, -0.5]))
     # The prediction is float64 here; sums of the luminance weights round in the last digits.
     np.testing.assert_allclose(picture[:12, :16], np.broadcast_to(above, (12, 16, 3)), rtol=1e-9)
@@ -271,11 +276,36 @@ def test_residual_is_prediction_minus_target(make_basis: Any):
 def test_residual_scale_is_never_finer_than_sight(make_basis: Any):
     solution = _look(make_basis)["solution"]
     almost = solution.image + 1e-7
-    assert residual_limit(solution, almost, transform=ViewTransform()) == 0.01
+    assert residual_of(solution, almost, transform=ViewTransform()).limit == 0.01
     # Three stops brighter on the display, an eighth of it can be seen: 0.00125, rounded up.
-    assert residual_limit(solution, almost, transform=ViewTransform("srgb", 3)) == pytest.approx(
-        0.002
-    )
+    brighter = residual_of(solution, almost, transform=ViewTransform("srgb", 3))
+    assert brighter.limit == pytest.approx(0.002)
+
+
+def test_a_residual_is_averaged_until_its_noise_does_not_show(make_basis: Any):
+    """What is missed by 0.1 in the middle third, under noise of 0.2 in every pixel."""
+    rng = np.random.default_rng(2)
+    height, width = 60, 90
+    noise = 0.2 * rng.standard_normal((1, height, width, 1)).repeat(3, -1)
+    other = 0.2 * rng.standard_normal((1, height, width, 1)).repeat(3, -1)
+    basis = make_basis(images=1 + noise, half_differences=other, emission=[[1, 1, 1]])
+    truth = np.zeros((height, width))
+    truth[:, 30:60] = 0.1
+    image = (1 - truth[..., None].repeat(3, -1)).astype(np.float32)
+    target = Target("third", image, np.ones((height, width), np.float32), everything=True)
+    # A locked light is shown as it is: the answer itself would be a little dimmer.
+    solution = solve(basis, target, constraints=Constraints.of({"light 0": {"lock": True}}))
+    missed = residual_of(solution, basis.mix(solution.weights), transform=ViewTransform())
+    assert missed.radius > 0
+    side = 2 * missed.radius + 1
+    assert missed.spoken == f", averaged over {side}x{side} pixels"
+    # Away from the edges of the third, which the average blurs: four standard errors of it.
+    flat = np.ones(width, bool)
+    for edge in (30, 60):
+        flat[edge - side : edge + side] = False
+    off = missed.values - truth
+    assert np.sqrt(np.square(off[:, flat]).mean()) < 1.5 * 0.2 / side
+    assert np.abs(missed.values).max() < 0.1 + 5 * 0.2 / side
 
 
 @pytest.mark.parametrize(

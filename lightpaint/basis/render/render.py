@@ -17,6 +17,7 @@ from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.surfaces import render_features
 from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples that choices of emitters are learned from before any counts.
@@ -76,7 +77,9 @@ def render_basis(
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
-    return render_all(scene, budget, seed, start, Keeper(keep), progress)
+    made = render_all(scene, budget, seed, start, Keeper(keep), progress)
+    known = None if start is None else start.features
+    return replace(made, features=known or render_features(scene, seed=seed))
 
 
 def memory_needed(scene: Scene) -> int:

@@ -41,6 +41,10 @@ NORMAL = NormalDist()
 #: Standard deviations beyond a bound from which on a normal tail is taken for an exponential one.
 FAR = 30.0
 
+#: Part of what the prediction's own noise should miss of any other picture: who misses less was
+#: given a sum of the basis itself, whose noise is the same and cancels.
+SAME_NOISE = 1e-4
+
 #: Steps in which it is decided how much of the noise to take out of M.
 SHARES = 8
 
@@ -204,9 +208,12 @@ def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
     """The share s that makes the expected excess of the objective least, in steps of SHARES.
 
     What is left of the bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which
-    grows as M_s = M − s N becomes smaller. least: M without all noise.
+    grows as M_s = M − s N becomes smaller. None of it where the target is made of this basis, as
+    a template is. least: M without all noise.
     """
     e, n = solution.equations, len(solution.weights)
+    if e.objective(solution.weights).sum() < SAME_NOISE * noise.objective_noise.sum():
+        return 0.0
     unbiased = NormalEquations(least, e.b - noise.drawn, noise.objective_noise)
     bias = answer_to(solution, unbiased) - solution.weights
     shares = np.linspace(0, 1, SHARES + 1)
