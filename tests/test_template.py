@@ -124,7 +124,7 @@ def test_nothing_painted_is_said_of_either(folder: Path):
 def test_where_each_light_takes_a_render_only_a_kept_basis_is_used(tmp_path: Path):
     """Of an integrator that has no one pass: a render of all lights, until there is a basis."""
     room = write_room(tmp_path)
-    how = ("--integrator", "volpath", "--spp", 4)
+    how = ("--integrator", "volpathmis", "--spp", 4)
     first = run(tmp_path, "template", room, *how)
     assert first.returncode == 0, first.stderr
     assert "each light takes a render of its own" in first.stderr

@@ -170,7 +170,7 @@ def test_writing_neither_solves_nor_sums_anew(
 
     count(solve_module, "_solution")
     count(reduced_problem, "_optima")
-    count(reweighted, "_fall")
+    count(solve_module, "descend")
     count(basis_module, "mix")
     count(Basis.__dict__["totals"], "func")
     # One that has kept nothing yet.
