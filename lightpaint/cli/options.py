@@ -16,7 +16,7 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
-from lightpaint.files import check_files, is_name, one_line
+from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -235,7 +235,8 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
     if output is not None and len(names) == 1:
         return [output]
     for name in names:
-        if not is_name(name):
+        # Names that are not UTF-8 are told by whoever reads the file that is called so.
+        if not is_name(name) and is_utf_8(Path(name)):
             how = "choose one with -o" if len(names) == 1 else "take it alone, with -o"
             raise OutputError(f"{one_line(repr(name))} is no name for a folder: {how}")
     if twice := sorted({name for name in names if names.count(name) > 1}):
