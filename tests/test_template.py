@@ -117,7 +117,7 @@ def test_only_paint_counts_whichever_look_it_was_painted_on(folder: Path, name: 
 
 def test_nothing_painted_is_said_of_either(folder: Path):
     for name in ("template.png", "template.exr", "clean.exr"):
-        with pytest.raises(TargetError, match=r"nothing in .* differs from the template"):
+        with pytest.raises(TargetError, match=r"nothing in .* differs from|is the template itself"):
             lp.read_target(folder / "template" / name, template=folder / "template")
 
 

@@ -15,7 +15,6 @@ from lightpaint.basis import basis as basis_module
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting import reweighted
 from lightpaint.lighting import solve as solve_module
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.constraints import reduced_problem
