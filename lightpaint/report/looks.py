@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.images.denoise import DENOISED_KEY, Features, denoised, how_denoised
-from lightpaint.lighting.lighting import Lighting, combine
 
 #: More lights than this have their thumbnails as they are, which hundreds of them need not wait
 #: for: a thumbnail is small, and averages much of its noise.
@@ -35,7 +34,7 @@ class Looks:
         larger: Features | None = None,
     ) -> "Looks":
         """Without their grain. larger: of a verification that has another size than the basis."""
-        present = combine(basis, Lighting.present(basis)).image
+        present = basis.present_look
         features = basis.features
         if verified is not None:
             verified = denoised(verified, larger or features)
@@ -46,7 +45,7 @@ class Looks:
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "Looks":
         """As they were rendered."""
-        present = combine(basis, Lighting.present(basis)).image
+        present = basis.present_look
         return cls(present, predicted, verified, {})
 
     @property
