@@ -98,6 +98,7 @@ def _few(problem: Problem) -> Problem:
         half_differences=planes(basis.half_differences),
         emitters_seen=cut(basis.emitters_seen),
         learned=None,
+        features=None,
     )
     its = replace(
         target,
