@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.images.blocks import block_pixels
+from lightpaint.images.blocks import block_mean, block_pixels
 from lightpaint.images.denoise import Features
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, largest_pass, pass_seed
@@ -52,14 +52,16 @@ def render_features(scene: Scene, *, seed: int = 0) -> Features:
 def _features(scene: Scene, loaded: Any, seed: int) -> Features:
     import mitsuba as mi
 
-    height, width = scene.size
+    film = scene.film
     integrator = mi.load_dict({"type": "aov", "aovs": "a:albedo,n:sh_normal"})
-    spp = min(SAMPLES, largest_pass(height * width))
+    pixels = scene.size[0] * scene.size[1] * film.block_pixels
+    spp = min(max(SAMPLES // film.block_pixels, 1), largest_pass(pixels))
     seed = pass_seed(seed, Stream.SURFACES, SAMPLES)
     camera = scene.camera(loaded)
     with interruptible_between_pieces():
         image = mi.render(loaded, sensor=camera, integrator=integrator, spp=spp, seed=seed)
     seen = np.nan_to_num(np.array(image)[..., -6:], nan=0, posinf=1, neginf=0)
+    seen = block_mean(seen, film.block)
     length = np.linalg.norm(seen[..., 3:], axis=-1, keepdims=True)
     normal = seen[..., 3:] / np.where(length > 0, length, 1)
     return Features(*(_in_half(x) for x in (np.clip(seen[..., :3], 0, 1), normal)))
