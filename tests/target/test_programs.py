@@ -129,7 +129,8 @@ def read(path: Path) -> lp.Target:
 
 
 def lights(basis: lp.Basis, target: lp.Target) -> np.ndarray:
-    return np.array(list(lp.solve(basis, target).lighting.emission.values()), np.float64)
+    solution = lp.solve(basis, target, literal=True)
+    return np.array(list(solution.lighting.emission.values()), np.float64)
 
 
 def test_gimp(folder: Path, basis: lp.Basis) -> None:
