@@ -1,5 +1,6 @@
 """A template is the sum of the basis that is solved with, and is painted on without its grain."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,14 @@ from lightpaint.errors import TargetError
 from lightpaint.images.denoise import DENOISED_KEY
 from lightpaint.images.exr import read_parts
 from lightpaint.target.template import read_template
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The same room is rendered elsewhere, with more samples."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIGHTPAINT_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="module")

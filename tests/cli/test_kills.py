@@ -29,7 +29,9 @@ def test_the_earlier_or_the_new(
 ) -> None:
     outcome = stage.killed(until, number)
     assert outcome.kind in ("earlier", "new"), outcome
-    if number == signal.SIGTERM:
+    if outcome.code == 0:  # on a busy machine it may come when all is done
+        assert outcome.kind == "new"
+    elif number == signal.SIGTERM:
         assert outcome.code == 143
         assert outcome.kind == "earlier"
         assert outcome.said.endswith(": interrupted\n")
