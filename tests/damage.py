@@ -25,7 +25,7 @@ from damage_readers import Reader
 from lightpaint.errors import LightpaintError
 
 MEMORY = 2 * 2**30
-SECONDS = 30
+SECONDS = 10
 
 #: Numbers that headers lie with.
 LIES = (0, 1, 2, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)

@@ -8,6 +8,7 @@ same text is gone through with bounds, and each of these is a SceneError of one 
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -111,17 +112,20 @@ class _Walk:
     def __init__(self, parameters: Mapping[str, str]) -> None:
         self.parameters = {f"${name}": value for name, value in parameters.items()}
         self.bytes = self.elements = self.objects = self.includes = self.looked_up = 0
+        # Files may be included thousands of times: each is looked up and read once.
+        self.contents: dict[Path, bytes] = {}
+        self.true_path = cache(os.path.realpath)
 
     def file(self, path: Path, resolver: Any, depth: int, chain: tuple[Path, ...]) -> None:
         """depth: of the element that includes it; chain: the files that include each other."""
         import mitsuba as mi
 
-        if os.path.realpath(path) in map(os.path.realpath, chain):
+        if self.true_path(path) in map(self.true_path, chain):
             which = "itself" if path == chain[-1] else f"{path}, which includes it in turn"
             raise SceneError(f"{chain[-1]} includes {which}: this has no end")
         chain = (*chain, path)
         try:
-            data = _as_utf8(read_bytes(path, "scene file", SceneError, limit=MAX_XML))
+            data = self._read(path)
         except SceneError as error:
             lead = f"{chain[-2]}: " if len(chain) > 1 else ""
             raise SceneError(f"{lead}{error}") from None
@@ -155,6 +159,12 @@ class _Walk:
                 if opened <= depth:
                     return
 
+    def _read(self, path: Path) -> bytes:
+        if path not in self.contents:
+            raw = read_bytes(path, "scene file", SceneError, limit=MAX_XML)
+            self.contents[path] = _as_utf8(raw)
+        return self.contents[path]
+
     def _count(self, tag: bytes, scene: Path) -> None:
         self.elements += 1
         self.objects += tag in _OBJECTS
@@ -183,12 +193,13 @@ class _Walk:
             resolver.prepend(_resolved(resolver, given["value"]))
         elif tag in (b"include", b"spectrum") and given.get("filename"):
             file = Path(_resolved(resolver, given["filename"]))
-            if not file.exists():
-                return  # which is for Mitsuba to say
-            try:
-                file_length(file, "file to read", SceneError)
-            except SceneError as error:
-                raise ValueError(str(error)) from None
+            if file not in self.contents:
+                if not file.exists():
+                    return  # which is for Mitsuba to say
+                try:
+                    file_length(file, "file to read", SceneError)
+                except SceneError as error:
+                    raise ValueError(str(error)) from None
             if tag == b"include":
                 self.file(file, resolver, depth, chain)
 
