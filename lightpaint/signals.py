@@ -1,13 +1,19 @@
 """What asks a process to end: heard as an interrupt, and held back where that would do harm."""
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 #: Ctrl-C; `kill`, docker stop, Slurm, timeout; a terminal that closes.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+#: Seconds after which a signal that was lost is sent again.
+SOON_S = 0.01
 
 
 @contextmanager
@@ -32,10 +38,37 @@ def hearing(came: list[int]) -> Iterator[None]:
         if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN
     }
     try:
-        yield
+        with _sent_again(came):
+            yield
     finally:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+@contextmanager
+def _sent_again(came: list[int]) -> Iterator[None]:
+    """Send a signal again whose KeyboardInterrupt Python has dropped.
+
+    It drops what is raised in a destructor or in the callback of a weak reference, and a signal
+    may come just then. came: the signals that have been heard.
+    """
+    reported, timers = sys.unraisablehook, []
+
+    def report(dropped: Any) -> None:
+        if not (came and isinstance(dropped.exc_value, KeyboardInterrupt)):
+            reported(dropped)
+            return
+        timers.append(threading.Timer(SOON_S, os.kill, (os.getpid(), came[-1])))
+        timers[-1].daemon = True
+        timers[-1].start()
+
+    sys.unraisablehook = report
+    try:
+        yield
+    finally:
+        sys.unraisablehook = reported
+        for timer in timers:
+            timer.cancel()
 
 
 @contextmanager

@@ -1,6 +1,8 @@
 """Ctrl-C between two pieces of work, and whose handler stands meanwhile."""
 
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -97,3 +99,27 @@ def test_what_ends_a_process_otherwise_waits_too():
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_comes_in_a_destructor_is_not_lost(number: signal.Signals) -> None:
+    """Python drops exceptions that are raised there."""
+    code = f"""
+import signal, sys, time
+from lightpaint.signals import hearing
+
+class Ending:
+    def __del__(self):
+        signal.raise_signal({int(number)})
+
+came = []
+with hearing(came):
+    try:
+        Ending()
+        time.sleep(20)
+    except KeyboardInterrupt:
+        sys.exit(128 + came[0])
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
+    assert done.returncode == 128 + number
+    assert done.stderr == b""
