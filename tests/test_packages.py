@@ -52,6 +52,8 @@ def test_wheel_solves_the_demo_in_an_empty_folder(built: Path, tmp_path: Path):
     done = lightpaint(folder, where, "demo", "--spp", "4")
     assert done.returncode == 0, done.stderr
     made = folder / "lightpaint-demo"
+    report = f"Open {Path('lightpaint-demo', 'evening', 'report.html')} in a browser. "
+    assert done.stdout.splitlines()[-3:-1] == ["", f"{report}Then paint your own:"]
     results = {"lighting.json", "relit.xml", "predicted.exr", "verified.exr", "comparison.png"}
     results |= {"report.html", "report.json", "result.json"}
     assert {file.name for file in (made / "evening").iterdir()} == results

@@ -123,7 +123,8 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> int:
     scene = SceneFile(str(made.scene), variant=variant)
     painting, settings = Painting(str(made.painting)), replace(settings, command=command)
     solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
-    terminal.write(f"\nOpen {made.answer / 'report.html'} in a browser. Then paint your own:")
+    terminal.write("")
+    terminal.write(f"Open {made.answer / 'report.html'} in a browser. Then paint your own:")
     terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
     return 0
 

@@ -15,6 +15,7 @@ from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target
 from lightpaint.target.template import (
+    CLEAN,
     LIGHT,
     SHOWN,
     Template,
@@ -186,7 +187,8 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     importance = painted_where(path, picture, template)
     share = float((importance > 0).mean())
     if share == 0:
-        if path.resolve() == Path(reading.painted_on).resolve():
+        folder = Path(reading.painted_on).parent
+        if path.resolve() in [(folder / name).resolve() for name in (LIGHT, SHOWN, CLEAN)]:
             raise TargetError(f"{path} is the template itself: give what was painted over it")
         raise TargetError(
             f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
