@@ -10,6 +10,7 @@
     ├── TargetError      a painting or mask that cannot be solved for
     │   └── SizeError    … because its size differs from the basis
     ├── ConstraintError  what is asked of a light, and cannot be understood or had
+    ├── PaintError       what a page says to the painter, and cannot be understood or done
     ├── LightingError    a lighting.json, or weights that are none
     │   └── UnknownLightError … or a name that none of its lights has; a KeyError as well
     └── OutputError      a place that cannot be written
@@ -65,6 +66,10 @@ class SizeError(TargetError):
 
 class ConstraintError(LightpaintError):
     """Something asked of a light that means nothing, contradicts itself, or cannot be had."""
+
+
+class PaintError(LightpaintError):
+    """A message to the painter that means nothing, or a session that cannot be had."""
 
 
 class LightingError(LightpaintError):

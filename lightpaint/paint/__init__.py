@@ -1,0 +1,1 @@
+"""Paint light, and see the answer while the brush moves."""
