@@ -28,14 +28,10 @@ from lightpaint.lighting.painting import (
     weight_of_rest,
     what_counts,
 )
-from lightpaint.lighting.pull import to_colors, to_present
+from lightpaint.lighting.pull import pull_of
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
-
-#: Strength of the pull to the present colours: of what a light would do to the picture by changing
-#: its hue, this much is missed, in proportion to what is painted.
-GENTLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -177,42 +173,27 @@ class Problem:
         """The equations that the weights are to solve, noise taken out where that was asked."""
         return self.equations if self.corrected is None else self.corrected
 
-    @property
-    def brightness(self) -> float:
-        """By how much the view transform brightens the squares of light."""
-        transform = self.fit.transform
-        return 1.0 if transform is None else float(4.0**transform.stops)
+    @cached_property
+    def painted_share(self) -> float:
+        """Importance of all that is painted, beside the number of pixels."""
+        painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
+        return painted / sum(x.importance.size for x in self.views.targets)
 
     @property
     def pull_strength(self) -> float:
         """That of the pull to the present, of light as bright as the view transform makes it."""
-        return self.constraints.prefer_current * self.brightness
-
-    @cached_property
-    def color_strength(self) -> float:
-        """That of the pull to the present colours: in proportion to what is painted."""
-        if self.fit.colors != "gentle":
-            return 0.0
-        painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
-        pixels = sum(x.importance.size for x in self.views.targets)
-        return GENTLE * self.brightness * painted / pixels
+        return self.constraints.prefer_current * self.fit.brightness
 
     @property
     def keeps_color(self) -> Bools:
         """(n,), the lights that are pulled to their colour: free to leave it, and seen to."""
-        free = {k for knob in self.full.knobs if knob.is_free for k in knob.lights}
-        its: Bools = np.array([k in free for k in range(len(self.basis.lights))], dtype=bool)
-        return its & self.equations.reached.any(axis=1)
+        return self.full.is_free & self.equations.reached.any(axis=1)
 
     @cached_property
     def pull(self) -> NormalEquations | None:
         """What pulls to the present, or to the present colours, adds; None where none is asked."""
-        added = []
-        if self.pull_strength:
-            added.append(to_present(self.basis, self.pull_strength))
-        if self.color_strength:
-            added.append(to_colors(self.basis, self.color_strength, self.keeps_color))
-        return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
+        prefer, share = self.constraints.prefer_current, self.painted_share
+        return pull_of(self.basis, self.fit, prefer, share, self.keeps_color)
 
     def pulled(self, equations: NormalEquations) -> NormalEquations:
         """`equations` with what pulls at the weights, if something does."""
