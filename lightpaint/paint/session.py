@@ -20,6 +20,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
@@ -35,6 +36,8 @@ from lightpaint.paint.steps import Patch, Pixels, Region, Step, painted_by
 from lightpaint.paint.store import Store
 from lightpaint.paint.told import lights_fields
 from lightpaint.paint.wishes import Wishes
+from lightpaint.report.sentences import what_is_missed
+from lightpaint.report.verdict import headline
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
@@ -67,6 +70,27 @@ class Moment:
         if self.settings.corrects_noise(is_known=self.basis.knows_noise):
             solution = correct_noise(solution)
         return solution
+
+    def beyond(self) -> tuple[list[str], npt.NDArray[np.uint8]]:
+        """What no light can make of the painting: sentences, and a picture (h, w) of where.
+
+        The best with nothing else asked: nothing held, any colour, no constraints. 255 stands for
+        what is missed by all that a display has.
+        """
+        height, width = self.basis.size
+        if self.target is None:
+            return ["Nothing is painted yet."], np.zeros((height, width), np.uint8)
+        solution = self.solution()
+        assert solution is not None
+        [analysis] = analyse(solution)
+        free = replace(self.settings, hold=0.0, colors="free")
+        best = solution_of(Problem.of(self.basis, self.target, fit=free))
+        transform = best.problem.fit.transform or ViewTransform()
+        shown = transform.encode(self.basis.mix(best.weights))
+        missed = np.abs(shown - transform.encode(self.target.image)).max(axis=-1)
+        missed = np.where(self.target.importance > 0, np.clip(missed, 0, 1), 0)
+        said = [headline(analysis.seen), *what_is_missed(analysis.diagnosis)]
+        return said, np.round(255 * missed).astype(np.uint8)
 
 
 class Session:
@@ -117,6 +141,16 @@ class Session:
     def is_painted(self) -> bool:
         """Whether any pixel counts."""
         return bool(self.importance.any())
+
+    @property
+    def stroke(self) -> int:
+        """Number of the last stroke that was heard of."""
+        return self._stroke
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a stroke, or a slider, is not done yet."""
+        return bool(self._open) or self._moved is not None
 
     @property
     def target(self) -> Target | None:
@@ -279,7 +313,10 @@ class Session:
         return self.image[where].copy(), self.importance[where].copy()
 
     def _close(self, label: str) -> None:
-        """Make a step of the stroke that is open, if one is."""
+        """Make a step of the stroke that is open, if one is; a slider that was left moves back."""
+        if self._moved is not None:
+            self.wishes, self._moved = self._moved, None
+            self._asks()
         if not self._open:
             return
         region = _around([one for one, _ in self._open])
