@@ -66,6 +66,13 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="leave the lights file beside the scene alone",
     )
+    parser.add_argument(
+        "--no-group-alike",
+        dest="group_alike",
+        action="store_false",
+        help="adjust emitters without names one by one, also where more than 24 are alike "
+        "(default: those are one light)",
+    )
 
 
 def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:

@@ -89,6 +89,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
             "groups": _groups(options.groups),
             "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
+            "group_alike": options.group_alike,
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **how}
     loading["integrator"] = options.integrator

@@ -41,7 +41,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
                 "" if light.is_fixed else whole.color,
                 *whole.amounts[: len(amounts)],
             )
-        for member in light.members:
+        # Of many that nobody has named one row says all.
+        for member in () if light.is_found else light.members:
             its = photometry_of(member, cd_per_unit)
             table.row(
                 member.name if single else f"  {member.name}",
