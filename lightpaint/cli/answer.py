@@ -1,5 +1,6 @@
 """What `lightpaint solve` prints of an answer: for people, or with everything there is."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +12,7 @@ from lightpaint.cli.tables import spoken_agreement
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.report.measures import energy_shares
+from lightpaint.report.pictures import spoken_view
 from lightpaint.report.sentences import (
     how_sure,
     partly_reached,
@@ -22,6 +24,7 @@ from lightpaint.report.sentences import (
 )
 from lightpaint.results import Look
 from lightpaint.screen import some_names, some_of
+from lightpaint.settings import Settings
 
 Table = Literal["short", "full"]
 
@@ -75,6 +78,15 @@ def _sentences(look: Look, table: Table) -> list[str]:
     if look.uncertainty is not None:
         told.append(how_sure(look.basis, look.solution, look.uncertainty))
     return told
+
+
+def spoken_settings(settings: Settings) -> str:
+    """What is used, said or by default: `space display, hold 1, ...`."""
+    told = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    transform = told.pop("transform")
+    told |= {"view": transform and spoken_view(transform), "command": None}
+    said = {name: value for name, value in told.items() if value not in (None, "")}
+    return ", ".join(f"{name} {value}" for name, value in said.items() if value is not False)
 
 
 def how_it_was_meant(look: Look) -> str:

@@ -75,10 +75,10 @@ def report_numbers(
         "lights": _lights(basis, solution, uncertainty),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
         "uncertainty": None if uncertainty is None else _sure(basis, solution, uncertainty),
-        "verification": None if verification is None else _verification(verification),
+        "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggested(suggestions, solution.lighting.cd_per_unit),
     }
-    return json.dumps(_finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _basis(basis: Basis) -> dict[str, Any]:
@@ -106,8 +106,9 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
 
 
 def _seen(seen: Seen) -> dict[str, Any]:
-    """Mean CIEDE2000 over what was painted."""
-    return {"delta_e": seen.delta_e, "noise": seen.noise, "asked": seen.asked}
+    """Mean CIEDE2000 over what was painted, and what of that has come about."""
+    names = ("delta_e", "noise", "asked", "share_met")
+    return {name: getattr(seen, name) for name in names}
 
 
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
@@ -190,7 +191,8 @@ def _sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[st
     }
 
 
-def _verification(v: Verification) -> dict[str, Any]:
+def verification_numbers(v: Verification) -> dict[str, Any]:
+    """Whether render and prediction agree, and how far they are apart."""
     height, width = v.verified.size
     return {
         "agrees": v.agrees,
@@ -220,13 +222,13 @@ def _suggested(
     ]
 
 
-def _finite(told: Any) -> Any:
+def finite(told: Any) -> Any:
     """The same without what there is none of, and without NumPy's numbers."""
     if isinstance(told, Mapping):
-        held = {key: _finite(value) for key, value in told.items()}
+        held = {key: finite(value) for key, value in told.items()}
         return {key: value for key, value in held.items() if value is not None}
     if isinstance(told, list | tuple):
-        return [_finite(value) for value in told]
+        return [finite(value) for value in told]
     if isinstance(told, np.generic):
         told = told.item()
     return None if isinstance(told, float) and not math.isfinite(told) else told
