@@ -79,8 +79,8 @@ def colors_section(choices: Choices) -> str:
     return (
         "<section><h2>What colours cost</h2>"
         "<p>How near the lights would come if they were freer, or less free, to change their "
-        "colour, with all else as it is. A quick look; <code>--colors</code> solves with "
-        f"another.</p>{table(HEADS, rows, kind='choices')}</section>"
+        "colour, with all else as it is. A quick look; <code>colors</code> says which to "
+        f"solve with.</p>{table(HEADS, rows, kind='choices')}</section>"
     )
 
 
