@@ -14,6 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -22,6 +23,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.diagnosis import maps_limit
+from lightpaint.report.meant import meaning_of
 from lightpaint.report.measures import (
     brighter_as_allowed,
     codes_missed,
@@ -51,6 +53,7 @@ def report_numbers(
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
+    color_choices: Choices = (),
 ) -> str:
     """JSON of the numbers of `report_page`, whose arguments these are."""
     verified = None if verification is None else verification.verified.image
@@ -71,6 +74,8 @@ def report_numbers(
             "residual_pixels": 2 * residual.radius + 1,
         },
         "seen": _seen(seen or what_is_seen(solution, predicted)),
+        "meant": meaning_of(solution),
+        "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
         "fit": _fit(solution, predicted, unconstrained),
         "lights": _lights(basis, solution, uncertainty),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
@@ -109,6 +114,14 @@ def _seen(seen: Seen) -> dict[str, Any]:
     """Mean CIEDE2000 over what was painted, and what of that has come about."""
     names = ("delta_e", "noise", "asked", "share_met")
     return {name: getattr(seen, name) for name in names}
+
+
+def _choice(choice: ColorChoice) -> dict[str, Any]:
+    """What a choice of colours comes to, and the light that it would change most."""
+    told: dict[str, Any] = {"delta_e": choice.delta_e}
+    if choice.light:
+        told |= {"light": choice.light, "before": choice.before, "color": choice.color}
+    return told
 
 
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
