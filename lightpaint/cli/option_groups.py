@@ -66,6 +66,13 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="leave the lights file beside the scene alone",
     )
+    parser.add_argument(
+        "--no-group-alike",
+        dest="group_alike",
+        action="store_false",
+        help="adjust emitters without names one by one, also where more than 24 are alike "
+        "(default: those are one light)",
+    )
 
 
 def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
@@ -193,4 +200,29 @@ def add_force(parser: argparse.ArgumentParser) -> None:
         "--force",
         action="store_true",
         help="replace results of something else, or that were changed by hand (default: refuse)",
+    )
+
+
+def add_manner(parser: argparse.ArgumentParser) -> None:
+    """How results are said, and what beside them."""
+    parser.add_argument(
+        "--json",
+        dest="as_json",
+        action="store_true",
+        help="print the results as one JSON document on stdout, for other programs",
+    )
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "-q",
+        "--quiet",
+        dest="is_quiet",
+        action="store_true",
+        help="neither progress nor remarks: only results and errors",
+    )
+    group.add_argument(
+        "-v",
+        "--verbose",
+        dest="is_verbose",
+        action="store_true",
+        help="also what was used, and how long each stage took",
     )

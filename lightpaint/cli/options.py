@@ -14,6 +14,7 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
+from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
@@ -34,8 +35,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
     output = Path(asked["output"]) if asked.get("output") else None
     match options.command:
         case "lights":
-            unit = options.cd_per_unit
-            return {"scene": scene_of(options), "as_json": options.json, "cd_per_unit": unit}
+            return {"scene": scene_of(options), "cd_per_unit": options.cd_per_unit}
         case "basis":
             output = output or Path(Path(options.scene).stem + ".basis.exr")
             return {"scene": scene_of(options), "output": output, "settings": settings}
@@ -52,7 +52,8 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             output = output or Path("lightpaint-demo")
             return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
-            return {"jobs": jobs_of(options, settings), "table": options.table}
+            wanted = Wanted(options.max_miss, options.min_fit)
+            return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
         case "relight":
             scene = scene_of(options, is_to_solve=False, use_lights_file=False)
             paths = list(map(Path, options.lightings))
@@ -88,6 +89,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
             "groups": _groups(options.groups),
             "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
+            "group_alike": options.group_alike,
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **how}
     loading["integrator"] = options.integrator

@@ -8,6 +8,7 @@ from lightpaint.cli.option_groups import (
     add_cache,
     add_force,
     add_lights,
+    add_manner,
     add_output,
     add_sampling,
     add_scene,
@@ -18,8 +19,14 @@ from lightpaint.cli.option_groups import (
     add_view_transform,
 )
 from lightpaint.cli.order import CommandParser, Parser
-from lightpaint.cli.solve_options import add_constraints, add_method, add_paintings
+from lightpaint.cli.solve_options import add_constraints, add_method, add_paintings, add_wanted
 from lightpaint.version import __version__
+
+#: What a script asks.
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 done, but not as asked (verify disagrees, --max-miss, --min-fit); "
+    "2 an error that you can mend, in one line; 130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
+)
 
 
 def command_parser() -> argparse.ArgumentParser:
@@ -33,9 +40,10 @@ def command_parser() -> argparse.ArgumentParser:
         dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
     )
     for name, (about, add_options) in _COMMANDS.items():
-        add_options(
-            commands.add_parser(name, help=about, description=about[0].upper() + about[1:] + ".")
-        )
+        said = about[0].upper() + about[1:] + "."
+        its = commands.add_parser(name, help=about, description=said, epilog=EXIT_CODES)
+        add_options(its)
+        add_manner(its)
     return parser
 
 
@@ -43,7 +51,6 @@ def _lights(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
     add_unit(parser)
-    parser.add_argument("--json", action="store_true", help="as JSON, for other programs")
 
 
 def _basis(parser: argparse.ArgumentParser) -> None:
@@ -92,6 +99,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         "with their radiometry, and how sure they are (default: %(default)s)",
     )
     add_method(parser)
+    add_wanted(parser)
     add_unit(parser)
     add_lights(parser)
     parser.add_argument(

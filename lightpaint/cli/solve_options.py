@@ -135,6 +135,24 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_wanted(parser: argparse.ArgumentParser) -> None:
+    """What a script asks of the answer."""
+    parser.add_argument(
+        "--max-miss",
+        type=arguments.number(" of ΔE", may_be_zero=True),
+        metavar="DE",
+        help="exit with 1 if an answer misses more than this mean ΔE over what was painted, as "
+        "its first line says it; results are written all the same",
+    )
+    parser.add_argument(
+        "--min-fit",
+        type=arguments.number(" as a share", may_be_zero=True, most=1),
+        metavar="SHARE",
+        help="exit with 1 if less than this share, 0 to 1, of what was asked has come about: 1 − "
+        "that mean ΔE / the ΔE as the scene is now",
+    )
+
+
 def add_constraints(parser: argparse.ArgumentParser) -> None:
     """What is asked of the lights, as in the lights file and before it."""
     group = parser.add_argument_group(

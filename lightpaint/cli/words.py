@@ -38,6 +38,7 @@ OPTIONS = {
 
 #: What is spelled otherwise than by an option and a value.
 SPELLINGS = {
+    "group_alike=False": "--no-group-alike",
     "find=False": "--no-template",
     "noise_correction=False": "--no-correct-noise",
     "use_cache=False": "--no-cache",

@@ -12,6 +12,7 @@ from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.target.own import painted_of
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target
 from lightpaint.target.template import (
@@ -99,7 +100,7 @@ def read_target(
     # Pixels that the file does not store were not painted, whatever a mask says.
     there = picture.finite if picture.stored is None else picture.finite & picture.stored
     counted = np.where(there, 1 if importance is None else importance, 0)
-    image = picture.image
+    image, own = picture.image, painted_of(picture.attributes, reading.path)
     if paint == "light":
         image, counted, note = _lit(reading, counted)
     else:
@@ -115,9 +116,10 @@ def read_target(
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
         transform=reading.transform,
-        through_view=picture.transform is not None,
+        through_view=picture.transform is not None or (own is not None and own.through_view),
         # A layer that was saved alone lay over something; what a mask leaves out does not count.
         over_look=made is not None
+        or (own is not None and own.over_look)
         or (picture.transform is not None and picture.alpha is not None and mask is None),
         files=(
             reading.path,
@@ -158,6 +160,9 @@ def _opened(
         # It was painted on something else, and so was not shown through its transform either.
         made, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=asked)
+    own = painted_of(picture.attributes, path)
+    if own is not None:
+        otherwise = own.transform
     shown = picture.transform or (otherwise if asked.is_open else asked.over(otherwise))
     return _Reading(path, picture, made, folder, shown, notes)
 
