@@ -13,6 +13,7 @@ from lightpaint.cli.answer import Table, show_look, spoken_settings
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
+from lightpaint.cli.painter import paint as paint
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
