@@ -44,7 +44,9 @@ Region: TypeAlias = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Hello:
-    """The first message of a page, and again after a dropped connection. Answered by `state`."""
+    """The first message of a page, and again after a dropped connection. Answered by `state`, or
+    by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+    """
 
     version: int
 

@@ -15,7 +15,7 @@ import { Stage } from "./ui/stage.js";
 import { Store } from "./ui/store.js";
 import { Ask, ToolBar, ToolOptions } from "./ui/toolbar.js";
 import { TopBar } from "./ui/topbar.js";
-import { AnswerLine, TruthPanel } from "./ui/truth.js";
+import { AnswerLine, Here, TruthPanel } from "./ui/truth.js";
 
 /** @typedef {import("./ui/engine.js").Host} Host */
 /** @typedef {import("./ui/engine.js").Engine} Engine */
@@ -89,14 +89,14 @@ function Painter({ hands, root }) {
     <main class=${`middle ${ui.side ? "" : "is-wide"}`} aria-label="Painter">
       ${!ui.readonly && html`<${ToolOptions} ui=${ui} hands=${hands} />`}
       <${Banner} ui=${ui} hands=${hands} />
-      <${Stage} ui=${ui} hands=${hands} />
-      <${Working} ui=${ui} />
+      <div class="view"><${Stage} ui=${ui} hands=${hands} />
+        <${Toasts} ui=${ui} hands=${hands} /></div>
+      <div class="status"><${Here} ui=${ui} /><${Working} ui=${ui} /></div>
       <${AnswerLine} ui=${ui} hands=${hands} />
       <${Looks} ui=${ui} hands=${hands} />
     </main>
     ${ui.side && html`<${Side} ui=${ui} hands=${hands} />`}
     <${Dialogs} ui=${ui} hands=${hands} />
-    <${Toasts} ui=${ui} hands=${hands} />
     <${Tips} root=${root} />`;
 }
 

@@ -22,7 +22,7 @@ export function Button({ icon, label, tip, keys, on, disabled, primary, act, cla
   ].filter(Boolean).join(" ");
   const hint = tip ?? (keys ? label : undefined);
   return html`<button type="button" class=${kind} disabled=${disabled} onClick=${act}
-    aria-label=${label ? undefined : tip} aria-pressed=${on === undefined ? undefined : String(on)}
+    aria-label=${label && label.length > 1 ? undefined : tip} aria-pressed=${on === undefined ? undefined : String(on)}
     aria-keyshortcuts=${keys} data-tip=${hint} data-keys=${keys}>
     ${icon && html`<${Icon} name=${icon} />`}${label && html`<span>${label}</span>`}
   </button>`;
@@ -104,7 +104,7 @@ export function Number_(props) {
       disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)} />
-    ${unit && html`<span class="unit">${unit}</span>`}
+    ${unit !== undefined && html`<span class="unit">${unit}</span>`}
   </label>`;
 }
 
@@ -136,7 +136,7 @@ export function Slider(props) {
       onChange=${(/** @type {any} */ event) => moved(event, true)}
       onDblClick=${() => rest !== undefined && change(rest, true)} />
     ${!plain && html`<${Number_} label=${label} hidden value=${value} least=${least} most=${most}
-      step=${step} digits=${digits} unit=${unit} disabled=${disabled}
+      step=${step} digits=${digits} unit=${unit ?? ""} disabled=${disabled}
       change=${(/** @type {number} */ made) => change(made, true)} />`}
   </div>`;
 }

@@ -2,6 +2,7 @@
 
 import { html, useState } from "../vendor/preact.js";
 import { Button, Check, Choice, Dialog, Number_ } from "./controls.js";
+import { number } from "./format.js";
 import { KEYS } from "./keys.js";
 
 /** @typedef {import("./model.js").Ui} Ui */
@@ -95,8 +96,7 @@ function SettingsDialog({ ui, hands, close }) {
     { value: "hold", label: "Keep", tip: "What is not painted stays near the present look" },
     { value: "go", label: "Let go", tip: "What is not painted may become anything" }];
   return html`<${Dialog} title="How the painting is answered" close=${close} class="settings">
-    <${Row} title="What is not painted" is=${meant.hold === undefined ? "" : meant.hold
-      ? `is kept near the present look, ${meant.hold} times as much as the paint` : "is let go"}>
+    <${Row} title="What is not painted" is=${kept(meant.hold)}>
       <${Choice} label="What is not painted" value=${manner} choices=${holds}
         change=${(/** @type {string} */ to) => set("hold")({ auto: null, hold: hold || 1, go: 0 }[to])} />
       ${manner === "hold" && html`<${Number_} label="Strength" value=${hold} least=${0.01} most=${100}
@@ -120,6 +120,13 @@ function SettingsDialog({ ui, hands, close }) {
       <${Number_} label="Use at most" value=${settings.sparse ?? null} least=${1} digits=${0}
         most=${ui.lights.length || 1} empty="all" unit="lights" change=${set("sparse")} /></${Row}>
   </${Dialog}>`;
+}
+
+/** @param {number | null | undefined} hold */
+function kept(hold) {
+  if (hold === undefined || hold === null) return "";
+  const much = hold === 1 ? "" : `, ${number(hold)} times as firmly as usual`;
+  return hold ? `is kept near the present look${much}` : "is let go";
 }
 
 /** @param {{title: string, is: string, children?: any}} props */

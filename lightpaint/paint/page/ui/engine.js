@@ -54,6 +54,7 @@
  * @property {number} hardness
  * @property {number} flow
  * @property {number} importance
+ * @property {"spot" | "object"} about what a drag asks about
  */
 
 /** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */

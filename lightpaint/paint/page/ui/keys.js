@@ -1,6 +1,6 @@
 /** All keys: one table, for the keyboard and for the overlay that shows them. */
 
-import { harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from "./tools.js";
+import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from "./tools.js";
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./session.js").Session} Session */
@@ -23,8 +23,18 @@ const expose = (by) => (/** @type {Hands} */ { store }) =>
 export const KEYS = [
   { title: "Tools", keys: TOOLS.map(({ tool, keys, label }) => ({
     keys: keys.toLowerCase(), shown: [keys], does: label,
-    act: ({ store }) => store.set({ tool }),
+    act: ({ store }) => choose(store, tool),
   })) },
+  { title: "Work", keys: [
+    { keys: "mod+s", shown: ["Ctrl", "S"], does: "keep this look",
+      act: ({ session, store }) =>
+        void session.send("save_look", { name: `Look ${store.value.looks.length + 1}` }) },
+    { keys: "p", shown: ["P"], does: "panels away, and back",
+      act: ({ store }) => store.set({ side: !store.value.side }) },
+    { keys: "?", shown: ["?"], does: "these keys", act: ({ store }) => store.set({ dialog: "keys" }) },
+    { keys: "", shown: ["Tab"], does: "from control to control" },
+    { keys: "", shown: ["← ↑ ↓ →"], does: "on the pictures: the brush, Enter paints" },
+  ] },
   { title: "Brush", keys: [
     { keys: "[", shown: ["["], does: "smaller", act: ({ store }) => resize(store, -1) },
     { keys: "]", shown: ["]"], does: "larger", act: ({ store }) => resize(store, 1) },
@@ -58,16 +68,6 @@ export const KEYS = [
       act: ({ store }) => look(store, { clean: !store.value.show.clean }) },
     { keys: "o", shown: ["O"], does: "next overlay",
       act: ({ store }) => look(store, { overlay: next(OVERLAYS, store.value.show.overlay) }) },
-  ] },
-  { title: "Work", keys: [
-    { keys: "mod+s", shown: ["Ctrl", "S"], does: "keep this look",
-      act: ({ session, store }) =>
-        void session.send("save_look", { name: `Look ${store.value.looks.length + 1}` }) },
-    { keys: "p", shown: ["P"], does: "panels away, and back",
-      act: ({ store }) => store.set({ side: !store.value.side }) },
-    { keys: "?", shown: ["?"], does: "these keys", act: ({ store }) => store.set({ dialog: "keys" }) },
-    { keys: "", shown: ["Tab"], does: "from control to control" },
-    { keys: "", shown: ["← ↑ ↓ →"], does: "on the pictures: the brush, Enter paints" },
   ] },
 ];
 

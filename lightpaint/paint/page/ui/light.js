@@ -39,8 +39,7 @@ export class LightRow extends Component {
     const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
     return html`<div class=${`light ${dim} ${isOpen ? "is-open" : ""}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
-      <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}
-        data-tip="Its own picture">
+      <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
         <${Thumb} name=${`thumb/${k}`} generation=${this.props.thumb} hands=${hands} />
         <${Share} share=${this.props.lit?.share ?? 0} here=${here} />
       </div>
@@ -83,19 +82,20 @@ export class LightRow extends Component {
   numbers() {
     const { light, rgb, lit, isLive, asked, tied } = this.props;
     const level = luminance(rgb);
+    const said = notes({ light, lit, asked, tied });
     const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
     const hue = white ? kelvinText(white) : lit?.hue ?? "";
     const parts = [
-      level > 0 ? hue : "", `${number(level)} ${light.unit}`.trim(), !isLive && lit?.error,
+      hue, [number(level), !isLive && lit?.error, light.unit].filter(Boolean).join(" "),
     ].filter(Boolean);
     return html`<div class="light-numbers">
       <span class=${`dot ${level > 0 ? "" : "is-off"}`} aria-hidden="true"
         style=${{ background: level > 0 ? toHex(scaled(rgb)) : "none" }}></span>
       <span class="values">${level > 0 ? parts.join(" · ") : "off"}</span>
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
-      ${notes({ light, lit, asked, tied }).map((note) => html`<span class="badge" key=${note}>
-        ${note}</span>`)}
-    </div>`;
+    </div>
+    ${said.length > 0 && html`<div class="badges">${said.map((note) =>
+      html`<span class="badge" key=${note}>${note}</span>`)}</div>`}`;
   }
 
   dimmer() {

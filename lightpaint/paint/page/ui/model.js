@@ -50,6 +50,7 @@
  * @property {number} flow
  * @property {number} importance
  * @property {"light" | "look"} as
+ * @property {"spot" | "object"} about what a drag asks about
  * @property {RGB} colour linear, its largest channel at most 1
  * @property {number} stops brightness of the paint over `colour`
  * @property {{colour: RGB, stops: number}} second
@@ -87,7 +88,7 @@ export function first() {
     history: { undo: [], redo: [] }, looks: [], basis: null, verifying: null, loading: null,
     verified: null, explained: [], exported: null, connection: "wait", closed: null, toasts: [],
     resources: {}, hint: false, tool: "brush", size: 60, hardness: 0.5, flow: 1, importance: 1,
-    as: "light", colour: [1, 0.45, 0.13], stops: 0, second: { colour: [0.2, 0.4, 1], stops: 0 },
+    as: "light", about: "spot", colour: [1, 0.45, 0.13], stops: 0, second: { colour: [0.2, 0.4, 1], stops: 0 },
     recent: [], mixer: "white", asking: null, show: SHOW, solo: [], mute: [], hovered: null,
     pointed: null, mix: null, open: { colour: true, lights: true, truth: false }, side: true,
     dialog: null, search: "", sort: "scene", unfolded: [],
@@ -108,11 +109,20 @@ export function shown(ui) {
   if (mixed) show.other = mixed;
   if (ui.hovered !== null) {
     const k = ui.hovered;
-    show.other = ui.weights.map((rgb, i) => (i === k ? alone(rgb, ui.lights[k]) : [0, 0, 0]));
+    const gain = gainOf(ui, k);
+    const rgb = alone(ui.weights[k], ui.lights[k]).map((x) => x * gain);
+    show.other = ui.weights.map((_, i) => (i === k ? /** @type {RGB} */ (rgb) : [0, 0, 0]));
     show.right = "other";
     show.gains = null;
   }
   return show;
+}
+
+/** By how much a light alone is shown brighter, so that one of many can be seen: whole stops.
+ * @param {Ui} ui @param {number} k @returns {number} */
+export function gainOf(ui, k) {
+  const share = ui.lit[k]?.share ?? 1;
+  return share > 0 ? 2 ** Math.min(10, Math.max(0, Math.round(Math.log2(0.5 / share)))) : 1;
 }
 
 /** A light that is off is shown as it is now, or else at one unit. @param {RGB} rgb

@@ -2,7 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../vendor/preact.js";
 import { toHex } from "./colours.js";
-import { paintOf, shown } from "./model.js";
+import { gainOf, paintOf, shown } from "./model.js";
 import { paneAt, Pointer } from "./pointer.js";
 import { look } from "./tools.js";
 
@@ -18,7 +18,10 @@ const NAMES = { painting: "Painting", solution: "Answer", other: "Other look", v
 
 /** @param {Ui} ui @param {string} kind @returns {string} */
 function nameOf(ui, kind) {
-  if (kind === "other" && ui.hovered !== null) return `${ui.lights[ui.hovered].label} alone`;
+  if (kind === "other" && ui.hovered !== null) {
+    const stops = Math.round(Math.log2(gainOf(ui, ui.hovered)));
+    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${stops} stops brighter` : ""}`;
+  }
   if (kind === "other" && ui.mix) {
     const [a, b] = [ui.mix.a, ui.mix.b].map((id) => ui.looks.find((one) => one.id === id)?.name);
     return ui.mix.share === 1 ? `${b}` : `${a} → ${b}, ${Math.round(100 * ui.mix.share)} %`;
@@ -48,21 +51,23 @@ export function Stage({ ui, hands }) {
   // At once, so that names lie where the pictures will.
   useMemo(() => engine.show(shown(ui)),
     [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights]);
+  const hasAlbedo = ui.resources.albedo !== undefined;
   useEffect(() => engine.use({
-    tool: ui.tool, rgb: paintOf(ui), as: ui.as, size: ui.size, hardness: ui.hardness,
-    flow: ui.flow, importance: ui.importance,
-  }), [ui.tool, ui.colour, ui.stops, ui.as, ui.size, ui.hardness, ui.flow, ui.importance]);
+    tool: ui.tool, rgb: paintOf(ui), as: hasAlbedo ? ui.as : "look", size: ui.size, hardness: ui.hardness,
+    flow: ui.flow, importance: ui.importance, about: ui.about,
+  }), [ui.tool, ui.colour, ui.stops, ui.as, ui.size, ui.hardness, ui.flow, ui.importance, ui.about,
+    hasAlbedo]);
   useEffect(() => ring(rings.current, engine, ui), [ui.size, ui.tool, ui.hardness, ui.show]);
   useSurface(frame, pointer, hands);
   const panes = ui.ready ? engine.panes() : [];
   return html`<div class=${`stage is-${ui.tool}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints." aria-describedby="lp-status">
-    <div class="rings" ref=${rings} aria-hidden="true">
+    <div class="rings" ref=${rings} hidden aria-hidden="true">
       <i class="ring" style=${{ "--paint": toHex(ui.colour) }}></i><i class="ring is-twin"></i>
     </div>
     ${panes.map((pane, k) => html`<${Tag} key=${k} ui=${ui} pane=${pane} panes=${panes} />`)}
     ${ui.show.layout === "wipe" && ui.ready && html`<${Wipe} ui=${ui} hands=${hands} />`}
-    ${ui.hint && ui.ready && html`<${Hint} panes=${panes} />`}
+    ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} />`}
     ${ui.asking && html`<div class="asking" role="status">${asked(ui.asking)}</div>`}
     ${!ui.ready && html`<div class="waiting" role="status">
       ${ui.connection === "wait" ? "Opening the scene …" : "Waiting for the session …"}</div>`}
@@ -81,15 +86,21 @@ function asked({ stops, mired }) {
 /** @param {{ui: Ui, pane: Pane, panes: Pane[]}} props */
 function Tag({ ui, pane, panes }) {
   const isRight = ui.show.layout === "wipe" && pane === panes[0] && panes.length > 1;
+  const size = /** @type {[number, number]} */ ([...ui.state.size].reverse());
   if (pane.width < 90) return null;
-  const style = { top: `${Math.max(pane.y, 0) + 8}px`, ...(isRight
-    ? { right: "8px" } : { left: `${pane.x + 8}px` }) };
+  const [w] = size;
+  const right = Math.min(pane.x + pane.width, pane.left + w * pane.scale);
+  const style = {
+    top: `${Math.min(Math.max(pane.y, pane.top), pane.y + pane.height - 30) + 8}px`,
+    left: `${(isRight ? right : Math.max(pane.x, pane.left)) + (isRight ? -8 : 8)}px`,
+    transform: isRight ? "translateX(-100%)" : "",
+  };
   return html`<span class="tag" style=${style}>${nameOf(ui, pane.kind)}</span>`;
 }
 
 /** @param {{panes: Pane[]}} props */
 function Hint({ panes }) {
-  const pane = panes.find((one) => one.kind === "painting") ?? panes[0];
+  const pane = panes.find((one) => one.kind === "painting") ;
   if (!pane) return null;
   return html`<div class="hint" style=${{ left: `${pane.x + pane.width / 2}px`,
     top: `${pane.y + pane.height / 2}px`, maxWidth: `${Math.min(320, pane.width - 24)}px` }}>
@@ -149,7 +160,8 @@ function ring(rings, engine, ui, x = Number(rings?.dataset.x), y = Number(rings?
   const [own, twin] = /** @type {HTMLElement[]} */ ([...rings.children]);
   rings.hidden = !pane;
   if (!pane) return;
-  const isPoint = ["pick", "fill", "ask"].includes(ui.tool);
+  const isPoint = ["pick", "fill"].includes(ui.tool)
+    || (ui.tool === "ask" && ui.about === "object");
   const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale);
   place(own, x, y, size, ui.hardness);
   twin.hidden = !others.length;

@@ -3,7 +3,7 @@
 import { html, useState } from "../vendor/preact.js";
 import { toHex } from "./colours.js";
 import { Button, Choice, Number_, Select, Slider } from "./controls.js";
-import { HINTS, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from "./tools.js";
+import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from "./tools.js";
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -12,6 +12,10 @@ import { HINTS, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from "./tools.js";
 const RATIO = { to: (/** @type {number} */ x) => Math.log2(x), of: (/** @type {number} */ t) =>
   Math.round(2 ** t) };
 
+const ABOUT = [
+  { value: "spot", label: "Spot", tip: "A soft spot where the drag begins" },
+  { value: "object", label: "Object", tip: "The whole object under the pointer" },
+];
 const PAINT_AS = [
   { value: "light", label: "Light", tip: "Paint light: what the surface is made of stays visible" },
   { value: "look", label: "Look", tip: "Paint the look: the colour itself, as it is to appear" },
@@ -23,7 +27,7 @@ export function ToolBar({ ui, hands }) {
   const style = { "--first": toHex(ui.colour), "--second": toHex(ui.second.colour) };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
-      keys=${keys} on=${ui.tool === tool} act=${() => store.set({ tool })}
+      keys=${keys} on=${ui.tool === tool} act=${() => choose(store, tool)}
       disabled=${tool === "fill" && !ui.state?.objects?.length} />`)}
     <div class="spring"></div>
     <button type="button" class="two-colours" style=${style} data-tip="Other colour" data-keys="X"
@@ -40,22 +44,23 @@ export function ToolOptions({ ui, hands }) {
   const paints = ["brush", "fill", "line"].includes(ui.tool);
   return html`<div class="options" role="group" aria-label=${`${label} settings`}>
     <strong>${label}</strong>
-    ${paints && ui.state?.resources?.albedo !== undefined && html`<${Choice} label="Paint as"
+    ${paints && ui.resources.albedo !== undefined && html`<${Choice} label="Paint as"
       value=${ui.as} choices=${PAINT_AS} change=${(/** @type {any} */ as) => store.set({ as })} />`}
     ${ui.tool === "weight" && html`<${Slider} label="Importance" value=${ui.importance} least=${0}
       most=${1} step=${0.05} digits=${2} rest=${1}
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`}
-    ${strokes && html`<${Slider} label="Size" value=${ui.size} least=${LEAST_SIZE} curve=${RATIO}
-        most=${MOST_SIZE} unit="px" keys="[ ]" tip="Size"
-        change=${(/** @type {number} */ size) => store.set({ size })} />
-      <${Slider} label="Hardness" value=${100 * ui.hardness} least=${0} most=${100} unit="%"
+    ${ui.tool === "ask" && ui.state?.objects?.length > 0 && html`<${Choice} label="Ask about"
+      value=${ui.about} choices=${ABOUT} change=${(/** @type {any} */ about) =>
+        store.set({ about })} />`}
+    ${(strokes || (ui.tool === "ask" && ui.about === "spot")) && html`<${Slider} label="Size"
+      value=${ui.size} least=${LEAST_SIZE} curve=${RATIO} most=${MOST_SIZE} unit="px" keys="[ ]"
+      tip="Size" change=${(/** @type {number} */ size) => store.set({ size })} />`}
+    ${strokes && html`<${Slider} label="Hardness" value=${100 * ui.hardness} least=${0} most=${100} unit="%"
         keys="Shift [ ]" tip="Hardness of the edge"
         change=${(/** @type {number} */ hard) => store.set({ hardness: hard / 100 })} />`}
     ${(strokes || ui.tool === "fill") && html`<${Slider} label="Flow" value=${100 * ui.flow}
       least=${1} most=${100} unit="%" keys="1 … 0" tip="Flow: how much paint each touch leaves"
       change=${(/** @type {number} */ flow) => store.set({ flow: flow / 100 })} />`}
-    ${ui.tool === "ask" && html`<${Ask} ui=${ui} hands=${hands} />`}
-    <span class="tool-hint">${HINTS[ui.tool]}</span>
   </div>`;
 }
 
@@ -79,7 +84,7 @@ export function Ask({ ui, hands }) {
       change=${setStops} />
     <${Number_} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
       unit="mired" change=${setMired} />
-    <${Button} label="Ask" disabled=${!stops && !mired} act=${ask}
-      tip="Ask for it as one stroke; undo takes it back" />
+    <${Button} label="Ask for it" disabled=${!stops && !mired} act=${ask}
+      tip="As one stroke, which undo takes back" />
   </div>`;
 }

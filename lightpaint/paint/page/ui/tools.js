@@ -33,6 +33,12 @@ export const HINTS = /** @type {Record<Tool, string>} */ ({
 export const LEAST_SIZE = 2;
 export const MOST_SIZE = 1000;
 
+/** @param {UiStore} store @param {Tool} tool */
+export function choose(store, tool) {
+  // Who asks by a drag may want to do it in numbers.
+  store.set(({ open }) => ({ tool, open: tool === "ask" ? { ...open, ask: true } : open }));
+}
+
 /** @param {UiStore} store */
 export function swap(store) {
   store.set(({ colour, stops, second }) => ({

@@ -4,7 +4,7 @@ import { html } from "../vendor/preact.js";
 import { Button, Choice } from "./controls.js";
 import { number } from "./format.js";
 import { Icon } from "./icons.js";
-import { look } from "./tools.js";
+import { HINTS, look } from "./tools.js";
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -17,12 +17,12 @@ const OVERLAYS = [
   { value: "importance", label: "Painted", tip: "What counts, and how much" },
 ];
 
-/** What colours of an overlay mean. @type {Record<string, {bar: string, from: string, to: string}>} */
+/** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
 const LEGENDS = {
-  missed: { bar: "missed", from: "fits", to: "missed" },
-  beyond: { bar: "missed", from: "in reach", to: "out of reach" },
-  falsecolor: { bar: "false", from: "dark", to: "bright" },
-  importance: { bar: "importance", from: "free", to: "counts" },
+  missed: ["too dark", "fits", "too bright"],
+  beyond: ["in reach", "out of reach"],
+  falsecolor: ["−6 stops", "grey", "+6"],
+  importance: ["free", "counts"],
 };
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -37,8 +37,8 @@ export function TruthPanel({ ui, hands }) {
   const sentences = ui.explained.length ? ui.explained : ui.sentences;
   return html`<div class="truth">
     <${Choice} label="Over the pictures" value=${overlay} choices=${OVERLAYS} change=${choose} />
-    ${legend && html`<div class="legend"><span>${legend.from}</span>
-      <i class=${`is-${legend.bar}`}></i><span>${legend.to}</span></div>`}
+    ${legend && html`<div class="legend"><i class=${`is-${overlay}`}></i>
+      ${legend.map((text) => html`<span key=${text}>${text}</span>`)}</div>`}
     ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
     ${!ui.readonly && html`<div class="row">
       <${Button} label="Why not closer?" act=${() => session.send("explain")}
@@ -87,7 +87,7 @@ export function Bar({ progress, label }) {
     <i style=${{ "--share": String(isKnown ? Math.min(1, done / total) : 1) }}></i></span>`;
 }
 
-/** Below the pictures: what is under the pointer, and in one sentence how close the answer comes.
+/** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
   const { store, session } = hands;
@@ -103,7 +103,6 @@ export function AnswerLine({ ui, hands }) {
         "Mean difference to what was painted, as seen: 1 is just visible, 5 is clear"
         }>ΔE ${number(ui.deltaE, 2)}</span>`}
     </p>
-    <${Here} ui=${ui} />
     ${!ui.readonly && html`<${Button} label="Keep look" icon="plus" keys="Control+S"
       tip="Keep painting and answer under a name"
       act=${() => session.send("save_look", { name: `Look ${ui.looks.length + 1}` })} />`}
@@ -112,12 +111,16 @@ export function AnswerLine({ ui, hands }) {
   </div>`;
 }
 
-/** Which lights make up what is under the pointer. @param {{ui: Ui}} props */
-function Here({ ui }) {
-  if (!ui.pointed) return html`<p class="here" id="lp-status"></p>`;
+/** Which lights make up what is under the pointer; else what the tool does. @param {{ui: Ui}}
+ * props */
+export function Here({ ui }) {
+  if (!ui.pointed) {
+    const text = ui.readonly ? "" : HINTS[ui.tool];
+    return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
+  }
   const { object, shares } = ui.pointed;
   const most = shares.map((share, k) => ({ share, k })).filter(({ share }) => share >= 0.01)
-    .sort((a, b) => b.share - a.share).slice(0, 4);
+    .sort((a, b) => b.share - a.share).slice(0, 5);
   return html`<p class="here" id="lp-status">${object && html`<span class="object">${object}</span>`}
     ${most.map(({ share, k }) => html`<span key=${k}>${ui.lights[k]?.label}
       <b>${Math.round(100 * share)} %</b></span>`)}</p>`;
