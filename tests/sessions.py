@@ -8,7 +8,7 @@ from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
 from lightpaint.paint.store import Store
 
 SIZE = (12, 10)
-IDENTITY = Identity("room.xml", "0f0f sensor", SIZE, ("panel", "bulb"))
+IDENTITY = Identity("room.xml", "0f0f", SIZE, ("panel", "bulb"), "camera")
 
 
 def patch(rng: np.random.Generator, size: tuple[int, int] = SIZE) -> Patch:

@@ -13,6 +13,7 @@ from lightpaint.cli.listing import lights as lights
 from lightpaint.cli.listing import note_scene
 from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
+from lightpaint.cli.painter import paint as paint
 from lightpaint.cli.upkeep import cache as cache
 from lightpaint.cli.upkeep import doctor as doctor
 from lightpaint.cli.wanted import Wanted

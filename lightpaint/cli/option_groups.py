@@ -194,6 +194,33 @@ def add_output(parser: "argparse._ActionsContainer", metavar: str, about: str) -
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
 
 
+def add_server(parser: argparse.ArgumentParser) -> None:
+    """Where the painter's page is, and which session it shows."""
+    parser.add_argument(
+        "--new",
+        action="store_true",
+        help="start afresh; the session that is there is kept under another name (default: go on)",
+    )
+    parser.add_argument(
+        "--port",
+        type=arguments.at_least(0, most=65535),
+        metavar="N",
+        help="where the page is served; 0 for any (default: 8421, or any if that is taken)",
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        help="let others reach the page, by this address of the machine: whoever has its token can "
+        "paint (default: nobody but this machine)",
+    )
+    parser.add_argument(
+        "--no-browser",
+        dest="with_browser",
+        action="store_false",
+        help="only say where the page is",
+    )
+
+
 def add_force(parser: argparse.ArgumentParser) -> None:
     """What may be given up."""
     parser.add_argument(

@@ -12,6 +12,7 @@ from lightpaint.cli.option_groups import (
     add_output,
     add_sampling,
     add_scene,
+    add_server,
     add_spp,
     add_unit,
     add_variant,
@@ -19,7 +20,14 @@ from lightpaint.cli.option_groups import (
     add_view_transform,
 )
 from lightpaint.cli.order import CommandParser, Parser
-from lightpaint.cli.solve_options import add_constraints, add_method, add_paintings, add_wanted
+from lightpaint.cli.solve_options import (
+    add_constraints,
+    add_fit,
+    add_method,
+    add_paintings,
+    add_pattern,
+    add_wanted,
+)
 from lightpaint.version import __version__
 
 #: What a script asks.
@@ -110,16 +118,35 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_wanted(parser)
     add_unit(parser)
     add_lights(parser)
-    parser.add_argument(
-        "--pattern",
-        metavar="'Light_{name}'",
-        help="how the layers, parts or files of light groups are named, where no renderer that "
-        "is known names them so",
-    )
+    add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
     add_cache(parser)
     add_view(parser)
+
+
+def _paint(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "source",
+        metavar="SCENE|BASIS|LIGHTS",
+        nargs="?",
+        help="scene XML, a *.basis.exr, or light groups of another renderer, which --lights may "
+        "name, too",
+    )
+    add_output(
+        parser, "DIR", "folder for the session and what is exported (default: <scene>.paint/)"
+    )
+    add_server(parser)
+    add_fit(parser)
+    add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
+    add_lights(parser)
+    add_pattern(parser)
+    add_constraints(parser)
+    add_budget(parser)
+    add_cache(parser)
+    add_view(parser)
+    # Options are kept for the command that answers what is exported.
+    parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 
 
 def _relight(parser: argparse.ArgumentParser) -> None:
@@ -159,6 +186,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "basis": ("render the image of each light alone", _basis),
     "template": ("render the current look, to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
+    "paint": ("paint in the browser, and see the lighting that comes closest at once", _paint),
     "relight": ("write lightings into the scene and render it", _relight),
     "verify": ("render results anew and compare with the prediction", _verify),
     "cache": ("list or delete the bases kept from earlier runs", _cache),

@@ -55,8 +55,18 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_method(parser: argparse.ArgumentParser) -> None:
-    """How a painting is answered."""
+def add_pattern(parser: argparse.ArgumentParser) -> None:
+    """How light groups are named."""
+    parser.add_argument(
+        "--pattern",
+        metavar="'Light_{name}'",
+        help="how the layers, parts or files of light groups are named, where no renderer that "
+        "is known names them so",
+    )
+
+
+def add_fit(parser: argparse.ArgumentParser) -> None:
+    """What it is to be close."""
     parser.add_argument(
         "--hold",
         type=arguments.number(may_be_zero=True),
@@ -83,6 +93,11 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         help="take the painting at its word, as the paper does: linear light, nothing held, any "
         "colour, noise left in; but for what other options say",
     )
+
+
+def add_method(parser: argparse.ArgumentParser) -> None:
+    """How a painting is answered."""
+    add_fit(parser)
     parser.add_argument(
         "--unpainted",
         type=arguments.number(may_be_zero=True),

@@ -115,6 +115,11 @@ def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) 
                 f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {identity.scene} "
                 f"has {identity.size[1]}x{identity.size[0]}: {AFRESH}"
             )
+        if its.sensor != identity.sensor:
+            raise PaintError(
+                f"{path} is a session of the view through {its.sensor}, and this is through "
+                f"{identity.sensor}: {AFRESH}"
+            )
         if its.lights != identity.lights:
             raise PaintError(
                 f"{path} is a session of the lights {some_names(its.lights)}, and "

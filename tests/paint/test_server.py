@@ -1,10 +1,12 @@
 """The painter's server: who may ask, what strangers and junk are told, who has the session."""
 
 import json
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from posixpath import dirname, join, normpath
 from typing import Any
 
 import numpy as np
@@ -214,6 +216,26 @@ def test_what_is_not_in_the_table_is_not_there(served: Served, path: str) -> Non
     assert "secret" not in answer.text
 
 
+def test_the_page_as_it_ships_is_whole_and_keeps_its_policy() -> None:
+    """What it refers to is there, and nothing stands in it that the policy forbids."""
+    table = page_files()
+    page = table["/"].content.decode()
+    assert not re.search(r"<script(?![^>]* src=)|<style|\s(?:style|on\w+)=", page)
+    named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', page)
+    assert named
+    for name in named:
+        assert f"/{name}" in table, name
+    imports = re.compile(
+        r"""(?:^|\n)(?:import|export)\b[^'"\n;]*?(?:\n[^'";]*?)?from ['"]([^'"]+)"""
+    )
+    for path, file in table.items():
+        if path.endswith(".js"):
+            text = re.sub(r"/\*.*?\*/", "", file.content.decode(), flags=re.DOTALL)
+            for name in imports.findall(text):
+                assert normpath(join(dirname(path), name)) in table, f"{name} in {path}"
+    assert any(path.startswith("/vendor/LICENSE") for path in table)
+
+
 def test_a_link_out_of_the_page_is_no_file_of_it(tmp_path: Path) -> None:
     (tmp_path / "page").mkdir()
     (tmp_path / "other.js").write_text("secret", "utf-8")
@@ -401,6 +423,8 @@ def test_a_page_that_is_back_after_a_dropped_connection_has_its_session(served: 
     with served.socket("same") as first, served.socket("same") as again:
         greet(first)
         assert greet(again)["kind"] == "state"
+        with pytest.raises(WebSocketDisconnect):  # and is not told that another has it
+            first.receive_bytes()
 
 
 def test_too_many_tabs_are_sent_away(served: Served) -> None:

@@ -300,6 +300,7 @@ def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
     ("other", "said"),
     [
         (replace(IDENTITY, size=(12, 20)), "of 10x12 pixels, and room.xml has 20x12"),
+        (replace(IDENTITY, sensor="side"), "through camera, and this is through side"),
         (replace(IDENTITY, lights=("panel", "sun")), "lights panel, bulb, and room.xml has"),
     ],
 )
