@@ -112,7 +112,16 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
 
 def _seen(seen: Seen) -> dict[str, Any]:
     """Mean CIEDE2000 over what was painted."""
-    return {"delta_e": seen.delta_e, "noise": seen.noise, "asked": seen.asked}
+    place = seen.place
+    return {
+        "delta_e": seen.delta_e,
+        "noise": seen.noise,
+        "asked": seen.asked,
+        "region": None if place is None else place.region,
+        "object": place.object or None if place else None,
+        "held": seen.held or None,
+        "held_by_views": seen.held_by_views or None,
+    }
 
 
 def _choice(choice: ColorChoice) -> dict[str, Any]:
