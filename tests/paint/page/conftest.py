@@ -86,18 +86,25 @@ def served(site: Site, path: str) -> tuple[dict[str, str], bytes]:
     return {}, b""
 
 
-@pytest.fixture
-def page(browser: Any, site: Site) -> Iterator[Any]:
-    """An empty page of the site. What a test leaves on its console as an error fails it."""
+@pytest.fixture(scope="session")
+def tab(browser: Any) -> tuple[Any, list[str]]:
+    """One page for all tests, which start a process less; and what goes wrong on it."""
     opened = browser.new_page(viewport={"width": 800, "height": 600})
     wrong: list[str] = []
     opened.on("pageerror", lambda error: wrong.append(str(error)))
     opened.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
+    return opened, wrong
+
+
+@pytest.fixture
+def page(tab: Any, site: Site) -> Iterator[Any]:
+    """An empty page of the site. What a test leaves on its console as an error fails it."""
+    opened, wrong = tab
     opened.goto(f"{site.url}/empty.html")
     yield opened
-    opened.close()
     site.arrays.clear()
-    assert wrong == []
+    left, wrong[:] = wrong[:], []
+    assert left == []
 
 
 #: As the server of the painter has it: nothing from elsewhere, nothing inline.

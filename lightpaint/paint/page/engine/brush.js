@@ -59,7 +59,8 @@ export class Path {
     const from = this.last ?? point
     const length = Math.hypot(point.x - from.x, point.y - from.y)
     const regions = []
-    for (; this.left <= length; this.left += this.step) {
+    // Steps that do not add up to the last bit still reach its end.
+    for (; this.left <= length + 1e-6; this.left += this.step) {
       const t = length > 0 ? this.left / length : 0
       const between = {
         x: from.x + t * (point.x - from.x),

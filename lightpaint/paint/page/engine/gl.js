@@ -6,7 +6,6 @@
  */
 import { mixedAt } from './cpu.js'
 import { Planes } from './gpu.js'
-import { VALUES } from './half.js'
 import { SRGB } from './lut.js'
 import { GROUND, SQUARES, panes } from './view.js'
 
@@ -215,7 +214,7 @@ export class GlView {
   }
 
   memory() {
-    return this.textures.memory() + VALUES.byteLength + 4 * this.canvas.width * this.canvas.height
+    return this.textures.memory() + 4 * this.canvas.width * this.canvas.height
   }
 
   close() {

@@ -98,6 +98,9 @@ export class Stroke {
     const before = canvas.uncover()
     canvas.region = null
     const path = new Path(canvas, use)
+    // Its last stamp is at its end.
+    const length = Math.hypot(to.x - start.x, to.y - start.y)
+    path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step
     const regions = [...path.to({ ...start, pressure: 1 }), ...path.to({ ...to, pressure: 1 })]
     return [...(before ? [before] : []), ...this.applied(regions)]
   }

@@ -32,8 +32,10 @@ export class Screen {
     this.isLive = false
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.rest = undefined
+    /** Milliseconds that a GPU has to come back. */
+    this.patience = PATIENCE
     /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.patience = undefined
+    this.waiting = undefined
   }
 
   /** A view of pictures of a size, and of so many lights.
@@ -52,15 +54,15 @@ export class Screen {
 
   /** The GPU has gone; without it, if it does not come back. */
   lost() {
-    clearTimeout(this.patience)
-    this.patience = setTimeout(() => {
+    clearTimeout(this.waiting)
+    this.waiting = setTimeout(() => {
       this.begin(this.size, this.count, 'cpu')
       this.options.refill()
-    }, PATIENCE)
+    }, this.patience)
   }
 
   restored() {
-    clearTimeout(this.patience)
+    clearTimeout(this.waiting)
     this.view?.setCount(this.count)
     this.options.refill()
   }
@@ -76,6 +78,7 @@ export class Screen {
   fit() {
     if (!this.view) return
     const { canvas } = this.view
+    canvas.style.display = 'block'
     canvas.style.width = `${this.width}px`
     canvas.style.height = `${this.height}px`
     const [width, height] = [this.width, this.height].map((n) => Math.max(1, Math.round(n * this.ratio)))
@@ -117,7 +120,7 @@ export class Screen {
 
   close() {
     clearTimeout(this.rest)
-    clearTimeout(this.patience)
+    clearTimeout(this.waiting)
     cancelAnimationFrame(this.frame)
     this.view?.close()
     this.view?.canvas.remove()
