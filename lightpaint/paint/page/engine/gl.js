@@ -164,7 +164,6 @@ export class GlView {
     textures.bind(3, gl.TEXTURE_3D, this.lattice ?? textures.black)
     for (const [i, name] of ['picture', 'painting', 'beyond', 'lattice'].entries())
       gl.uniform1i(at(name), i)
-    textures.filter(picture, pane.scale < 0.75 && !params.live)
     const { shaper, lattice } = this.lut
     gl.uniform2f(at('size'), this.size[1], this.size[0])
     gl.uniform2f(at('corner'), pane.left, pane.top)
@@ -175,6 +174,7 @@ export class GlView {
     gl.uniform2f(at('shaper'), shaper.low, shaper.high)
     gl.uniform1i(at('isSrgb'), Number(!lattice))
     gl.uniform1i(at('isSharp'), Number(isSharp))
+    gl.uniform1i(at('isSmall'), Number(pane.scale < 0.75))
     gl.uniform1i(at('overlay'), overlayOf(pane.kind, params))
     gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height)
     gl.drawArrays(gl.TRIANGLES, 0, 3)

@@ -60,6 +60,7 @@ uniform float side;
 uniform vec2 shaper;
 uniform bool isSrgb;
 uniform bool isSharp;
+uniform bool isSmall;
 uniform int overlay;
 out vec4 shown;
 
@@ -100,6 +101,19 @@ vec3 missed(vec3 display, ivec2 at) {
   return lay(display, ink, amount * hatch(at, isDark ? -1 : 1));
 }
 
+vec3 lightAt(vec2 where, ivec2 at) {
+  if (isSharp) return texelFetch(picture, at, 0).rgb;
+  if (!isSmall) return texture(picture, where / size).rgb;
+  // A pixel of the display covers several: the middles of its four quarters.
+  vec2 near = 0.25 / scale / size;
+  vec3 sum = vec3(0.0);
+  for (int k = 0; k < 4; k++) {
+    vec2 corner = vec2(k % 2, k / 2) * 2.0 - 1.0;
+    sum += texture(picture, where / size + corner * near).rgb;
+  }
+  return sum * 0.25;
+}
+
 void main() {
   vec2 place = vec2(gl_FragCoord.x, above - gl_FragCoord.y) - corner;
   vec2 where = place / scale;
@@ -108,7 +122,7 @@ void main() {
     return;
   }
   ivec2 at = min(ivec2(where), ivec2(size) - 1);
-  vec3 light = isSharp ? texelFetch(picture, at, 0).rgb : texture(picture, where / size).rgb;
+  vec3 light = lightAt(where, at);
   vec3 display = encode(light);
   if (overlay == 1) {
     float stops = log2(max(dot(LUMA, light) * gain, 1e-9) / ${GREY});

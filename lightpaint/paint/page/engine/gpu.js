@@ -96,7 +96,6 @@ export class Planes {
     })
     gl.disable(gl.BLEND)
     mix.isStale = false
-    this.textures.changed(mix.texture)
   }
 
   /** Draw to a texture from here on. @param {WebGLTexture} texture @param {number} width

@@ -49,9 +49,9 @@ export class Textures {
     this.size = size
     /** @type {Map<WebGLTexture, number>} bytes */
     this.sizes = new Map()
-    /** Those whose smaller copies are up to date. @type {Set<WebGLTexture>} */
-    this.small = new Set()
-    this.rgba = new Uint16Array(4 * size[0] * size[1]).fill(ONE)
+    /** Some rows on their way to the GPU. */
+    this.rows = Math.max(1, Math.floor(2 ** 18 / size[1]))
+    this.rgba = new Uint16Array(4 * this.rows * size[1]).fill(ONE)
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1)
     this.nothing = this.made(gl.TEXTURE_2D, 8, gl.NEAREST, () =>
       gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, 1, 1),
@@ -89,7 +89,6 @@ export class Textures {
     if (!texture) return
     this.gl.deleteTexture(texture)
     this.sizes.delete(texture)
-    this.small.delete(texture)
   }
 
   memory() {
@@ -108,46 +107,50 @@ export class Textures {
   /** @param {WebGLTexture} slice @param {number} layer @param {Uint16Array} halves (h, w, 3) */
   setPlane(slice, layer, halves) {
     const { gl } = this
-    const [height, width] = this.size
+    const width = this.size[1]
     this.bind(0, gl.TEXTURE_2D_ARRAY, slice)
-    gl.texSubImage3D(
-      ...[gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.HALF_FLOAT],
-      this.four(halves),
-    )
+    for (const { top, rows, rgba } of this.bands(halves))
+      gl.texSubImage3D(
+        ...[gl.TEXTURE_2D_ARRAY, 0, 0, top, layer, width, rows, 1, gl.RGBA, gl.HALF_FLOAT],
+        rgba,
+      )
   }
 
-  /** A picture of halves, RGBA, that can be drawn to and has smaller copies. */
+  /** A picture of halves, RGBA, that can be drawn to. */
   halves() {
     const { gl } = this
     const [height, width] = this.size
-    const levels = 1 + Math.floor(Math.log2(Math.max(height, width)))
-    return this.made(gl.TEXTURE_2D, Math.round((8 * height * width * 4) / 3), gl.LINEAR, () =>
-      gl.texStorage2D(gl.TEXTURE_2D, levels, gl.RGBA16F, width, height),
+    return this.made(gl.TEXTURE_2D, 8 * height * width, gl.LINEAR, () =>
+      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, width, height),
     )
   }
 
   /** @param {WebGLTexture} texture @param {Uint16Array} halves (h, w, 3) */
   setHalves(texture, halves) {
     const { gl } = this
-    const [height, width] = this.size
+    const width = this.size[1]
     this.bind(0, gl.TEXTURE_2D, texture)
-    const rgba = this.four(halves)
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.HALF_FLOAT, rgba)
-    this.changed(texture)
+    for (const { top, rows, rgba } of this.bands(halves))
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, top, width, rows, gl.RGBA, gl.HALF_FLOAT, rgba)
   }
 
-  /** Halves with a fourth channel, without Inf and NaN. @param {Uint16Array} halves */
-  four(halves) {
+  /** Halves with a fourth channel, without Inf and NaN, some rows after the other.
+   * @param {Uint16Array} halves (h, w, 3) */
+  *bands(halves) {
+    const [height, width] = this.size
     const { rgba } = this
-    for (let from = 0, to = 0; from < halves.length; to++) {
-      for (let c = 0; c < 3; c++) {
-        const bits = halves[from++]
-        const magnitude = bits & 0x7fff
-        const isFinite = magnitude < 0x7c00
-        rgba[to++] = isFinite ? bits : magnitude > 0x7c00 ? 0 : (bits & 0x8000) | 0x7bff
-      }
+    for (let top = 0; top < height; top += this.rows) {
+      const rows = Math.min(this.rows, height - top)
+      const end = 3 * width * (top + rows)
+      for (let from = 3 * width * top, to = 0; from < end; to++)
+        for (let c = 0; c < 3; c++) {
+          const bits = halves[from++]
+          const magnitude = bits & 0x7fff
+          const isFinite = magnitude < 0x7c00
+          rgba[to++] = isFinite ? bits : magnitude > 0x7c00 ? 0 : (bits & 0x8000) | 0x7bff
+        }
+      yield { top, rows, rgba: rgba.subarray(0, 4 * rows * width) }
     }
-    return rgba
   }
 
   /** @param {WebGLTexture} texture @param {Region} region @param {Float32Array} image (h, w, 3)
@@ -166,24 +169,6 @@ export class Textures {
       }
     this.bind(0, gl.TEXTURE_2D, texture)
     gl.texSubImage2D(gl.TEXTURE_2D, 0, left, top, width, height, gl.RGBA, gl.FLOAT, rgba)
-    this.changed(texture)
-  }
-
-  /** Smaller copies of a texture are to be made anew. @param {WebGLTexture} texture */
-  changed(texture) {
-    this.small.delete(texture)
-  }
-
-  /** @param {WebGLTexture} texture @param {boolean} isSmall whether its smaller copies are used */
-  filter(texture, isSmall) {
-    const { gl } = this
-    this.bind(0, gl.TEXTURE_2D, texture)
-    if (isSmall && !this.small.has(texture)) {
-      gl.generateMipmap(gl.TEXTURE_2D)
-      this.small.add(texture)
-    }
-    const filter = isSmall ? gl.LINEAR_MIPMAP_LINEAR : gl.LINEAR
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter)
   }
 
   /** (h, w) of 0 to 255; null for none. @param {Uint8Array | null} data */
