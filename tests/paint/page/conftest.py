@@ -4,7 +4,12 @@ import shutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from functools import partial
+from http.server import (
+    BaseHTTPRequestHandler,
+    SimpleHTTPRequestHandler,
+    ThreadingHTTPServer,
+)
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -19,6 +24,15 @@ HERE = Path(__file__).parent
 #: WebGL2 in software, so that both views are tried where there is no GPU.
 ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": "text/css"}
+
+
+#: As the server of the painter has it: nothing from elsewhere, nothing inline.
+CSP = (
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: "
+    "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+FOLDERS = {"/page/": PAGE, "/fake/": HERE / "fake"}
 
 
 @pytest.fixture(scope="session")
@@ -98,3 +112,33 @@ def page(browser: Any, site: Site) -> Iterator[Any]:
     opened.close()
     site.arrays.clear()
     assert wrong == []
+
+
+class _Files(SimpleHTTPRequestHandler):
+    """Files of the page and of what stands in for the rest of it."""
+
+    def translate_path(self, path: str) -> str:
+        plain = path.split("?")[0]
+        for prefix, folder in FOLDERS.items():
+            if plain.startswith(prefix):
+                return str(folder / plain.removeprefix(prefix))
+        return str(FOLDERS["/fake/"] / "index.html")
+
+    def end_headers(self) -> None:
+        self.send_header("Content-Security-Policy", CSP)
+        self.send_header("Cache-Control", "no-store")
+        super().end_headers()
+
+    def log_message(self, *_: Any) -> None:
+        pass
+
+
+@pytest.fixture(scope="session")
+def fake_page() -> Iterator[str]:
+    """Address of the interface over a session that is made up."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Files))
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+    server.server_close()

@@ -1,0 +1,101 @@
+/**
+ * What the interface wants of the picture engine and of its host: all that crosses between the two
+ * goes through here.
+ */
+
+/** @typedef {[number, number, number]} RGB */
+/** @typedef {{data: any, shape: number[]}} Picture */
+/** @typedef {{kind: string, reply?: number, arrays?: Record<string, Picture>, [field: string]: any}} Message */
+
+/**
+ * The session, wherever it is: behind a socket, a notebook's model, or a report that only reads.
+ * `on` hears messages of a kind, asked for or not, and "connection" with
+ * {state: "open" | "lost"}. `send` is answered by the reply.
+ * @typedef {object} Host
+ * @property {(kind: string, fields?: Record<string, any>, arrays?: Record<string, Picture>)
+ *   => Promise<Message>} send
+ * @property {(kind: string, hear: (message: Message) => void) => void} on
+ * @property {(name: string) => Promise<Picture>} fetch
+ * @property {() => void} close
+ */
+
+/** @typedef {"painting" | "solution" | "other" | "verified" | "present"} Kind */
+
+/**
+ * What is drawn, and how. `gains`: which lights are heard, by solo and mute; null for all.
+ * `instead`, `other`: weights that "solution" and "other" are shown with; null for the answer's.
+ * @typedef {object} Show
+ * @property {Kind} left
+ * @property {Kind} right
+ * @property {"side" | "wipe" | "blink"} layout
+ * @property {number} wipe
+ * @property {"left" | "right"} blink
+ * @property {number} zoom
+ * @property {[number, number]} pan
+ * @property {number} stops
+ * @property {string} transform
+ * @property {boolean} clean
+ * @property {null | "missed" | "beyond" | "falsecolor" | "importance"} overlay
+ * @property {boolean[] | null} gains
+ * @property {RGB[] | null} instead
+ * @property {RGB[] | null} other
+ */
+
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "ask"} Tool */
+
+/**
+ * The tool in the hand. `rgb`: linear light of the colour, its stops included. `size`: diameter in
+ * pixels of the picture. `importance`: what the importance brush paints, 0 to 1.
+ * @typedef {object} Use
+ * @property {Tool} tool
+ * @property {RGB} rgb
+ * @property {"light" | "look"} as
+ * @property {number} size
+ * @property {number} hardness
+ * @property {number} flow
+ * @property {number} importance
+ * @property {"spot" | "object"} about what a drag asks about
+ */
+
+/** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */
+/** In CSS pixels of the element. @typedef {{kind: Kind, x: number, y: number, width: number,
+ *   height: number, left: number, top: number, scale: number}} Pane */
+
+/**
+ * @typedef {object} Engine
+ * @property {HTMLElement} element where the pictures are drawn
+ * @property {(width: number, height: number) => void} resize in CSS pixels
+ * @property {(show: Show) => void} show
+ * @property {(use: Use) => void} use
+ * @property {() => Pane[]} panes
+ * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
+ * @property {(point: Point) => void} begin a stroke of the tool in the hand
+ * @property {(points: Point[]) => void} move
+ * @property {() => void} end
+ * @property {() => void} cancel the stroke that has begun
+ * @property {(from: Point, to: Point) => void} line a straight stroke, whole
+ * @property {(asked: {stops: number, mired: number, object: number | null}) => void} ask
+ *   brighter and warmer by so much, in an object or, for null, in the whole picture
+ * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
+ * @property {(x: number, y: number) => {object: string | null, shares: number[]} | null} pointed
+ *   what is seen there, and the share of each light in the answer's light
+ * @property {(name: string, hear: (event: any) => void) => void} on "message": an answer to a
+ *   stroke; "loading": {done, total} planes; "asking": {stops, mired} while a drag asks;
+ *   "trouble": {text}
+ * @property {() => void} close
+ */
+
+/** @param {string} path @returns {Promise<any>} */
+const load = (path) => import(path);
+
+/** @returns {Promise<Host>} the session behind the server that the page came from */
+export async function openHost() {
+  const { openHost: open } = await load("../engine/painter.js");
+  return open();
+}
+
+/** @param {Host} host @returns {Promise<Engine>} */
+export async function openEngine(host) {
+  const { openEngine: open } = await load("../engine/painter.js");
+  return open(host);
+}

@@ -1,0 +1,146 @@
+/** What the interface knows: of the session, and of itself. */
+
+/** @typedef {import("./engine.js").RGB} RGB */
+/** @typedef {import("./engine.js").Show} Show */
+/** @typedef {import("./engine.js").Tool} Tool */
+
+/** @typedef {{name: string, label: string, unit: string, parameter: string, plugin: string,
+ *   form: string, members: string[], group: string | null, present: RGB, is_fixed: boolean,
+ *   is_scalar: boolean, scale?: number}} Light */
+/** @typedef {{emission: RGB, stops: number | null, kelvin: number | null, hue: string | null,
+ *   swatch: string, share: number, error: string | null, held: boolean, unreached: boolean}} Lit */
+/** @typedef {{id: number, name: string, weights: RGB[], delta_e: number | null, stamp: string,
+ *   thumbnail: string}} Look */
+/** @typedef {Record<string, any>} Asked */
+/** @typedef {{what: string, done: number, total: number, unit: string}} Progress */
+/** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
+
+/**
+ * @typedef {object} Ui
+ * @property {boolean} ready whether the session has said what there is
+ * @property {boolean} readonly
+ * @property {any} state as the session said it last
+ * @property {Light[]} lights
+ * @property {Lit[]} lit the last exact answer
+ * @property {RGB[]} weights the last answer
+ * @property {string} headline
+ * @property {number | null} deltaE
+ * @property {string[]} sentences
+ * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
+ * @property {Record<string, Asked>} asked
+ * @property {string[][]} ties
+ * @property {Record<string, any>} settings
+ * @property {Record<string, any>} meant
+ * @property {{undo: string[], redo: string[]}} history
+ * @property {Look[]} looks
+ * @property {Progress | null} basis
+ * @property {Progress | null} verifying
+ * @property {{done: number, total: number} | null} loading
+ * @property {{spp: number, agrees: boolean, text: string, isOld?: boolean} | null} verified
+ * @property {string[]} explained
+ * @property {{files: string[], command: string} | null} exported
+ * @property {"wait" | "open" | "lost"} connection
+ * @property {{reason: string, text: string} | null} closed
+ * @property {Toast[]} toasts
+ * @property {Record<string, number>} resources
+ * @property {boolean} hint whether somebody still has to be told what to do
+ * @property {Tool} tool
+ * @property {number} size
+ * @property {number} hardness
+ * @property {number} flow
+ * @property {number} importance
+ * @property {"light" | "look"} as
+ * @property {"spot" | "object"} about what a drag asks about
+ * @property {RGB} colour linear, its largest channel at most 1
+ * @property {number} stops brightness of the paint over `colour`
+ * @property {{colour: RGB, stops: number}} second
+ * @property {{colour: RGB, stops: number}[]} recent
+ * @property {"white" | "hsv" | "rgb"} mixer
+ * @property {{stops: number, mired: number} | null} asking by a drag
+ * @property {Show} show
+ * @property {number[]} solo lights
+ * @property {number[]} mute
+ * @property {number | null} hovered light whose own picture is shown
+ * @property {{object: string | null, shares: number[]} | null} pointed
+ * @property {{a: number, b: number, share: number} | null} mix of two looks, by their ids
+ * @property {Record<string, boolean>} open what is unfolded
+ * @property {boolean} side whether the panels are there
+ * @property {null | "keys" | "export" | "settings" | "view"} dialog
+ * @property {string} search
+ * @property {"scene" | "name" | "share" | "change"} sort
+ * @property {number[]} unfolded lights whose controls are open
+ */
+
+/** @typedef {import("./store.js").Store<Ui>} UiStore */
+
+/** @type {Show} */
+const SHOW = {
+  left: "painting", right: "solution", layout: "side", wipe: 0.5, blink: "left", zoom: 1,
+  pan: [0, 0], stops: 0, transform: "srgb", clean: true, overlay: null, gains: null,
+  instead: null, other: null,
+};
+
+/** @returns {Ui} */
+export function first() {
+  return {
+    ready: false, readonly: false, state: null, lights: [], lit: [], weights: [], headline: "",
+    deltaE: null, sentences: [], isLive: false, asked: {}, ties: [], settings: {}, meant: {},
+    history: { undo: [], redo: [] }, looks: [], basis: null, verifying: null, loading: null,
+    verified: null, explained: [], exported: null, connection: "wait", closed: null, toasts: [],
+    resources: {}, hint: false, tool: "brush", size: 60, hardness: 0.5, flow: 1, importance: 1,
+    as: "light", about: "spot", colour: [1, 0.45, 0.13], stops: 0, second: { colour: [0.2, 0.4, 1], stops: 0 },
+    recent: [], mixer: "white", asking: null, show: SHOW, solo: [], mute: [], hovered: null,
+    pointed: null, mix: null, open: { colour: true, lights: true, truth: false }, side: true,
+    dialog: null, search: "", sort: "scene", unfolded: [],
+  };
+}
+
+/**
+ * What is drawn: what was chosen, with what is only looked at for a moment.
+ * @param {Ui} ui @returns {Show}
+ */
+export function shown(ui) {
+  const show = { ...ui.show };
+  const isAlone = ui.solo.length > 0;
+  if (isAlone || ui.mute.length) {
+    show.gains = ui.lights.map((_, k) => (isAlone ? ui.solo.includes(k) : !ui.mute.includes(k)));
+  }
+  const mixed = ui.mix && mixOf(ui, ui.mix);
+  if (mixed) show.other = mixed;
+  if (ui.hovered !== null) {
+    const k = ui.hovered;
+    const gain = gainOf(ui, k);
+    const rgb = alone(ui.weights[k], ui.lights[k]).map((x) => x * gain);
+    show.other = ui.weights.map((_, i) => (i === k ? /** @type {RGB} */ (rgb) : [0, 0, 0]));
+    show.right = "other";
+    show.gains = null;
+  }
+  return show;
+}
+
+/** By how much a light alone is shown brighter, so that one of many can be seen: whole stops.
+ * @param {Ui} ui @param {number} k @returns {number} */
+export function gainOf(ui, k) {
+  const share = ui.lit[k]?.share ?? 1;
+  return share > 0 ? 2 ** Math.min(10, Math.max(0, Math.round(Math.log2(0.5 / share)))) : 1;
+}
+
+/** A light that is off is shown as it is now, or else at one unit. @param {RGB} rgb
+ * @param {Light} light @returns {RGB} */
+function alone(rgb, light) {
+  if (Math.max(...rgb) > 0) return rgb;
+  return Math.max(...light.present) > 0 ? light.present : [1, 1, 1];
+}
+
+/** @param {Ui} ui @param {{a: number, b: number, share: number}} mix @returns {RGB[] | null} */
+export function mixOf(ui, { a, b, share }) {
+  const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);
+  if (!from || !to) return null;
+  return from.map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * to[k][c])
+    ).map((rgb) => /** @type {RGB} */ (rgb));
+}
+
+/** Linear light of the paint in the hand. @param {Ui} ui @returns {RGB} */
+export function paintOf({ colour, stops }) {
+  return /** @type {RGB} */ (colour.map((x) => x * 2 ** stops));
+}

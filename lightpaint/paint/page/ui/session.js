@@ -1,0 +1,222 @@
+/** Talks with the session: what it says becomes state, what a person does becomes messages. */
+
+/** @typedef {import("./engine.js").Host} Host */
+/** @typedef {import("./engine.js").Message} Message */
+/** @typedef {import("./engine.js").RGB} RGB */
+/** @typedef {import("./model.js").Ui} Ui */
+/** @typedef {import("./model.js").Asked} Asked */
+
+const HEARD = ["state", "answer", "patch", "renewed", "progress", "say", "failed", "looks",
+  "exported", "verified", "explained", "closed", "connection"];
+
+export class Session {
+  /** @param {Host} host @param {import("./model.js").UiStore} store */
+  constructor(host, store) {
+    this.host = host;
+    this.store = store;
+    /** Replies come twice: to who asked, and to who listens. @type {WeakSet<Message>} */
+    this.done = new WeakSet();
+    /** What was asked of a light before a hand moved it. @type {Map<number, Asked>} */
+    this.before = new Map();
+    for (const kind of HEARD) host.on(kind, (message) => this.receive({ ...message, kind }, message));
+  }
+
+  /**
+   * Say something; what cannot be done is said in a toast.
+   * @param {string} kind @param {Record<string, any>} [fields] @returns {Promise<Message | null>}
+   */
+  async send(kind, fields = {}) {
+    try {
+      const reply = await this.host.send(kind, fields);
+      this.receive(reply, reply);
+      return reply;
+    } catch (error) {
+      this.toast(error instanceof Error ? error.message : String(error), "warn");
+      return null;
+    }
+  }
+
+  /** @param {Message} message @param {Message} [origin] */
+  receive(message, origin = message) {
+    if (this.done.has(origin)) return;
+    this.done.add(origin);
+    const told = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
+      state: stateOf,
+      answer: (/** @type {any} */ m) => answerOf(m, this.store.value),
+      patch: (/** @type {any} */ m) => answerOf(m, this.store.value),
+      renewed: (/** @type {any} */ m) =>
+        ({ resources: { ...this.store.value.resources, ...m.resources } }),
+      progress: progressOf,
+      say: (/** @type {any} */ m) => this.toast(m.text, m.tone),
+      failed: (/** @type {any} */ m) => this.failed(m.text),
+      looks: (/** @type {any} */ m) => ({ looks: m.looks }),
+      exported: (/** @type {any} */ m) => ({ exported: m }),
+      verified: (/** @type {any} */ m) => ({ verified: m, verifying: null }),
+      explained: (/** @type {any} */ m) => ({ explained: m.sentences }),
+      closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
+      connection: (/** @type {any} */ m) => ({ connection: m.state }),
+    })[message.kind]?.(message);
+    if (told) this.store.set(told);
+    if (told?.asked) this.forget(told.asked);
+  }
+
+  /** What lights were before a hand held them, of those that are held no more: undo does that, too.
+   * @param {Record<string, Asked>} asked */
+  forget(asked) {
+    for (const light of this.before.keys()) {
+      const now = asked[this.store.value.lights[light]?.name] ?? {};
+      if (now.lock === undefined && !now.off) this.before.delete(light);
+    }
+  }
+
+  /** @param {string} text */
+  failed(text) {
+    this.store.set({ verifying: null });
+    this.toast(text, "warn");
+  }
+
+  /** @param {string} text @param {"info" | "warn"} [tone] */
+  toast(text, tone = "info") {
+    const id = Date.now() + Math.random();
+    const others = this.store.value.toasts.filter((one) => one.text !== text).slice(-2);
+    this.store.set({ toasts: [...others, { id, text, tone }] });
+    const stays = Math.min(15000, 4000 + 60 * text.length);
+    setTimeout(() => this.dismiss(id), tone === "warn" ? 2 * stays : stays);
+  }
+
+  /** @param {number} id */
+  dismiss(id) {
+    this.store.set((ui) => ({ toasts: ui.toasts.filter((one) => one.id !== id) }));
+  }
+
+  /**
+   * What is asked of a light from now on.
+   * @param {number} light @param {Asked} asked @param {boolean} [done] false while a slider moves
+   */
+  ask(light, asked, done = true) {
+    const kept = Object.fromEntries(Object.entries(asked).filter(
+      ([, value]) => value !== null && value !== undefined && value !== false));
+    this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }));
+    return this.send("ask", { light, asked: kept, done });
+  }
+
+  /**
+   * Set a light by hand: it is held there, and the others are solved around it.
+   * @param {number} light @param {RGB} emission @param {boolean} done
+   */
+  hold(light, emission, done) {
+    const { lights, asked } = this.store.value;
+    const { name, is_scalar: isScalar } = lights[light];
+    const now = asked[name] ?? {};
+    if (!this.before.has(light)) this.before.set(light, withoutLevel(now));
+    const level = isScalar ? emission[0] : emission;
+    return this.ask(light, { lock: level }, done);
+  }
+
+  /** Let the solve have a light again, with what was asked of it before. @param {number} light */
+  release(light) {
+    const { lights, asked } = this.store.value;
+    const before = this.before.get(light) ?? withoutLevel(asked[lights[light].name] ?? {});
+    this.before.delete(light);
+    return this.ask(light, before);
+  }
+
+  /** @param {number} light @param {boolean} off */
+  turn(light, off) {
+    if (!off) return this.release(light);
+    const { lights, asked } = this.store.value;
+    if (!this.before.has(light)) {
+      this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}));
+    }
+    return this.ask(light, { off: true });
+  }
+
+  /** Put two lights on one dimmer. @param {string} one @param {string} other */
+  tie(one, other) {
+    const { ties } = this.store.value;
+    const joined = ties.filter((tie) => tie.includes(one) || tie.includes(other)).flat();
+    const rest = ties.filter((tie) => !tie.includes(one) && !tie.includes(other));
+    return this.tieAll([...rest, [...new Set([...joined, one, other])]]);
+  }
+
+  /** @param {string} name */
+  untie(name) {
+    const left = this.store.value.ties.map((tie) => tie.filter((one) => one !== name));
+    return this.tieAll(left.filter((tie) => tie.length > 1));
+  }
+
+  /** @param {string[][]} ties */
+  tieAll(ties) {
+    this.store.set({ ties });
+    return this.send("tie", { ties });
+  }
+
+  /** @param {string} key @param {any} value null for what follows from the painting */
+  setting(key, value) {
+    this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }));
+    return this.send("set", { values: { ...this.store.value.settings } });
+  }
+
+  verify(run = true) {
+    this.store.set({
+      verifying: run ? { what: "verify", done: 0, total: 0, unit: "" } : null,
+    });
+    return this.send("verify", { run });
+  }
+}
+
+/** @param {Asked} asked @returns {Asked} */
+function withoutLevel({ lock, off, ...rest }) {
+  return rest;
+}
+
+/** @param {any} message @returns {Partial<Ui>} */
+function stateOf(message) {
+  const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
+  return {
+    ready: true, state: message, lights, asked: asked ?? {}, ties: ties ?? [],
+    settings: settings ?? {}, meant: meant ?? {}, history, looks: looks ?? [],
+    resources: resources ?? {}, hint: Boolean(message.first), connection: "open", closed: null,
+    basis: basis && !basis.done ? { what: "basis", done: basis.spp, total: basis.wanted,
+      unit: "samples" } : null,
+    ...(message.answer ? answerFields(message.answer) : {}),
+    ...weightsOf(message),
+  };
+}
+
+/** @param {any} answer @returns {Partial<Ui>} */
+function answerFields({ headline, delta_e: deltaE, sentences, lights }) {
+  return {
+    headline: headline ?? "", deltaE: deltaE ?? null, sentences: sentences ?? [],
+    ...(lights ? { lit: lights } : {}), isLive: false,
+  };
+}
+
+/** @param {Message} message @returns {Partial<Ui>} */
+function weightsOf(message) {
+  const flat = message.arrays?.weights?.data;
+  if (!flat) return {};
+  /** @type {RGB[]} */
+  const weights = [];
+  for (let at = 0; at < flat.length; at += 3) weights.push([flat[at], flat[at + 1], flat[at + 2]]);
+  return { weights };
+}
+
+/** Of an answer, and of a patch. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+function answerOf(message, ui) {
+  const made = /** @type {Partial<Ui>} */ (weightsOf(message));
+  if (message.kind === "answer" && !message.exact) return { ...made, isLive: true };
+  for (const key of /** @type {const} */ (["history", "asked", "ties", "settings", "meant"])) {
+    if (message[key]) made[key] = message[key];
+  }
+  if (message.lights) Object.assign(made, answerFields(message));
+  if (ui.verified && message.lights) made.verified = { ...ui.verified, isOld: true };
+  return made;
+}
+
+/** @param {any} message @returns {Partial<Ui>} */
+function progressOf({ what, done, total, unit }) {
+  const made = { what, done, total, unit };
+  if (/verif/i.test(what)) return { verifying: made };
+  return { basis: total && done >= total ? null : made };
+}

@@ -1,0 +1,40 @@
+/** One place for all that the interface shows, and whoever wants to know of changes. */
+
+/**
+ * @template {object} T
+ */
+export class Store {
+  /** @param {T} value */
+  constructor(value) {
+    this.value = value;
+    /** @type {Set<() => void>} */
+    this.listeners = new Set();
+    this.waiting = false;
+  }
+
+  /**
+   * Change some of it. Listeners hear of it once, before the next frame, however many changes
+   * there were; `value` is new at once.
+   * @param {Partial<T> | ((value: T) => Partial<T>)} changes
+   */
+  set(changes) {
+    const made = typeof changes === "function" ? changes(this.value) : changes;
+    this.value = { ...this.value, ...made };
+    if (!this.waiting) {
+      this.waiting = true;
+      queueMicrotask(() => {
+        this.waiting = false;
+        for (const listener of this.listeners) listener();
+      });
+    }
+  }
+
+  /**
+   * @param {() => void} listener
+   * @returns {() => void} what ends it
+   */
+  listen(listener) {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+}
