@@ -33,7 +33,7 @@ _COMMENT = re.compile(
     r"^[ \t]*(?:/\*(?!!)[\s\S]*?\*/[ \t]*(?=\n|\Z)|//[^\n]*(?=\n|\Z))", re.MULTILINE
 )
 _TYPE = re.compile(r"/\*\*\s*@(?:type|param|returns|this|template)\b[\s\S]*?\*/ ?")
-_LEFT = re.compile(r"^\s*(?:import|export)\b|\bimport\.meta\b", re.MULTILINE)
+_LEFT = re.compile(r"^\s*(?:import|export)\s*[\w$*{'\"]|\bimport\.meta\b", re.MULTILINE)
 
 
 class BundleError(Exception):

@@ -189,6 +189,7 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         "unconstrained": look.analysis.unconstrained,
         "suggestions": look.suggestions,
         "seen": look.analysis.seen,
+        "color_choices": look.analysis.color_choices,
     }
     write_text(folder / "report.json", report_numbers(**how))
     write_text(folder / "report.html", report_page(**how, looks=looks))

@@ -61,8 +61,8 @@ class Problem:
         squares: The linear problem that stands for the loss, the loss itself where that is one;
             before a solve has found better, the painting taken at its word.
         equations: M and b of these squares, of the basis as it is.
-        constraints: What is asked of the lights.
-        reduction: What constraints leave to solve for.
+        constraints: What is asked of the lights, beside what `fit` says of their colours.
+        reduction: What both leave to solve for.
         full: The same with all lights that `sparse` has not chosen.
         start: (n, 3), the weights to begin with: lights that reach nothing keep them.
         fit: How close is measured, and how the closest is found.
@@ -129,8 +129,6 @@ class Problem:
         ]
         views = Views(parts, tuple(fitted))
         fit = meant_by(fit, fitted)
-        if fit.colors == "white":
-            asked = white_where_free(asked, whole.lights)
         word = joint_squares(views, unpainted=weight_of_rest(views, fit))
         loss = loss_of(
             word,
@@ -167,6 +165,11 @@ class Problem:
     def space(self) -> Space:
         """In which the prediction is brought close to the painting."""
         return "linear" if self.loss.transform is None else "display"
+
+    @property
+    def asks(self) -> bool:
+        """Whether anything limits the lights: constraints, or that they are to be white."""
+        return bool(self.constraints) or self.fit.colors == "white"
 
     @property
     def solved(self) -> NormalEquations:
@@ -273,7 +276,12 @@ class Problem:
 
 
 def reduced_by(asked: Constraints, basis: Basis, fit: Fit) -> Reduction:
-    """What constraints leave of the lights, and the fit of their colours."""
+    """What constraints leave of the lights, and the fit of their colours.
+
+    Raises ConstraintError for a light that is to be white and cannot be what else is asked of it.
+    """
+    if fit.colors == "white":
+        asked = white_where_free(asked, basis.lights)
     return replace(reduce_to(asked, basis.lights), is_joined=fit.colors == "gentle")
 
 

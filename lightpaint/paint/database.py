@@ -8,7 +8,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -23,6 +23,9 @@ APPLICATION, VERSION = 0x6C706E74, 1
 
 #: Pages (of 16 KiB) of what was thrown away that are given back at a start: 64 MB, a moment.
 GIVEN_BACK = 4096
+
+#: FULL: what is written is there when the current ends, too.
+SYNCHRONOUS = "FULL"
 
 TABLES = """
 CREATE TABLE about (name TEXT PRIMARY KEY, value) WITHOUT ROWID;
@@ -57,12 +60,12 @@ def opened(path: Path | None, identity: Identity | None) -> sqlite3.Connection:
 
 def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity | None) -> None:
     for setting in (
+        "locking_mode=EXCLUSIVE",  # first of all: WAL then needs no shared memory, nor room for it
         "trusted_schema=OFF",  # tables that others made may not call anything
         "page_size=16384",
         "auto_vacuum=INCREMENTAL",
-        "locking_mode=EXCLUSIVE",  # before WAL, which then needs no shared memory
         "journal_mode=WAL",
-        "synchronous=FULL",
+        f"synchronous={SYNCHRONOUS}",
     ):
         database.execute(f"PRAGMA {setting}").fetchall()
     with transaction(database):
@@ -83,11 +86,20 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             )
         if identity is not None:
             _check(database, path, identity)
-            said = json.dumps(asdict(identity))
-            database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (said,))
-    database.execute(f"PRAGMA incremental_vacuum({GIVEN_BACK})").fetchall()
+            _keep(database, json.dumps(asdict(identity)))
+    with suppress(sqlite3.OperationalError):  # on a full disk
+        # A row for each page, which only a script takes all of.
+        database.executescript(f"PRAGMA incremental_vacuum({GIVEN_BACK})")
 
 
+def _keep(database: sqlite3.Connection, identity: str) -> None:
+    """That it is of this; nothing is written if it is already, as the disk may be full."""
+    if (identity,) not in database.execute("SELECT value FROM about WHERE name = 'identity'"):
+        database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (identity,))
+
+
+#: What can be done instead, and how a session that another process has is told.
+IN_USE = "is in use"
 AFRESH = (
     "choose another folder (folder=...), or start afresh, which keeps it under another name "
     "(new=True)"
@@ -102,6 +114,11 @@ def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) 
             raise PaintError(
                 f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {identity.scene} "
                 f"has {identity.size[1]}x{identity.size[0]}: {AFRESH}"
+            )
+        if its.sensor != identity.sensor:
+            raise PaintError(
+                f"{path} is a session of the view through {its.sensor}, and this is through "
+                f"{identity.sensor}: {AFRESH}"
             )
         if its.lights != identity.lights:
             raise PaintError(
@@ -145,7 +162,7 @@ def _spoken(path: Path | None, error: sqlite3.Error) -> LightpaintError:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
         return PaintError(
-            f"{path} is in use: another lightpaint paints there; end that one, or choose another "
+            f"{path} {IN_USE}: another lightpaint paints there; end that one, or choose another "
             "folder (folder=...)"
         )
     if code in _DAMAGED or not isinstance(error, sqlite3.OperationalError):
@@ -163,7 +180,7 @@ def set_aside(path: Path) -> Path | None:
     try:
         opened(path, None).close()  # what its last process left beside it goes into it
     except PaintError as error:
-        if "is in use" in str(error):
+        if IN_USE in str(error):
             raise
     number = 1
     while (aside := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists():

@@ -65,6 +65,7 @@ class Line:
         self._unsaved: str | None = None
         self._watch: asyncio.Task[None] | None = None
         self._is_over = False
+        self._leaving: asyncio.Future[None] | None = None
 
     def begin(self) -> None:
         """Hear the session from now on, in the running loop."""
@@ -158,8 +159,11 @@ class Line:
     def _give(self, client: Client) -> None:
         """`client` has the session from now on."""
         before, self._holder = self._holder, client
-        if before not in (None, client):
-            assert before is not None
+        if before is None or before is client:
+            return
+        if _same_page(before, client):  # it is at the other end of a lost connection
+            self._leaving = asyncio.ensure_future(before.leave(1001))
+        else:
             before.send(_taken("another tab has taken this session over"))
 
     def _post(self, message: Message) -> None:

@@ -96,12 +96,15 @@ def listening(host: str, port: int | None) -> socket.socket:
 
     Raises PaintError where there is none.
     """
+    reason = "ports are numbers up to 65535"
     for tried in (PORT, 0) if port is None else (port,):
+        if not 0 <= tried < 2**16:
+            break
         try:
             family = socket.AF_INET6 if ":" in host else socket.AF_INET
             return socket.create_server((host, tried), family=family)
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
+        except OSError as error:
+            reason = error.strerror or str(error)
     raise PaintError(f"cannot listen at {host}:{tried}: {reason}; choose another with port=...")
 
 

@@ -9,7 +9,7 @@ While a brush is down the answer is that of `Live`; `settle` finds the exact one
 `lightpaint solve` finds for the exported painting.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -207,14 +207,26 @@ class Session:
         """As messages have them."""
         return {"weights": self.weights}
 
-    def settled(self, moment: Moment, solution: Solution | None, **more: Any) -> Message | None:
-        """The exact answer to `moment`, if nothing has changed since."""
+    def settled(
+        self,
+        moment: Moment,
+        solution: Solution | None,
+        *,
+        of_lights: Sequence[Mapping[str, Any]] = (),
+        **more: Any,
+    ) -> Message | None:
+        """The exact answer to `moment`, if nothing has changed since.
+
+        of_lights, more: what is known of each light, and of the whole.
+        """
         if moment.version != self.version:
             return None
         if solution is not None:
             self.weights = solution.weights
-        told = {"lights": lights_fields(self.basis, self.weights), **self.about, **more}
-        return self.answer(**{**told, "exact": True})
+        lights = lights_fields(self.basis, self.weights)
+        for light, known in zip(lights, of_lights, strict=bool(of_lights)):
+            light |= known
+        return self.answer(**{**self.about, **more, "lights": lights, "exact": True})
 
     @property
     def about(self) -> dict[str, Any]:

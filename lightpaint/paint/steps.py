@@ -67,13 +67,15 @@ class Identity:
     """What a session is of: steps speak of its pixels, and of its lights by their names.
 
     scene: name of the scene or basis, for people. basis: what the basis says it was made of, which
-    may change, as a scene does in which something was moved. size: (height, width).
+    may change, as a scene does in which something was moved. size: (height, width). sensor: that
+    it is seen through.
     """
 
     scene: str
     basis: str
     size: tuple[int, int]
     lights: tuple[str, ...]
+    sensor: str = ""
 
     @classmethod
     def of(cls, basis: Basis) -> "Identity":

@@ -180,7 +180,7 @@ class Store:
         """
         with self._lock:
             unsaved = self.flush()
-            self._waiting = []
+            self._waiting, self.unsaved = [], None  # closed again, there is nothing left to say
             try:
                 self._database.close()
             except sqlite3.Error as error:  # what is beside the file goes into it next time

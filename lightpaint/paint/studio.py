@@ -63,6 +63,18 @@ class Studio:
             for work in (self._obtain, self._settle)
         ]
 
+    @property
+    def session(self) -> Session:
+        """What is painted. Raises PaintError before there is a basis."""
+        if self._session is None:
+            raise PaintError(self._failed or "the first picture is still being rendered")
+        return self._session
+
+    @property
+    def store(self) -> Store | None:
+        """Where it is kept; None before there is a basis."""
+        return None if self._session is None else self._session.store
+
     def start(self) -> None:
         """Begin to obtain the basis."""
         for thread in self._threads:
@@ -90,7 +102,7 @@ class Studio:
                 "can_render": self.subject.scene is not None,
             }
             if session is None:
-                return Message("state", {**about, "waiting": self._failed or True})
+                return Message("waiting", {**about, "text": self._failed})
             basis = session.basis
             about |= self._of_basis(basis, session)
             answer = {"lights_answer": lights_fields(basis, session.weights)}
@@ -106,9 +118,8 @@ class Studio:
                 Message("fetched", {"name": message.name}, {"data": self.resource(message.name)})
             ]
         with self._lock:
-            session, looks = self._session, self._looks
-            if session is None or looks is None:
-                raise PaintError(self._failed or "the first picture is still being rendered")
+            session, looks = self.session, self._looks
+            assert looks is not None
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
                     return [looks.said(message)]

@@ -69,7 +69,7 @@ def analysis_fields(analysis: Analysis) -> dict[str, Any]:
         "delta_e": seen.delta_e,
         "delta_e_asked": seen.asked,
         "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],
-        "lights_more": [
+        "of_lights": [
             {"error": error, "held": its.is_active, "unreached": not any(its.reached)}
             for error, its in zip(errors, settings, strict=True)
         ],

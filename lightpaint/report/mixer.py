@@ -83,9 +83,10 @@ def mixer_html(
     }
     # In a script nothing is escaped, and only `<` can end it.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = text.replace("<", "\\u003c")
     return (
-        f'<section class="mixer" hidden><h2>{title}</h2><p>{ABOUT}</p><script type="application/json">'
-        f"{text.replace('<', chr(92) + 'u003c')}</script></section>"
+        f'<section class="mixer" hidden><h2>{title}</h2><p>{ABOUT}</p>'
+        f'<script type="application/json">{text}</script></section>'
     )
 
 

@@ -15,18 +15,21 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import covered
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
+from lightpaint.report.colors import colors_section
 from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import lights_table
 from lightpaint.report.looks import Looks
+from lightpaint.report.meant import spoken_meaning
 from lightpaint.report.mixer import mixer_assets, mixer_html
 from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
@@ -49,6 +52,7 @@ def report_page(
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
     looks: Looks | None = None,
+    color_choices: Choices = (),
 ) -> str:
     """The page as HTML text.
 
@@ -56,7 +60,8 @@ def report_page(
     command: the shell command that made the result.
     uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
     what they tell. seen: what `what_is_seen` says, where somebody has looked.
-    looks: the pictures without their grain, which then have it on a switch.
+    looks: the pictures without their grain, which then have it on a switch. color_choices: what
+    other colours would come to, if that is known.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -72,6 +77,7 @@ def report_page(
         target=escape(target.name),
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
         verdict=escape(verdict(solution, predicted, verification, seen=seen)),
+        meant=escape(spoken_meaning(solution)),
         banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
         wipe=wipe(_pictures(target, solution, looks, raw, transform=transform)),
         exposure=_exposure(transform, predicted.image, looks.how),
@@ -79,7 +85,8 @@ def report_page(
             solution, predicted.image, current, verification=verification, transform=transform
         ),
         missed=missed_section(solution, diagnosis, current, transform=transform)
-        + constraints_section(basis, solution, unconstrained, transform=transform, looks=looks),
+        + constraints_section(basis, solution, unconstrained, transform=transform, looks=looks)
+        + colors_section(color_choices),
         suggestions=suggestion_section(
             suggestions,
             transform=transform,

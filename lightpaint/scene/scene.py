@@ -248,6 +248,7 @@ def load_scene(
     groups: Mapping[str, Iterable[str]] | None = None,
     lights_file: str | Path | None = None,
     use_lights_file: bool = True,
+    group_alike: bool = True,
     integrator: str | None = None,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
@@ -263,6 +264,8 @@ def load_scene(
             replaces what it lists, `groups` are added to its own or replace namesakes; without
             `lights` they are adjusted beside what it lists.
         use_lights_file: False leaves the one beside the scene alone.
+        group_alike: Whether more than 24 emitters that are alike and have no names are one light,
+            unless they are asked for by the names that they get here. The lights file may say no.
         integrator: To render with instead of the scene's own, like `path`, `direct` or
             `path:max_depth=8`. What its own says of max_depth, rr_depth and hide_emitters stays.
 
@@ -296,7 +299,14 @@ def load_scene(
     return Scene(
         path=path,
         parameters=values,
-        lights=choose_lights(emitters, scene=str(path), lights=said.lights, groups=said.groups),
+        lights=choose_lights(
+            emitters,
+            scene=str(path),
+            lights=said.lights,
+            groups=said.groups,
+            group_alike=group_alike and said.group_alike,
+            named=said.asked.names,
+        ),
         lights_file=said.path,
         asked=said.asked,
         _parsed=parsed,

@@ -167,7 +167,7 @@ def diagnose(solution: Solution) -> Diagnosis:
         bounds=bounds,
         bounds_left_out=left_out,
         lighting_total=total if whole is solution else whole.energy,
-        is_constrained=bool(solution.problem.constraints),
+        is_constrained=solution.problem.asks,
         compromise=compromise,
         painting_noise=painting_noise,
         place=_place(solution, unreachable) if lacking > 0 else None,

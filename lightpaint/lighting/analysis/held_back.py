@@ -52,12 +52,12 @@ def held_back_by(solution: Solution) -> tuple[Held, ...]:
 
 
 def _asked(problem: Problem) -> tuple[Held, ...]:
-    """What is asked at all. Whites are asked of each light, and stand among its constraints."""
+    """What is asked at all."""
     fit, asked = problem.fit, problem.constraints
     on: dict[Held, bool] = {
         "hold": bool(fit.hold or fit.unpainted),
         "colors": fit.colors != "free",
-        "constraints": bool(asked) and fit.colors != "white",
+        "constraints": bool(asked),
     }
     return tuple(name for name, is_on in on.items() if is_on)
 
@@ -69,9 +69,7 @@ def _let_go(problem: Problem, those: tuple[Held, ...]) -> Problem:
         change |= {"hold": 0.0, "unpainted": 0.0}
     if "colors" in those:
         change["colors"] = "free"
-    constraints = problem.constraints
-    if "constraints" in those or ("colors" in those and problem.fit.colors == "white"):
-        constraints = Constraints()
+    constraints = Constraints() if "constraints" in those else problem.constraints
     return _problem(problem, problem.views.targets[0], constraints, replace(problem.fit, **change))
 
 

@@ -76,6 +76,13 @@ class Seen:
         return self.delta_e - self.noise
 
     @property
+    def share_met(self) -> float:
+        """Share of what was asked that has come about: 1 − `delta_e` / `asked`, at least 0."""
+        if self.asked > 0:
+            return max(1 - self.delta_e / self.asked, 0.0)
+        return float(self.delta_e == 0)
+
+    @property
     def is_in_vain(self) -> bool:
         """Whether hardly any of what was asked has come about."""
         return self.missed > max(UNSEEN, (1 - SOME) * self.asked)

@@ -4,12 +4,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
-from http.server import (
-    BaseHTTPRequestHandler,
-    SimpleHTTPRequestHandler,
-    ThreadingHTTPServer,
-)
+from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -24,15 +19,6 @@ HERE = Path(__file__).parent
 #: WebGL2 in software, so that both views are tried where there is no GPU.
 ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": "text/css"}
-
-
-#: As the server of the painter has it: nothing from elsewhere, nothing inline.
-CSP = (
-    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: "
-    "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-
-FOLDERS = {"/page/": PAGE, "/fake/": HERE / "fake"}
 
 
 @pytest.fixture(scope="session")
@@ -114,6 +100,15 @@ def page(browser: Any, site: Site) -> Iterator[Any]:
     assert wrong == []
 
 
+#: As the server of the painter has it: nothing from elsewhere, nothing inline.
+CSP = (
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' "
+    "data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+FOLDERS = {"/page/": PAGE, "/fake/": HERE / "fake"}
+
+
 class _Files(SimpleHTTPRequestHandler):
     """Files of the page and of what stands in for the rest of it."""
 
@@ -130,13 +125,13 @@ class _Files(SimpleHTTPRequestHandler):
         super().end_headers()
 
     def log_message(self, *_: Any) -> None:
-        pass
+        """Say nothing."""
 
 
 @pytest.fixture(scope="session")
 def fake_page() -> Iterator[str]:
     """Address of the interface over a session that is made up."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Files))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Files)
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}/"

@@ -223,4 +223,8 @@ def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any):
     for which in ("cpu", "gl"):
         shown(page, which, pictures)
         planes = {"cpu": 6, "gl": 8}[which] * N * H * W
-        assert planes <= page.evaluate("() => view.memory()") - 65536 * 4 <= planes + 60 * H * W + 2**21
+        assert (
+            planes
+            <= page.evaluate("() => view.memory()") - 65536 * 4
+            <= planes + 60 * H * W + 2**21
+        )
