@@ -30,10 +30,10 @@ _LISTED = re.compile(
 _DYNAMIC = re.compile(r"(?<![\w$.])import\(")
 _PATHS = re.compile(r"""\(\s*["'](\.[./\w-]*\.js)["']""")
 _COMMENT = re.compile(
-    r"^[ \t]*(?:/\*(?!!)[\s\S]*?\*/[ \t]*(?=\n|\Z)|//[^\n]*(?=\n|\Z))", re.MULTILINE
+    r"^[ \t]*(?:/\*(?!!)(?:(?!\*/)[\s\S])*\*/[ \t]*(?=\n|\Z)|//[^\n]*(?=\n|\Z))", re.MULTILINE
 )
 _TYPE = re.compile(r"/\*\*\s*@(?:type|param|returns|this|template)\b[\s\S]*?\*/ ?")
-_LEFT = re.compile(r"^\s*(?:import|export)\s*[\w$*{'\"]|\bimport\.meta\b", re.MULTILINE)
+_LEFT = re.compile(r"^\s*(?:import|export)(?:\s+[\w$*]|\s*[{'\"])|\bimport\.meta\b", re.MULTILINE)
 
 
 class BundleError(Exception):
