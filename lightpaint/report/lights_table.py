@@ -21,7 +21,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
 from lightpaint.report.looks import MOST_THUMBNAILS
-from lightpaint.report.measures import energy_shares
+from lightpaint.report.measures import energy_shares, largest_shares, that_do_most
 from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
 
 #: Headings of the columns, with the classes of their cells.
@@ -54,10 +54,8 @@ def lights_table(
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
     if len(rows) <= SHOWN + SPARE:
         return _table(rows, solution)
-    shares = np.maximum(
-        energy_shares(basis, solution.lighting), energy_shares(basis, Lighting.present(basis))
-    )
-    most = np.sort(np.argsort(-shares, kind="stable")[:SHOWN])
+    shares = largest_shares(basis, solution.lighting)
+    most = that_do_most(basis, solution.lighting)
     rest = np.setdiff1d(np.arange(len(rows)), most)
     told = (
         f"{len(rest)} more lights, none of which is more than "

@@ -4,6 +4,7 @@ The page's frame is page.html.in; what is filled in comes from the other modules
 are data: URIs; nothing is loaded from anywhere, and the page's own content policy forbids it.
 """
 
+import shlex
 from collections.abc import Sequence
 from html import escape
 from importlib import resources
@@ -29,6 +30,7 @@ from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import lights_table
 from lightpaint.report.looks import Looks
 from lightpaint.report.meant import spoken_meaning
+from lightpaint.report.mixer import mixer_assets, mixer_html
 from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
@@ -96,6 +98,7 @@ def report_page(
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, predicted, verification),
+        mixer=_mixer(basis, target, solution, looks, transform=transform) + mixer_assets(),
         command=escape(command or "(made from Python, without a command line)"),
         again=_paint_again(basis, target, verification),
         versions=escape(versions(basis)),
@@ -130,6 +133,21 @@ def _pictures(
         about = "An independent render of the relit scene."
         pictures.append(picture("verified", about, looks.verified, raw.verified))
     return pictures
+
+
+def _mixer(
+    basis: Basis, target: Target, solution: Solution, looks: Looks, *, transform: ViewTransform
+) -> str:
+    """The lights by hand."""
+    scene = basis.origin.scene
+    return mixer_html(
+        basis,
+        solution.lighting,
+        target_picture(target, solution, looks.current, transform=transform),
+        transform=transform,
+        is_clean=looks.is_clean,
+        scene=shlex.quote(scene) if scene.endswith(".xml") else None,
+    )
 
 
 def _banner(verification: Verification | None) -> str:
