@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from threading import Condition, Lock, RLock, Thread
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
@@ -216,6 +217,9 @@ class Studio:
         if basis.features is not None:
             albedo = basis.features.albedo
             offer("albedo", lambda: pictures.as_halves(albedo))
+        if basis.objects is not None:
+            index = basis.objects.index
+            offer("objects", lambda: index.astype(np.int16))
         for transform in self._transforms(session):
             offer(f"lut/{transform.name}", lambda t=transform: pictures.table_of(t))  # type: ignore[misc]
 
@@ -234,7 +238,7 @@ class Studio:
                 {**light_fields(light), "scale": scale}
                 for light, scale in zip(basis.lights, scales, strict=True)
             ],
-            "objects": [],
+            "objects": [] if basis.objects is None else list(basis.objects.names),
             "transforms": [x.name for x in self._transforms(session)],
             "transform": {"name": session.transform.name, "stops": session.transform.stops},
             "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
