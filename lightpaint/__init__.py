@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from lightpaint.demo import write_demo as write_demo
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
+    from lightpaint.images.objects import Objects as Objects
     from lightpaint.images.png import display_picture as display_picture
     from lightpaint.job import Job as Job
     from lightpaint.lighting.analysis.analyse import Analysis as Analysis
@@ -100,6 +101,7 @@ _HOMES = {
     "Lighting": "lighting.lighting",
     "LightpaintError": "errors",
     "Look": "results",
+    "Objects": "images.objects",
     "Painting": "sources",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",

@@ -6,18 +6,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis import cache as bases
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.answer import Table, show_look, spoken_settings
-from lightpaint.cli.doctor import examine
+from lightpaint.cli.listing import lights as lights
+from lightpaint.cli.listing import note_scene
 from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.cli.painter import paint as paint
+from lightpaint.cli.upkeep import cache as cache
+from lightpaint.cli.upkeep import doctor as doctor
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
-from lightpaint.errors import BasisError, OutputError
+from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
@@ -25,13 +27,18 @@ from lightpaint.pipeline import obtain, run
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import scene_of
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
-from lightpaint.renders import relight_look, relit_folder, render_look, render_template
+from lightpaint.renders import (
+    relight_look,
+    relit_folder,
+    render_look,
+    render_template,
+)
 from lightpaint.result_folder import ResultFolder
 from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import some_names, some_of
+from lightpaint.screen import some_of
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
 from lightpaint.staging import finish
@@ -41,23 +48,13 @@ from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, file
 ANY = Wanted()
 
 
-def lights(*, scene: SceneFile, cd_per_unit: float | None) -> Outcome:
-    """`lightpaint lights SCENE`"""
-    loaded = scene.content
-    _note(loaded)
-    for remark in remarks_of_scene(loaded):
-        terminal.say(remark)
-    tables.show_lights(loaded, cd_per_unit)
-    return Outcome(lambda: documents.lights_document(loaded, cd_per_unit))
-
-
 def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
     """`lightpaint basis SCENE -o F.basis.exr`"""
     if output.suffix.lower() != ".exr":
         raise OutputError(f"{output} must end in .exr, the format that is written")
     check_writable(output.parent)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
-    _note(loaded)
+    note_scene(loaded)
     check_files([output], loaded.read_files)
     with terminal.Listener() as listen:
         of_film = remarks_of_film(loaded, settings)
@@ -82,7 +79,7 @@ def template(
     """`lightpaint template SCENE -o DIR`"""
     _check_template(output, force=force)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
-    _note(loaded)
+    note_scene(loaded)
     replaced = (
         files_in_the_way(output) if is_folder(output) else [output, output.with_suffix(".png")]
     )
@@ -225,58 +222,6 @@ def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) 
     )
 
 
-def cache(*, action: str, names: Sequence[str]) -> Outcome:
-    """`lightpaint cache [list | drop NAME... | clear]`"""
-    if action != "drop" and names:
-        raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
-    if action == "list":
-        kept, about = bases.entries(), {"folder": str(bases.folder()), "largest": bases.LARGEST}
-        tables.show_kept(kept)
-        size = sum(entry.size for entry in kept) / 1e6
-        terminal.write(
-            f"kept in {bases.folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB"
-        )
-        listed = [documents.kept_document(entry) for entry in reversed(kept)]
-        return Outcome(lambda: {**about, "kept": listed})
-    dropped = bases.entries() if action == "clear" else _kept_by_names(names)
-    freed = bases.drop(dropped)
-    if action == "drop":
-        tables.show_kept(dropped)
-    terminal.write(f"{len(dropped)} deleted from {bases.folder()}: {freed / 1e6:.1f} MB are free")
-    gone = [documents.kept_document(entry) for entry in dropped]
-    return Outcome(lambda: {"folder": str(bases.folder()), "dropped": gone, "freed": freed})
-
-
-def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
-    """The bases that are meant, each once. Raises BasisError for a name of none."""
-    if not names:
-        raise BasisError(
-            "cache drop needs the name of a scene or of a file, as cache list shows it"
-        )
-    found: dict[Path, bases.Entry] = {}
-    for name in names:
-        if not (its := bases.named(name)):
-            scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
-            there = some_names(sorted(scenes)) or "none"
-            raise BasisError(f"no basis of {name!r} is kept in {bases.folder()}: it has {there}")
-        found |= {entry.path: entry for entry in its}
-    return list(found.values())
-
-
-def doctor(*, variant: str | None) -> Outcome:
-    """`lightpaint doctor`"""
-    findings = examine(variant)
-    for finding in findings:
-        mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
-        terminal.write(f"{finding.what:18s} {mark:8s} {finding.found}")
-    missing = [finding for finding in findings if finding.state == "missing"]
-    for finding in missing:
-        if finding.remedy:
-            terminal.write(f"to mend {finding.what}: {finding.remedy}")
-    terminal.write("something is missing" if missing else "everything needed is here")
-    return Outcome(lambda: documents.doctor_document(findings), 2 if missing else 0)
-
-
 def _check_template(output: Path, *, force: bool) -> None:
     """Raise OutputError for a place that a template cannot or should not go to."""
     is_tree = is_folder(output)
@@ -309,17 +254,7 @@ def _replaced(output: Path) -> list[Path]:
 def _loaded(scene: SceneFile) -> Scene:
     """The scene, of whose lights only the sum counts."""
     loaded = scene.content
-    _note(loaded)
+    note_scene(loaded)
     if note := use_variant().note:
         terminal.say(note)
     return loaded
-
-
-def _note(loaded: Scene) -> None:
-    """A scene that was read, and by what, where somebody wants to know all."""
-    height, width = loaded.size
-    terminal.note(
-        f"{loaded.path} read: {len(loaded.emitters)} emitters, {len(loaded.lights)} lights, "
-        f"{width}x{height} pixels through {loaded.sensor_names[loaded.sensor]}, "
-        f"{use_variant().variant}"
-    )

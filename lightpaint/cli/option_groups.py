@@ -189,7 +189,7 @@ def add_unit(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
+def add_output(parser: "argparse._ActionsContainer", metavar: str, about: str) -> None:
     """Where results go."""
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
 

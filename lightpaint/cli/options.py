@@ -36,7 +36,14 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
     output = Path(asked["output"]) if asked.get("output") else None
     match options.command:
         case "lights":
-            return {"scene": scene_of(options), "cd_per_unit": options.cd_per_unit}
+            is_drawn = output is not None or not (options.no_sheet or options.as_json)
+            return {
+                "scene": scene_of(options),
+                "cd_per_unit": options.cd_per_unit,
+                "sheet": (output or Path("lights.png")) if is_drawn else None,
+                "is_asked": output is not None,
+                "force": options.force,
+            }
         case "basis":
             output = output or Path(Path(options.scene).stem + ".basis.exr")
             return {"scene": scene_of(options), "output": output, "settings": settings}

@@ -59,6 +59,14 @@ def _lights(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
     add_unit(parser)
+    where = parser.add_mutually_exclusive_group()
+    add_output(where, "F.png", "what each light does alone, as a picture (default: lights.png)")
+    where.add_argument(
+        "--no-sheet", action="store_true", help="only list them; --json does that, too, without -o"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace a picture of something else (default: refuse)"
+    )
 
 
 def _basis(parser: argparse.ArgumentParser) -> None:

@@ -85,10 +85,7 @@ def thumbnail(
     brought to white; reduced in linear light. is_clean: whether it is denoised then.
     """
     height, width = image.shape[:2]
-    bright = image.max(axis=-1)
-    lit = bright[(bright > 0) & ~emitters_seen]
-    lit = lit if lit.size else bright[bright > 0]
-    stops = float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+    stops = exposure_of(image, emitters_seen)
     if width > THUMBNAIL:
         size = (THUMBNAIL, max(1, round(height * THUMBNAIL / width)))
         box = Image.Resampling.BOX
@@ -101,6 +98,14 @@ def thumbnail(
     if is_clean and width < ENOUGH * THUMBNAIL:
         image = denoised(image)
     return encode_display(image, stops=stops), stops
+
+
+def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
+    """Stops that bring the 98th percentile of what a light lights to white, seen emitters aside."""
+    bright = image.max(axis=-1)
+    lit = bright[(bright > 0) & ~emitters_seen]
+    lit = lit if lit.size else bright[bright > 0]
+    return float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
 
 
 def wipe(looks: list[Picture]) -> str:

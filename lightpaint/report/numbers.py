@@ -112,8 +112,17 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
 
 def _seen(seen: Seen) -> dict[str, Any]:
     """Mean CIEDE2000 over what was painted, and what of that has come about."""
-    names = ("delta_e", "noise", "asked", "share_met")
-    return {name: getattr(seen, name) for name in names}
+    place = seen.place
+    return {
+        "delta_e": seen.delta_e,
+        "noise": seen.noise,
+        "asked": seen.asked,
+        "share_met": seen.share_met,
+        "region": None if place is None else place.region,
+        "object": place.object or None if place else None,
+        "held": seen.held or None,
+        "held_by_views": seen.held_by_views or None,
+    }
 
 
 def _choice(choice: ColorChoice) -> dict[str, Any]:

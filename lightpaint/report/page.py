@@ -65,9 +65,9 @@ def report_page(
     """
     target = target.fitted_to(basis.size, resize=False)
     verified = None if verification is None else verification.verified.image
-    transform = transform_of(target, predicted.image, verified)
     raw = Looks.raw(basis, predicted.image, verified)
     looks = looks or raw
+    transform = looks.through(transform_of(target, predicted.image, verified))
     current = looks.current
     template = resources.files("lightpaint.report").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
@@ -108,7 +108,8 @@ def _pictures(
     """What can be put side by side under the wipe, in the order of its lists."""
 
     def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> Picture:
-        both = transform.encode(clean), transform.encode(noisy)
+        size = looks.predicted.shape[:2]
+        both = [covered(transform.encode(x), size) for x in (clean, noisy)]
         return Picture(name, alt, both[0], both[1] if looks.is_clean else None)
 
     pictures = [
@@ -126,9 +127,8 @@ def _pictures(
         ),
     ]
     if looks.verified is not None and raw.verified is not None:
-        about, size = "An independent render of the relit scene.", looks.predicted.shape[:2]
-        clean, grainy = (covered(x, size) for x in (looks.verified, raw.verified))
-        pictures.append(picture("verified", about, clean, grainy))
+        about = "An independent render of the relit scene."
+        pictures.append(picture("verified", about, looks.verified, raw.verified))
     return pictures
 
 

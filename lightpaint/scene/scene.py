@@ -8,6 +8,7 @@ import gc
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +27,7 @@ from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import ParsedScene, mitsuba_errors
+from lightpaint.scene.shapes import shape_names
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import Listed, Shown, some_names, some_of
 
@@ -219,6 +221,11 @@ class Scene(Shown):
         finally:
             del loaded
             gc.collect()
+
+    @cached_property
+    def shape_names(self) -> tuple[str, ...]:
+        """What the shapes are called, in the order of a loaded scene's."""
+        return shape_names(self._parsed)
 
     @property
     def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:

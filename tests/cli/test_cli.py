@@ -181,17 +181,17 @@ def test_solving_from_a_basis_needs_no_mitsuba(basis_file: Path, tmp_path: Path)
 
 
 def test_lights_as_table_and_json(tmp_path: Path) -> None:
-    assert "left_spot" in succeed(tmp_path, "lights", CORNELL)
+    assert "left_spot" in succeed(tmp_path, "lights", CORNELL, "--no-sheet")
     data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json"))
     assert data["lights"][0]["name"] == "ceiling"
     np.testing.assert_allclose(data["lights"][0]["emission"], [7, 6.8, 6.4], rtol=1e-6)
 
 
 def test_lights_in_candela_and_lumen_where_the_scene_has_a_unit(tmp_path: Path) -> None:
-    plain = succeed(tmp_path, "lights", CORNELL)
+    plain = succeed(tmp_path, "lights", CORNELL, "--no-sheet")
     assert "K" in plain
     assert "lm" not in plain
-    assert "cd/m²" in succeed(tmp_path, "lights", CORNELL, "--unit", 100)
+    assert "cd/m²" in succeed(tmp_path, "lights", CORNELL, "--unit", 100, "--no-sheet")
     data = json.loads(succeed(tmp_path, "lights", CORNELL, "--json", "--unit", 100))
     assert data["cd_per_unit"] == 100
     lamp = next(light for light in data["lights"] if light["name"] == "lamp")
@@ -298,7 +298,7 @@ def test_whoever_reads_may_leave(basis_file: Path, tmp_path: Path) -> None:
 
 
 def test_a_terminal_without_unicode_loses_no_result(tmp_path: Path) -> None:
-    done = spawn(tmp_path, "lights", CORNELL, PYTHONIOENCODING="ascii")
+    done = spawn(tmp_path, "lights", CORNELL, "--no-sheet", PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
     assert "W/(m? sr)" in done.stdout
 
@@ -445,7 +445,7 @@ def test_missing_parameter_tells_the_option(tmp_path: Path) -> None:
     text = room.read_text(encoding="utf-8").replace('<default name="width" value="24"/>', "")
     room.write_text(text, encoding="utf-8")
     assert "-D width=VALUE" in refused(tmp_path, "lights", room)
-    assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9")
+    assert "sun" in succeed(tmp_path, "lights", room, "-D", "width=9", "--no-sheet")
 
 
 def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
@@ -481,7 +481,7 @@ def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
         "rest": ["beam", "screen"],
     }
     assert [name for name, light in listed.items() if light["is_fixed"]] == ["rest"]
-    assert "  beam" in succeed(tmp_path, "lights", room, *choice)
+    assert "  beam" in succeed(tmp_path, "lights", room, *choice, "--no-sheet")
 
     succeed(tmp_path, "template", room, "-o", "t.exr", "--spp", 16)
     output = succeed(tmp_path, "solve", room, "t.exr", *choice, "--spp", 64, "-o", "out")
@@ -514,7 +514,7 @@ def test_a_lights_file_beside_the_scene(tmp_path: Path) -> None:
         return [light["name"] for light in json.loads(text)["lights"]]
 
     assert names() == ["pair", "rest"]
-    assert "room.lights.toml" in run(tmp_path, "lights", room).stderr
+    assert "room.lights.toml" in run(tmp_path, "lights", room, "--no-sheet").stderr
     # The command line replaces the list, and adds groups or replaces namesakes.
     assert names("--lights", "pair,b*") == ["bulb", "beam", "pair", "rest"]
     assert names("--group", "pair=panel,bulb") == ["pair", "rest"]

@@ -140,7 +140,7 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     lamps = "".join(sphere(k).format('<ref id="glass"/>') for k in range(40))
     room = write_room(tmp_path, lights=GLASS + lamps + LIGHTS["sky"])
     small = ("-D", "width=16", "--spp", 2)
-    done = run(tmp_path, "lights", room)
+    done = run(tmp_path, "lights", room, "--no-sheet")
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["light", "glass", "sky"]
     assert "--no-group-alike parts them all, --group name=VALUE makes a light" in done.stderr
     listed = json.loads(succeed(tmp_path, "lights", room, "--json"))["lights"]

@@ -17,7 +17,7 @@ from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import render_features
+from lightpaint.scene.surfaces import render_first_hits
 from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples that choices of emitters are learned from before any counts.
@@ -78,8 +78,10 @@ def render_basis(
         start, keep = None, None
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
     made = render_all(scene, budget, seed, start, Keeper(keep), progress)
-    known = None if start is None else start.features
-    return replace(made, features=known or render_features(scene, seed=seed))
+    if start is not None and start.features is not None and start.objects is not None:
+        return replace(made, features=start.features, objects=start.objects)
+    features, objects = render_first_hits(scene, seed=seed)
+    return replace(made, features=features, objects=objects)
 
 
 def memory_needed(scene: Scene) -> int:

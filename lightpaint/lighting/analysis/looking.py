@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -89,6 +90,12 @@ class Looking:
         sums, total = self._sums(weight * values), self.block_weights
         total = total.reshape(*total.shape, *[1] * (values.ndim - 1))
         return np.asarray(sums / np.where(total > 0, total, 1))
+
+    def of_blocks(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """(p,), what each painted pixel has of its block's values, (rows, columns)."""
+        height, width = self.weight.shape
+        tall = values.repeat(BLOCK, axis=0)[:height]
+        return np.asarray(tall.repeat(BLOCK, axis=1)[:, :width][self.counts])
 
     @cached_property
     def block_weights(self) -> Doubles:
