@@ -60,7 +60,7 @@ def opened(path: Path | None, identity: Identity | None) -> sqlite3.Connection:
 
 def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity | None) -> None:
     for setting in (
-        "locking_mode = EXCLUSIVE",  # first of all: WAL then needs no shared memory, nor room for it
+        "locking_mode = EXCLUSIVE",  # first of all: WAL then needs no room for shared memory
         "trusted_schema = OFF",  # tables that others made may not call anything
         "page_size = 16384",
         "auto_vacuum = INCREMENTAL",

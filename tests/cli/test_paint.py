@@ -225,13 +225,16 @@ def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(here:
             assert socket.protocol.extensions == []  # nothing is compressed
 
 
-def test_a_host_is_told_what_it_means(here: Path) -> None:
-    with painting(here, "groups.exr", "--host", "127.0.0.1") as (process, _):
-        process.send_signal(signal.SIGINT)
+def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(here: Path) -> None:
+    with painting(here, "groups.exr", "--host", "127.0.0.1") as (process, url):
+        with urllib.request.urlopen(url):
+            process.send_signal(signal.SIGHUP)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
         said = process.stderr.read()
     assert "whoever has its address, with the token, can paint here" in said
+    assert "Traceback" not in said
+    assert said.endswith("what was painted is kept in groups.paint\n")
 
 
 def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:
