@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lightpaint.cli import lines, terminal
 from lightpaint.cli.manner import Outcome, manner
 from lightpaint.colour.transform import TransformChoice
+from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.settings import Settings
@@ -54,6 +55,9 @@ def paint(
             terminal.say(remark)
     addresses = []
 
+    def told() -> dict[str, str]:
+        return {"folder": str(folder), "scene": subject.name}
+
     def opened(server: "Server") -> None:
         addresses.append(server.url)
         if host is not None:
@@ -71,7 +75,10 @@ def paint(
         if not addresses:  # it had not begun
             raise
         terminal.say(f"the painter has ended; what was painted is kept in {folder}")
-    return Outcome(lambda: {"folder": str(folder), "scene": subject.name})
+    except OutputError as error:  # also where an interrupt has ended it
+        terminal.complain("paint", str(error))
+        return Outcome(told, 2)
+    return Outcome(told)
 
 
 def _say(text: str) -> None:
