@@ -103,6 +103,18 @@ def test_a_lost_connection_loses_no_stroke(told: Any):
     ]
 
 
+def test_a_session_with_another_basis_is_told_all_of_the_stroke(told: Any):
+    said = told(
+        """
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
+        host.tell("renewed", { kind: "renewed", resources: {} });
+        strokes.touch([5, 6, 5, 6]);
+        return host.told;
+        """
+    )
+    assert [one["region"] for one in said] == [[0, 2, 0, 2], [0, 6, 0, 6]]
+
+
 def test_strokes_go_on_counting_where_the_session_is(told: Any):
     assert told("await host.find(41); strokes.begin(); return strokes.live.stroke;") == 42
 
