@@ -1,65 +1,107 @@
-"""A browser for the tests of the page, one for all of them, and a server for files of a page."""
+"""One browser for all tests of the page, and a site that serves its modules and arrays."""
 
 import shutil
 import threading
 from collections.abc import Iterator
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
+import numpy as np
 import pytest
+from renderer import REPOSITORY
 
-import lightpaint
+PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
+HERE = Path(__file__).parent
 
-#: As the server of the painter has it: nothing from elsewhere, nothing inline.
-CSP = (
-    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: "
-    "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-
-FOLDERS = {"/page/": Path(lightpaint.__file__).parent / "paint" / "page", "/fake/": Path(__file__).parent / "fake"}
+#: WebGL2 in software, so that both views are tried where there is no GPU.
+ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": "text/css"}
 
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    """Chromium of the system, or what Playwright has installed."""
-    driver = pytest.importorskip("playwright.sync_api", reason="playwright")
-    program = shutil.which("chromium") or shutil.which("google-chrome")
-    with driver.sync_playwright() as playwright:
-        try:
-            opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        except driver.Error:
-            pytest.skip("a browser")
+    """The system's Chromium, or the one that Playwright has installed."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright")
+    with playwright.sync_playwright() as started:
+        names = ("chromium", "chromium-browser", "google-chrome")
+        path = next(filter(None, map(shutil.which, names)), started.chromium.executable_path)
+        if not Path(path).exists():
+            pytest.skip("a browser (chromium)")
+        opened = started.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield opened
         opened.close()
 
 
-class _Files(SimpleHTTPRequestHandler):
-    """Files of the page and of what stands in for the rest of it."""
+@dataclass
+class Site:
+    """What is served: the page's files, those of this folder, and arrays as `/data/NAME`."""
 
-    def translate_path(self, path: str) -> str:
-        plain = path.split("?")[0]
-        for prefix, folder in FOLDERS.items():
-            if plain.startswith(prefix):
-                return str(folder / plain.removeprefix(prefix))
-        return str(FOLDERS["/fake/"] / "index.html")
-
-    def end_headers(self) -> None:
-        self.send_header("Content-Security-Policy", CSP)
-        self.send_header("Cache-Control", "no-store")
-        super().end_headers()
-
-    def log_message(self, *_: Any) -> None:
-        pass
+    url: str = ""
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 @pytest.fixture(scope="session")
-def fake_page() -> Iterator[str]:
-    """Address of the interface over a session that is made up."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Files))
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_port}/"
+def site() -> Iterator[Site]:
+    """On a port of its own."""
+    made = Site()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            path = unquote(urlsplit(self.path).path)
+            headers, content = served(made, path)
+            self.send_response(200 if headers else 404)
+            for name, value in headers.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, *_: Any) -> None:
+            """Say nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    made.url = f"http://127.0.0.1:{server.server_port}"
+    yield made
     server.shutdown()
     server.server_close()
+
+
+def served(site: Site, path: str) -> tuple[dict[str, str], bytes]:
+    """Headers and content; none for what there is not."""
+    if path.startswith("/data/"):
+        array = site.arrays.get(path.removeprefix("/data/"))
+        if array is None:
+            return {}, b"there is no such picture"
+        shape = ",".join(map(str, array.shape))
+        return {"x-dtype": array.dtype.name, "x-shape": shape}, array.tobytes()
+    if path == "/favicon.ico":
+        return {"content-type": "image/x-icon"}, b""
+    for folder in (PAGE, HERE):
+        file = folder / path.lstrip("/")
+        if file.is_file():
+            return {"content-type": KINDS[file.suffix]}, file.read_bytes()
+    return {}, b""
+
+
+@pytest.fixture(scope="session")
+def tab(browser: Any) -> tuple[Any, list[str]]:
+    """One page for all tests, which start a process less; and what goes wrong on it."""
+    opened = browser.new_page(viewport={"width": 800, "height": 600})
+    wrong: list[str] = []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
+    return opened, wrong
+
+
+@pytest.fixture
+def page(tab: Any, site: Site) -> Iterator[Any]:
+    """An empty page of the site. What a test leaves on its console as an error fails it."""
+    opened, wrong = tab
+    opened.goto(f"{site.url}/empty.html")
+    yield opened
+    site.arrays.clear()
+    left, wrong[:] = wrong[:], []
+    assert left == []
