@@ -4,7 +4,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -105,42 +105,3 @@ def page(tab: Any, site: Site) -> Iterator[Any]:
     site.arrays.clear()
     left, wrong[:] = wrong[:], []
     assert left == []
-
-
-#: As the server of the painter has it: nothing from elsewhere, nothing inline.
-CSP = (
-    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' "
-    "data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-
-FOLDERS = {"/page/": PAGE, "/fake/": HERE / "fake"}
-
-
-class _Files(SimpleHTTPRequestHandler):
-    """Files of the page and of what stands in for the rest of it."""
-
-    def translate_path(self, path: str) -> str:
-        plain = path.split("?")[0]
-        for prefix, folder in FOLDERS.items():
-            if plain.startswith(prefix):
-                return str(folder / plain.removeprefix(prefix))
-        return str(FOLDERS["/fake/"] / "index.html")
-
-    def end_headers(self) -> None:
-        self.send_header("Content-Security-Policy", CSP)
-        self.send_header("Cache-Control", "no-store")
-        super().end_headers()
-
-    def log_message(self, *_: Any) -> None:
-        """Say nothing."""
-
-
-@pytest.fixture(scope="session")
-def fake_page() -> Iterator[str]:
-    """Address of the interface over a session that is made up."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), _Files)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_port}/"
-    server.shutdown()
-    server.server_close()

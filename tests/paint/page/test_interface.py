@@ -21,8 +21,15 @@ class Painter:
 
     def said(self, kind: str) -> list[dict[str, Any]]:
         """What was sent to the session, of a kind, once all is still."""
-        self.page.wait_for_timeout(30)
+        self.still()
         return [one for one in self.page.evaluate("() => window.host.said") if one["kind"] == kind]
+
+    def still(self) -> None:
+        """Wait until all is answered, and shown."""
+        self.page.evaluate(
+            "async () => { do { await new Promise((done) => setTimeout(done, 20)); }"
+            " while (window.host.busy); }"
+        )
 
     def calls(self, name: str) -> list[Any]:
         """What the engine was asked to do."""
@@ -71,11 +78,11 @@ class Painter:
 
     def tell(self, **message: Any) -> None:
         self.page.evaluate("(message) => window.host.tell(message)", message)
-        self.page.wait_for_timeout(30)
+        self.still()
 
 
 @pytest.fixture
-def opened(browser: Any, fake_page: str) -> Iterator[Any]:
+def opened(browser: Any, site: Any) -> Iterator[Any]:
     """Opens painters. No test leaves an error on the console, or one that nobody caught."""
     contexts, errors = [], []
 
@@ -91,7 +98,7 @@ def opened(browser: Any, fake_page: str) -> Iterator[Any]:
         )
         if init:
             page.add_init_script(init)
-        page.goto(f"{fake_page}?size=48x27&{query}")
+        page.goto(f"{site.url}/fake/index.html?size=48x27&{query}")
         page.wait_for_selector(".lightpaint .tag")
         return Painter(page)
 
@@ -159,6 +166,7 @@ def test_keys_of_paint_programs(painter: Painter) -> None:
 def test_every_key_of_the_overlay_is_there(painter: Painter) -> None:
     painter.page.keyboard.press("?")
     dialog = painter.page.get_by_role("dialog", name="Keys")
+    dialog.wait_for()
     assert dialog.locator("kbd").count() > 40
     painter.page.keyboard.press("e")  # goes nowhere while a window is open
     assert painter.ui("tool") == "brush"
@@ -184,7 +192,7 @@ def test_mouse_with_modifiers(painter: Painter) -> None:
     painter.page.keyboard.down("Control")
     painter.page.mouse.wheel(0, -240)
     painter.page.keyboard.up("Control")
-    painter.page.wait_for_timeout(50)
+    painter.still()
     assert painter.ui("show")["zoom"] == pytest.approx(2, rel=1e-6)
 
 
@@ -214,13 +222,13 @@ def test_one_finger_paints_and_two_move_and_zoom(opened: Any) -> None:
     send("touchMove", (x + 20, y))
     send("touchMove", (x + 40, y))
     send("touchEnd")
-    painter.page.wait_for_timeout(30)
+    painter.still()
     assert len(painter.calls("begin")) == len(painter.calls("end")) == 1
     send("touchStart", (x, y))
     send("touchStart", (x, y), (x + 50, y))
     send("touchMove", (x - 25, y), (x + 75, y))
     send("touchEnd")
-    painter.page.wait_for_timeout(30)
+    painter.still()
     assert painter.ui("show")["zoom"] == pytest.approx(2, rel=0.1)
     assert painter.calls("cancel")  # of what the first finger had begun
     assert len(painter.calls("end")) == 1
@@ -322,7 +330,7 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert painter.page.evaluate("() => window.engine.shown.gains") == [k != 0 for k in range(7)]
     assert not painter.said("ask")
     painter.page.locator(".light-thumb").nth(1).hover()
-    painter.page.wait_for_timeout(50)
+    painter.still()
     shown = painter.page.evaluate("() => window.engine.shown")
     assert shown["right"] == "other"
     assert [max(rgb) > 0 for rgb in shown["other"]] == [k == 1 for k in range(7)]
