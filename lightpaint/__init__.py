@@ -145,13 +145,17 @@ _HOMES = {
     "write_lighting": "lighting.file",
 }
 
+#: The same of what needs an extra, and is not part of `import *`.
+_EXTRAS = {"Painter": "paint.widget"}
+
 __all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    homes = _HOMES | _EXTRAS
+    if name not in homes:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    value = getattr(import_module(f"{__name__}.{homes[name]}"), name)
     globals()[name] = value  # from now on found without asking here
     return value
 

@@ -73,7 +73,10 @@ def bundled(entry: str) -> str:
     if any(_DYNAMIC.search(_code(path)) for path in order):
         table = ", ".join(f'"{path}": m{k}' for path, k in number.items())
         parts.append(f"const modules = {{ {table} }}\n{_AT_RUN_TIME}")
-    last = "".join(f"export const {name} = m{number[entry]}.{name}\n" for name in names)
+    last = "".join(
+        f"export {'default' if name == 'default' else f'const {name} ='} m{number[entry]}.{name}\n"
+        for name in names
+    )
     return "\n".join(parts) + "\n" + last
 
 
@@ -161,8 +164,6 @@ def _exported(path: str) -> list[str]:
     names = [match["name"] for match in _DECLARED.finditer(text)]
     for match in _LISTED.finditer(text):
         names += [name for _, name in _pairs(match["names"])]
-    if any(name == "default" for name in names):
-        raise BundleError(f"{path} exports a default: give it a name")
     return names
 
 

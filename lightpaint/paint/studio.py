@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.images.denoise import denoised
@@ -24,11 +25,12 @@ from lightpaint.paint.exports import command_line, export, verified
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.session import Session
+from lightpaint.paint.session import Moment, Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.told import analysis_fields, light_fields, lights_fields
+from lightpaint.paint.wishes import Wishes
 
 #: Seconds of rest after a stroke before the exact answer is looked for.
 REST_S = 0.08
@@ -136,6 +138,21 @@ class Studio:
                     return self._later(self._explain, message)
                 case _:
                     made = session.said(message, arrays)
+        self._ring()
+        return made
+
+    def moment(self) -> Moment:
+        """What is painted and asked now. Raises PaintError before there is a basis."""
+        with self._lock:
+            return self.session.moment()
+
+    def load(self, image: Floats, importance: Floats, wishes: Wishes, label: str) -> Message:
+        """Go on from another painting and what was asked with it: one step, a `patch`.
+
+        Raises LightpaintError for what cannot be asked, and has changed nothing then.
+        """
+        with self._lock:
+            made = self.session.load(image, importance, wishes, label)
         self._ring()
         return made
 

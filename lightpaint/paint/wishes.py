@@ -5,7 +5,9 @@ from dataclasses import dataclass, field, replace
 from shlex import quote
 from typing import Any
 
+from lightpaint.basis.basis import BasisLight
 from lightpaint.errors import PaintError
+from lightpaint.lighting.constraints.addressing import asked_of_each, tied_lights
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.settings import Settings
 
@@ -47,6 +49,26 @@ class Wishes:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
         kept = {k: v for k, v in ({**self.values, **values}).items() if v not in (None, False)}
         return replace(self, values=kept)
+
+    @classmethod
+    def asking(
+        cls, constraints: Constraints, lights: Sequence[BasisLight], values: Mapping[str, Any]
+    ) -> "Wishes":
+        """What constraints ask of these lights, patterns spelled out; of `values` what is OF_FIT.
+
+        Raises ConstraintError for lights that there are none of, PaintError for what a session has
+        no place for.
+        """
+        each = zip(lights, asked_of_each(constraints, lights), strict=True)
+        asked = {light.name: its for light, (its, _) in each if its}
+        ties = {id(tie): (tie, its) for tie, its in tied_lights(constraints, lights).values()}
+        for tie, _ in ties.values():
+            if tie.color is not None:
+                raise PaintError(f"{tie.where}: ask for the colour of each light; ties have none")
+        names = tuple(tuple(lights[k].name for k in its) for _, its in ties.values())
+        kept = {key: value for key, value in values.items() if key in OF_FIT}
+        together = {key: getattr(constraints, key) for key in OF_ALL}
+        return cls(asked, names, kept).of_answer({k: v for k, v in together.items() if v})
 
     def constraints(self) -> Constraints:
         """What is asked of the lights. Raises ConstraintError for what means nothing."""

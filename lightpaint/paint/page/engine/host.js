@@ -24,7 +24,7 @@ import { VERSION, frame, pictureOf, unframe } from "./protocol.js";
  */
 
 /** What does not wait for strokes that are on their way. */
-const AT_ONCE = ["paint", "drop", "hello", "take_over", "fetch"];
+export const AT_ONCE = ["paint", "drop", "hello", "take_over", "fetch"];
 
 /** Who hears what: the part that all hosts share. */
 export class Hearers {
