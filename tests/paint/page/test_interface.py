@@ -127,7 +127,9 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None
 
 def test_keys_of_paint_programs(painter: Painter) -> None:
     press = painter.page.keyboard.press
-    for key, tool in zip("ewiglab", "eraser weight pick fill line ask brush".split(), strict=True):
+    for key, tool in zip(
+        "ewiglab", ["eraser", "weight", "pick", "fill", "line", "ask", "brush"], strict=True
+    ):
         press(key)
         assert painter.ui("tool") == tool
     size, hardness = painter.ui("size"), painter.ui("hardness")
