@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.exports import command_line, export, verified
+from lightpaint.paint.exports import PAINTING, export, verified
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
 from lightpaint.paint.protocol import Message
@@ -269,8 +269,13 @@ class Studio:
             "has_noise": basis.knows_noise,
             "first": not session.store.steps,
             "stroke": session.stroke,
-            "command": command_line(self.subject, session.wishes),
+            "command": self._command(session),
         }
+
+    def _command(self, session: Session) -> str:
+        """The command that answers the exported painting alike, where there are commands."""
+        subject = self.subject
+        return subject.command(str(subject.folder / PAINTING), session.wishes)
 
     def _clean(self) -> None:
         """Planes without their grain, one after the other."""
@@ -351,7 +356,7 @@ class Studio:
         session, lighting = self._answer()
         with self._render:
             files = export(self.subject, session.moment(), lighting, message.what, self._hears)
-        command = command_line(self.subject, session.wishes)
+        command = self._command(session)
         self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
 
     def _verify(self, message: protocol.Verify) -> list[Message]:
