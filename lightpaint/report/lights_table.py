@@ -21,7 +21,13 @@ from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
 from lightpaint.report.looks import MOST_THUMBNAILS
 from lightpaint.report.measures import energy_shares
-from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
+from lightpaint.report.sentences import (
+    UNTOLD,
+    UNTOLD_HERE,
+    spoken_errors,
+    spoken_percent,
+    unreached_channels,
+)
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (
@@ -92,7 +98,8 @@ def _rows(
     for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
         picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
         name, setting = escape(light.name), settings[light.name]
-        error = f" <small>{errors[k]}</small>" if errors[k] else ""
+        error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
+        error = f" <small>{error}</small>" if error else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
             f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
