@@ -1,14 +1,14 @@
 /** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
 
-import { html, useEffect, useRef, useState } from "../vendor/preact.js";
-import { Icon } from "./icons.js";
+import { html, useEffect, useRef, useState } from '../vendor/preact.js'
+import { Icon } from './icons.js'
 
-let counter = 0;
+let counter = 0
 
 /** @returns {string} an id that no other element of the page has */
 export function useId() {
-  const [id] = useState(() => `lp-${(counter += 1)}`);
-  return id;
+  const [id] = useState(() => `lp-${(counter += 1)}`)
+  return id
 }
 
 /**
@@ -17,15 +17,15 @@ export function useId() {
  *   disabled?: boolean, primary?: boolean, act: (event: MouseEvent) => void, class?: string}} props
  */
 export function Button({ icon, label, tip, keys, on, disabled, primary, act, class: name }) {
-  const kind = [
-    "button", icon && !label && "is-icon", on && "is-on", primary && "is-primary", name,
-  ].filter(Boolean).join(" ");
-  const hint = tip ?? (keys ? label : undefined);
+  const kind = ['button', icon && !label && 'is-icon', on && 'is-on', primary && 'is-primary', name]
+    .filter(Boolean)
+    .join(' ')
+  const hint = tip ?? (keys ? label : undefined)
   return html`<button type="button" class=${kind} disabled=${disabled} onClick=${act}
     aria-label=${label && label.length > 1 ? undefined : tip} aria-pressed=${on === undefined ? undefined : String(on)}
     aria-keyshortcuts=${keys} data-tip=${hint} data-keys=${keys}>
     ${icon && html`<${Icon} name=${icon} />`}${label && html`<span>${label}</span>`}
-  </button>`;
+  </button>`
 }
 
 /**
@@ -36,11 +36,13 @@ export function Button({ icon, label, tip, keys, on, disabled, primary, act, cla
  */
 export function Choice({ label, value, choices, change, icons }) {
   return html`<div class="choice" role="group" aria-label=${label}>
-    ${choices.map((one) => html`<${Button} key=${String(one.value)} icon=${one.icon}
+    ${choices.map(
+      (one) => html`<${Button} key=${String(one.value)} icon=${one.icon}
       label=${icons ? undefined : one.label} tip=${one.tip ?? (icons ? one.label : undefined)}
       keys=${one.keys} on=${one.value === value} disabled=${one.disabled}
-      act=${() => change(one.value)} />`)}
-  </div>`;
+      act=${() => change(one.value)} />`,
+    )}
+  </div>`
 }
 
 /**
@@ -50,13 +52,15 @@ export function Choice({ label, value, choices, change, icons }) {
  */
 export function Select({ label, value, choices, change, hidden, tip }) {
   return html`<label class="field" data-tip=${tip}>
-    <span class=${hidden ? "only-read" : "name"}>${label}</span>
+    <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <select value=${value}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.value)}>
-      ${choices.map((one) => html`<option key=${one.value} value=${one.value}
-        selected=${one.value === value}>${one.label}</option>`)}
+      ${choices.map(
+        (one) => html`<option key=${one.value} value=${one.value}
+        selected=${one.value === value}>${one.label}</option>`,
+      )}
     </select>
-  </label>`;
+  </label>`
 }
 
 /** @param {{label: string, on: boolean, change: (on: boolean) => void, tip?: string,
@@ -66,7 +70,7 @@ export function Check({ label, on, change, tip, disabled }) {
     <input type="checkbox" checked=${on} disabled=${disabled}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.checked)} />
     <span>${label}</span>
-  </label>`;
+  </label>`
 }
 
 /**
@@ -76,36 +80,39 @@ export function Check({ label, on, change, tip, disabled }) {
  *   hidden?: boolean, empty?: string, disabled?: boolean}} props
  */
 export function Number_(props) {
-  const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
-  const { least = -Infinity, most = Infinity } = props;
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
-  const shown = typed ?? (value === null ? "" : String(Number(value.toFixed(digits))));
-  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, x));
+  const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props
+  const { least = -Infinity, most = Infinity } = props
+  const [typed, setTyped] = useState(/** @type {string | null} */ (null))
+  const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))))
+  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, x))
   const take = (/** @type {string} */ text) => {
-    setTyped(null);
-    const plain = text.trim().replace(/^\u2212/, "-").replace(",", ".");
-    const made = Number(plain);
-    if (!plain && empty !== undefined) change(null);
-    else if (plain && Number.isFinite(made)) change(within(made));
-  };
+    setTyped(null)
+    const plain = text
+      .trim()
+      .replace(/^\u2212/, '-')
+      .replace(',', '.')
+    const made = Number(plain)
+    if (!plain && empty !== undefined) change(null)
+    else if (plain && Number.isFinite(made)) change(within(made))
+  }
   const press = (/** @type {any} */ event) => {
-    const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
-    if (event.key === "Enter") take(event.currentTarget.value);
+    const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)]
+    if (event.key === 'Enter') take(event.currentTarget.value)
     if (way) {
-      event.preventDefault();
-      setTyped(null);
-      const by = way * step * (event.shiftKey ? 10 : 1);
-      change(within(Number(((Number(shown) || 0) + by).toFixed(6))));
+      event.preventDefault()
+      setTyped(null)
+      const by = way * step * (event.shiftKey ? 10 : 1)
+      change(within(Number(((Number(shown) || 0) + by).toFixed(6))))
     }
-  };
+  }
   return html`<label class="field number">
-    <span class=${hidden ? "only-read" : "name"}>${label}</span>
+    <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
       disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)} />
     ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}
-  </label>`;
+  </label>`
 }
 
 /**
@@ -117,28 +124,31 @@ export function Number_(props) {
  *   disabled?: boolean, keys?: string, tip?: string}} props
  */
 export function Slider(props) {
-  const { label, value, least, most, step = 1, unit, digits = 0, change, track, rest } = props;
-  const { curve, text, plain, disabled, keys, tip } = props;
-  const to = curve?.to ?? ((/** @type {number} */ x) => x);
-  const of = curve?.of ?? ((/** @type {number} */ x) => x);
+  const { label, value, least, most, step = 1, unit, digits = 0, change, track, rest } = props
+  const { curve, text, plain, disabled, keys, tip } = props
+  const to = curve?.to ?? ((/** @type {number} */ x) => x)
+  const of = curve?.of ?? ((/** @type {number} */ x) => x)
   const moved = (/** @type {any} */ event, /** @type {boolean} */ done) =>
-    change(of(Number(event.currentTarget.value)), done);
-  const [low, high] = [to(least), to(most)];
-  const at = Math.min(1, Math.max(0, (to(value) - low) / (high - low)));
+    change(of(Number(event.currentTarget.value)), done)
+  const [low, high] = [to(least), to(most)]
+  const at = Math.min(1, Math.max(0, (to(value) - low) / (high - low)))
   return html`<div class="slider" data-tip=${tip} data-keys=${keys}>
     ${!plain && html`<span class="name" aria-hidden="true">${label}</span>`}
     <input type="range" aria-label=${label} min=${low} max=${high}
       step=${curve ? (high - low) / 200 : step} value=${to(value)} disabled=${disabled}
-      aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ""}`.trim()}
-      class=${track ? "has-track" : ""}
-      style=${{ "--at": String(at), ...(track ? { "--track": track } : {}) }}
+      aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ''}`.trim()}
+      class=${track ? 'has-track' : ''}
+      style=${{ '--at': String(at), ...(track ? { '--track': track } : {}) }}
       onInput=${(/** @type {any} */ event) => moved(event, false)}
       onChange=${(/** @type {any} */ event) => moved(event, true)}
       onDblClick=${() => rest !== undefined && change(rest, true)} />
-    ${!plain && html`<${Number_} label=${label} hidden value=${value} least=${least} most=${most}
-      step=${step} digits=${digits} unit=${unit ?? ""} disabled=${disabled}
-      change=${(/** @type {number} */ made) => change(made, true)} />`}
-  </div>`;
+    ${
+      !plain &&
+      html`<${Number_} label=${label} hidden value=${value} least=${least} most=${most}
+      step=${step} digits=${digits} unit=${unit ?? ''} disabled=${disabled}
+      change=${(/** @type {number} */ made) => change(made, true)} />`
+    }
+  </div>`
 }
 
 /**
@@ -147,15 +157,15 @@ export function Slider(props) {
  *   class?: string}} props
  */
 export function Fold({ title, open, toggle, children, extra, class: name }) {
-  const id = useId();
-  return html`<section class=${`fold ${name ?? ""} ${open ? "is-open" : ""}`} aria-label=${title}>
+  const id = useId()
+  return html`<section class=${`fold ${name ?? ''} ${open ? 'is-open' : ''}`} aria-label=${title}>
     <div class="fold-head">
       <h2><button type="button" aria-expanded=${String(open)} aria-controls=${id} onClick=${toggle}>
         <${Icon} name="fold" /><span>${title}</span></button></h2>
       ${extra}
     </div>
     <div class="fold-body" id=${id} hidden=${!open}>${open && children}</div>
-  </section>`;
+  </section>`
 }
 
 /**
@@ -163,21 +173,22 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
  * @param {{title: string, close: () => void, children?: any, class?: string}} props
  */
 export function Dialog({ title, close, children, class: name }) {
-  const ref = useRef(/** @type {HTMLDialogElement | null} */ (null));
-  const id = useId();
+  const ref = useRef(/** @type {HTMLDialogElement | null} */ (null))
+  const id = useId()
   useEffect(() => {
-    const element = ref.current;
+    const element = ref.current
     const before = /** @type {HTMLElement | null} */ (
-      /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement);
-    if (element && !element.open) element.showModal();
-    return () => before?.focus?.();
-  }, []);
-  return html`<dialog class=${`dialog ${name ?? ""}`} ref=${ref} aria-labelledby=${id}
+      /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement
+    )
+    if (element && !element.open) element.showModal()
+    return () => before?.focus?.()
+  }, [])
+  return html`<dialog class=${`dialog ${name ?? ''}`} ref=${ref} aria-labelledby=${id}
     onClose=${close} onClick=${(/** @type {any} */ event) => event.target === ref.current && close()}>
     <div class="dialog-head">
       <h2 id=${id}>${title}</h2>
       <${Button} icon="close" tip="Close" act=${close} />
     </div>
     <div class="dialog-body">${children}</div>
-  </dialog>`;
+  </dialog>`
 }

@@ -86,16 +86,16 @@
  */
 
 /** @param {string} path @returns {Promise<any>} */
-const load = (path) => import(path);
+const load = (path) => import(path)
 
 /** @returns {Promise<Host>} the session behind the server that the page came from */
 export async function openHost() {
-  const { openHost: open } = await load("../engine/painter.js");
-  return open();
+  const { openHost: open } = await load('../engine/painter.js')
+  return open()
 }
 
 /** @param {Host} host @returns {Promise<Engine>} */
 export async function openEngine(host) {
-  const { openEngine: open } = await load("../engine/painter.js");
-  return open(host);
+  const { openEngine: open } = await load('../engine/painter.js')
+  return open(host)
 }
