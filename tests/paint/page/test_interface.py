@@ -448,7 +448,10 @@ def test_settings(painter: Painter) -> None:
     painter.page.get_by_label("Take the paint at its word").check()
     painter.type("Use at most", "3")
     painter.type("Stay as now, strength", "0.01")
-    assert painter.said("set")[-1]["values"] == {
+    asked: dict[str, Any] = {}
+    for said in painter.said("set"):
+        asked |= said["values"]
+    assert asked == {
         "hold": 2.5, "space": "linear", "colors": "white", "literal": True,
         "prefer_current": 0.01, "sparse": 3,
     }  # fmt: skip

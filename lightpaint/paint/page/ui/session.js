@@ -208,7 +208,7 @@ export class Session {
   /** @param {string} key @param {any} value null for what follows from the painting */
   setting(key, value) {
     this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }))
-    return this.send('set', { values: { ...this.store.value.settings } })
+    return this.send('set', { values: { [key]: value } })
   }
 
   verify(run = true) {

@@ -224,7 +224,7 @@ export class FakeHost {
     return this.answer()
   }
   set({ values }) {
-    this.settings = values
+    this.settings = { ...this.settings, ...values }
     return this.answer()
   }
   kept() {
