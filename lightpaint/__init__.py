@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from lightpaint.demo import write_demo as write_demo
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
+    from lightpaint.images.objects import Objects as Objects
     from lightpaint.images.png import display_picture as display_picture
     from lightpaint.job import Job as Job
     from lightpaint.lighting.analysis.analyse import Analysis as Analysis
@@ -100,6 +101,7 @@ _HOMES = {
     "Lighting": "lighting.lighting",
     "LightpaintError": "errors",
     "Look": "results",
+    "Objects": "images.objects",
     "Painting": "sources",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
@@ -143,13 +145,17 @@ _HOMES = {
     "write_lighting": "lighting.file",
 }
 
+#: The same of what needs an extra, and is not part of `import *`.
+_EXTRAS = {"Painter": "paint.widget"}
+
 __all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    homes = _HOMES | _EXTRAS
+    if name not in homes:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    value = getattr(import_module(f"{__name__}.{homes[name]}"), name)
     globals()[name] = value  # from now on found without asking here
     return value
 

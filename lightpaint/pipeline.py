@@ -114,6 +114,12 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
         listen.say(f"{has} kept from an earlier run (use_cache=False renders it anew)")
     elif settings.time_s is None and basis.origin.spp > wanted + 1:
         listen.say(f"{has}, not {wanted}: it takes one in each pixel of a block for each half")
+    origin, (height, width) = basis.origin, basis.size
+    how = "rendered" if is_rendered else "taken from the cache"
+    listen.note(
+        f"basis {how}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} samples "
+        f"per pixel, seed {origin.seed}, {origin.method}"
+    )
     return basis
 
 
@@ -145,7 +151,10 @@ def _hearing(job: Job, view: PaintedView, listen: Listener) -> Listener:
 
 def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
     """What can be done against noise is done."""
-    settings = job.settings
+    settings, found = job.settings, solution.certificate
+    listen.note(
+        f"solved in {max(found.sweeps)} sweeps, to a KKT residual of {max(found.kkt_residual):.1e}"
+    )
     if settings.corrects_noise(is_known=solution.basis.knows_noise):
         solution = correct_noise(solution)
     pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
@@ -174,6 +183,7 @@ def _finished(
 ) -> Look:
     """A view predicted, verified and shown. folder: what takes the place of the job's when done."""
     settings, scene, solution = job.settings, view.scene, analysis.solution
+    listen.note("analysed, and the lighting written")
     basis = solution.basis
     place = folder / view.folder.relative_to(job.folder)
     place.mkdir(exist_ok=True)
@@ -190,10 +200,12 @@ def _finished(
     if relit is not None:
         verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=listen)
         write_estimate(place / "verified.exr", verification.verified, {})
+        listen.note(f"verified with {spp} samples per pixel")
     if settings.suggest and scene is not None:
         suggestions = suggest_lights(
             scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
         )
+        listen.note("lights suggested")
     look = Look(
         target=view.target,
         basis=basis,
@@ -205,6 +217,7 @@ def _finished(
         suggestions=suggestions,
     )
     write_report(place, look, command=settings.command)
+    listen.note("report written")
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look

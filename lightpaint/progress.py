@@ -26,6 +26,9 @@ class Listener(Progress, Protocol):
     def say(self, text: str) -> None:
         """A remark, in plain text."""
 
+    def note(self, text: str) -> None:
+        """A stage that is done, and what was used in it: for who wants to know all."""
+
 
 class _Silent:
     """Listens to nothing."""
@@ -36,6 +39,9 @@ class _Silent:
     def say(self, text: str) -> None:
         """Hear no remark."""
 
+    def note(self, text: str) -> None:
+        """Hear no stage."""
+
 
 #: Whoever does not listen.
 silent = _Silent()
@@ -43,10 +49,11 @@ silent = _Silent()
 
 @dataclass(frozen=True)
 class _Split:
-    """Progress goes to one, remarks to another."""
+    """Progress goes to one, remarks to another, and stages to a third."""
 
     progress: Progress
     remarks: Callable[[str], None]
+    stages: Callable[[str], None]
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         self.progress(label, done, total, unit)
@@ -54,10 +61,14 @@ class _Split:
     def say(self, text: str) -> None:
         self.remarks(text)
 
+    def note(self, text: str) -> None:
+        self.stages(text)
+
 
 def listener(progress: Progress) -> Listener:
-    """`progress` as a listener: a plain callable lets remarks pass."""
-    return _Split(progress, getattr(progress, "say", silent.say))
+    """`progress` as a listener: a plain callable lets remarks and stages pass."""
+    say, note = (getattr(progress, name, getattr(silent, name)) for name in ("say", "note"))
+    return _Split(progress, say, note)
 
 
 class Interrupted(KeyboardInterrupt):
@@ -70,4 +81,4 @@ def labelled(listen: Listener, name: str) -> Listener:
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
         listen(f"{label} of {name}", done, total, unit)
 
-    return _Split(report, listen.say)
+    return _Split(report, listen.say, lambda text: listen.note(f"{text} of {name}"))

@@ -20,6 +20,12 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     remarks = []
     if scene.lights_file is not None:
         remarks.append(f"lights and groups as in {scene.lights_file}")
+    remarks += [
+        f"{len(x.members)} alike lamps without names are one light, {x.name}: group_alike=False "
+        "parts them all, groups={'name': ...} makes a light of some"
+        for x in scene.lights
+        if x.is_found
+    ]
     if scene.instead is not None:
         remarks.append(f"rendered by {scene.instead}, not by the scene's own integrator")
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:

@@ -40,6 +40,7 @@ class SceneFile:
         groups: Emitters that are one light, by its name.
         lights_file: TOML to read instead of the one beside the scene.
         use_lights_file: False leaves that one alone.
+        group_alike: False adjusts emitters that are alike and without names one by one.
         integrator: To render with instead of the scene's own.
 
     Examples:
@@ -55,6 +56,7 @@ class SceneFile:
     groups: Mapping[str, Sequence[str]] | None = None
     lights_file: str | None = None
     use_lights_file: bool = True
+    group_alike: bool = True
     integrator: str | None = None
 
     @cached_property

@@ -3,6 +3,7 @@
 Where the renderer is needed there is one small room, loaded and rendered once, to look at only.
 """
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -105,3 +106,12 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _older_objects_are_not_looked_through() -> Iterator[None]:
+    """Every scene that is let go of collects garbage: of what is new, not of all that is loaded."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()

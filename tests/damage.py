@@ -4,6 +4,7 @@ Run as a program it reads a pickle of cases and prints one line for each; the pr
 them counts one that never came as a crash or a hang. `damage_readers.py` knows the kinds of files.
 """
 
+import gc
 import os
 import pickle
 import random
@@ -156,6 +157,7 @@ def _read_all(folder: Path) -> None:
     for file, content in whole.items():
         (folder / file).write_bytes(content)
         known[file] = reader.read(folder / file)
+    gc.freeze()  # scenes collect garbage, for which libraries need not be looked through
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for case in cases:
         path = folder / case.file
@@ -164,6 +166,7 @@ def _read_all(folder: Path) -> None:
         signal.alarm(10 * SECONDS)
         out.write(_said(reader, path, known.get(case.file)) + "\n")
         out.flush()
+    gc.unfreeze()
 
 
 def _said(reader: Reader, path: Path, known: Any) -> str:

@@ -37,7 +37,7 @@ KINDS = {
 
 #: Commands with a path X, its ending, and what else it may be taken for than a file.
 COMMANDS = {
-    "lights": ("lights X", ".xml"),
+    "lights": ("lights --no-sheet X", ".xml"),
     "basis": ("basis X", ".xml"),
     "template": ("template X", ".xml"),
     "scene": ("solve X painting.exr", ".xml"),
@@ -46,7 +46,7 @@ COMMANDS = {
     "painted EXR": ("solve b.basis.exr X -o out", ".exr"),
     "layered": ("solve b.basis.exr X -o out", ".kra"),
     "mask": ("solve b.basis.exr painting.exr --mask X", ".png"),
-    "lights file": ("lights room.xml --lights-file X", ".toml"),
+    "lights file": ("lights --no-sheet room.xml --lights-file X", ".toml"),
     "its constraints": ("solve b.basis.exr painting.exr --lights-file X", ".toml"),
     "lighting": ("relight room.xml X", ".json"),
     "groups": ("solve painting.exr --lights X", ".exr"),

@@ -12,6 +12,7 @@ from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.errors import BasisError
 from lightpaint.expected import BRIGHTEST, is_amount
 from lightpaint.images.denoise import Features
+from lightpaint.images.objects import Objects
 from lightpaint.scene.lights_file import Asked
 from lightpaint.screen import Listed, Shown, some_names, some_of
 from lightpaint.version import __version__
@@ -120,6 +121,7 @@ class Basis(Shown):
         asked: What the lights file of the scene asks of the lights, for whoever solves; of memory
             only, since that file may change.
         features: Albedo and normals of what is seen, to denoise pictures by, or None.
+        objects: Whose surfaces are seen, or None.
 
     Examples:
         >>> basis.names
@@ -136,6 +138,7 @@ class Basis(Shown):
     learned: Floats | None = None
     asked: Asked = field(default_factory=Asked)
     features: Features | None = None
+    objects: Objects | None = None
 
     def __post_init__(self) -> None:
         n = len(self.lights)
@@ -149,6 +152,8 @@ class Basis(Shown):
             raise BasisError("the mask of seen emitters has another size than the images")
         if self.features is not None and self.features.size != self.size:
             raise BasisError("albedo and normals have another size than the images")
+        if self.objects is not None and self.objects.size != self.size:
+            raise BasisError("the picture of objects has another size than the images")
         if len(set(self.names)) != n:
             raise BasisError(f"light names repeat: {some_names(self.names)}")
         if len(self.origin.each_light) not in (0, n):

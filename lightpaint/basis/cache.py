@@ -67,6 +67,25 @@ def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> 
     return basis
 
 
+def any_of(scene_identity: str, sensor: str, *, samples: int, largest: int) -> Basis | None:
+    """A basis of any size and seed that is kept for that, the one with most samples; or None.
+
+    samples: of all pixels together, that it has at least. largest: bytes of its file, at most.
+    """
+    found: list[tuple[int, Origin, tuple[int, int]]] = []
+    for entry in entries():
+        of, size = entry.origin, entry.image_size
+        if of is None or size is None or entry.size > largest:
+            continue
+        taken = size[0] * size[1] * of.spp
+        if (of.scene_identity, of.sensor) == (scene_identity, sensor) and taken >= samples:
+            found.append((taken, of, size))
+    if not found:
+        return None
+    _, origin, size = max(found, key=lambda one: one[0])
+    return find(scene_identity, sensor, origin.seed, size)
+
+
 def keep(basis: Basis) -> bool:
     """Keep `basis` in the place of what was kept for its scene, sensor, size and seed.
 

@@ -18,6 +18,7 @@ from lightpaint.files import file_length, one_line
 from lightpaint.images.denoise import Features
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
+from lightpaint.images.objects import Objects
 from lightpaint.records import fields_of, read_record, strict_json
 
 FORMAT = "lightpaint-basis 1"
@@ -27,6 +28,7 @@ LIGHT_KEY = "lightpaint.light"
 EMITTERS_SEEN = "emitters seen"
 LEARNED = "learned"
 FEATURES, FEATURES_KEY = "features", "lightpaint.features"
+OBJECTS, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.names"
 
 #: Longest basis file that is read, in bytes.
 MAX_BYTES = 2**36
@@ -65,6 +67,12 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         its = _feature_channels(basis.features)
         about_them = {FEATURES_KEY: checksum("", its)}
         parts.append(Part(free_name(FEATURES, basis.names), its, about_them))
+    if basis.objects is not None:
+        named = json.dumps(basis.objects.names, ensure_ascii=False)
+        # Whole numbers that float32 holds.
+        index = {"index": basis.objects.index.astype(np.float32)}
+        about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
+        parts.append(Part(free_name(OBJECTS, basis.names), index, about_it))
     # Without `each_light` and `integrator` as in files from before there was any.
     of_origin = json.dumps(fields_of(basis.origin, "each_light", "integrator"), ensure_ascii=False)
     checksums = Checksums(
@@ -137,6 +145,7 @@ def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
             origin=origin,
             learned=_learned(others, checksums),
             features=_features(others, lit[0].size),
+            objects=_objects(others, lit[0].size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
@@ -188,6 +197,19 @@ def _features(others: Sequence[Part], size: tuple[int, int]) -> Features | None:
             return None
         normal = np.stack([channels[f"normal.{c}"] for c in "XYZ"], axis=-1)
         return Features(part.rgb("albedo"), normal.astype(np.float32))
+    return None
+
+
+def _objects(others: Sequence[Part], size: tuple[int, int]) -> Objects | None:
+    """Whose surfaces are seen; None if nothing says so or not as it was, which nothing needs."""
+    for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
+        named = part.attributes.get(NAMES_KEY, "")
+        if checksum(named, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:
+            return None
+        names = strict_json(named)
+        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+            return None
+        return Objects(part.channels["index"].astype(np.int32), tuple(names))
     return None
 
 

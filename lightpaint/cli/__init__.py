@@ -1,9 +1,9 @@
 # PYTHON_ARGCOMPLETE_OK
 """The command line: one sub-command per room. Parses, calls, prints; no more.
 
-Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: `verify` found
-a disagreement; 2: something the user can mend, said in one line; 130: interrupted, 143: told to
-end, 129: its terminal has closed.
+Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: done, but not as asked
+(`verify` found a disagreement, an answer is not close enough); 2: something the user can mend, said
+in one line; 130: interrupted, 143: told to end, 129: its terminal has closed.
 """
 
 from collections.abc import Sequence

@@ -1,5 +1,6 @@
 """What `lightpaint solve` prints of an answer: for people, or with everything there is."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
@@ -10,7 +11,10 @@ from lightpaint.cli import terminal
 from lightpaint.cli.tables import spoken_agreement
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.lighting.setting import LightSetting
+from lightpaint.report.colors import closer_choice
+from lightpaint.report.meant import spoken_meaning
 from lightpaint.report.measures import energy_shares
+from lightpaint.report.pictures import spoken_view
 from lightpaint.report.sentences import (
     how_sure,
     partly_reached,
@@ -22,6 +26,7 @@ from lightpaint.report.sentences import (
 )
 from lightpaint.results import Look
 from lightpaint.screen import some_names, some_of
+from lightpaint.settings import Settings
 
 Table = Literal["short", "full"]
 
@@ -49,7 +54,7 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     else:
         _show_short(look)
     terminal.write("")
-    terminal.tell(how_it_was_meant(look))
+    terminal.tell(spoken_meaning(look.solution, instead="--literal for none of this"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
@@ -67,36 +72,28 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
 
 
 def _sentences(look: Look, table: Table) -> list[str]:
-    """What holds the lights most; in full, where all that is missed comes from, and how sure."""
+    """What holds the lights most; in full, where all that is missed comes from, and how sure.
+
+    And if other colours come closer.
+    """
+    choice = closer_choice(look.analysis.color_choices)
+    closer = [f"Other colours come closer: --colors {choice}."] if choice else []
     if table == "short":
         is_told = not look.analysis.seen.is_close
-        return what_holds(look.diagnosis)[:1] if is_told else []
-    told = what_is_missed(look.diagnosis)
+        return [*(what_holds(look.diagnosis)[:1] if is_told else []), *closer]
+    told = [*what_is_missed(look.diagnosis), *closer]
     if look.uncertainty is not None:
         told.append(how_sure(look.basis, look.solution, look.uncertainty))
     return told
 
 
-def how_it_was_meant(look: Look) -> str:
-    """One line: what else than the painting decided the answer."""
-    certificate, fit = look.solution.certificate, look.solution.problem.fit
-    used = []
-    if certificate.display:
-        used.append(f"fitted as the eye sees it ({certificate.display})")
-    if fit.unpainted:
-        used.append(f"each pixel that you did not paint counts {fit.unpainted:g}")
-    elif fit.hold:
-        used.append(f"what you did not paint is held ({fit.hold:g})")
-    if fit.colors == "gentle":
-        used.append("lamps keep their colour (gentle)")
-    elif fit.colors == "white":
-        used.append("lamps are white")
-    if certificate.noise_removed:
-        used.append("noise is allowed for")
-    if not used:
-        return "The painting is taken at its word: linear light, nothing held, any colour."
-    said = "; ".join(used)
-    return f"{said[0].upper()}{said[1:]}; --literal for none of this."
+def spoken_settings(settings: Settings) -> str:
+    """What is used, said or by default: `space display, hold 1, ...`."""
+    told = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    transform = told.pop("transform")
+    told |= {"view": transform and spoken_view(transform), "command": None}
+    said = {name: value for name, value in told.items() if value not in (None, "")}
+    return ", ".join(f"{name} {value}" for name, value in said.items() if value is not False)
 
 
 def left_open(look: Look) -> str:

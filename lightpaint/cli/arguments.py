@@ -123,22 +123,24 @@ class at_least:  # noqa: N801 (used as a function)
 
 
 class number:  # noqa: N801 (used as a function)
-    """A number > 0, or >= 0, of no more than can be computed with.
+    """A number > 0, or >= 0, of no more than can be computed with, or than `most`.
 
     about: what it is a number of, with a space before.
     """
 
-    def __init__(self, about: str = "", *, may_be_zero: bool = False) -> None:
-        self.about, self.may_be_zero = about, may_be_zero
+    def __init__(
+        self, about: str = "", *, may_be_zero: bool = False, most: float = BRIGHTEST
+    ) -> None:
+        self.about, self.may_be_zero, self.most = about, may_be_zero, most
 
     def __call__(self, text: str) -> float:
         try:
             value = float(text)
         except ValueError:
             value = -1.0
-        if not (0 < value <= BRIGHTEST or (self.may_be_zero and value == 0)):
+        if not (0 < value <= self.most or (self.may_be_zero and value == 0)):
             bound = ">= 0" if self.may_be_zero else "> 0"
-            if value > BRIGHTEST:
-                bound = f"<= {BRIGHTEST:g}"
+            if value > self.most:
+                bound = f"<= {self.most:g}"
             raise argparse.ArgumentTypeError(f"{text!r} is not a number{self.about} {bound}")
         return value

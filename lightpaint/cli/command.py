@@ -7,7 +7,8 @@ import traceback
 import warnings
 from collections.abc import Sequence
 
-from lightpaint.cli import lines
+from lightpaint.cli import lines, terminal
+from lightpaint.cli.manner import Manner, Outcome, speaking
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
 from lightpaint.errors import LightpaintError
@@ -39,7 +40,12 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
 
         # The commands say it in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
-        return int(getattr(commands, options.command)(**values_of(options, given)))
+        with speaking(Manner(options.as_json, options.is_quiet, options.is_verbose)):
+            outcome: Outcome = getattr(commands, options.command)(**values_of(options, given))
+            if options.as_json:
+                terminal.write_json(outcome.told())
+            terminal.note("done")
+        return outcome.code
     except KeyboardInterrupt as interrupt:
         how_to_go_on = f": {interrupt}" if str(interrupt) else ""
     except Exception as error:

@@ -1,21 +1,25 @@
 """What each sub-command does: calls of the corridor, and tables of what came out."""
 
-import json
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis import cache as bases
 from lightpaint.basis.file import write_basis
-from lightpaint.cli import tables, terminal
-from lightpaint.cli.answer import Table, show_look
-from lightpaint.cli.doctor import examine
+from lightpaint.cli import documents, tables, terminal
+from lightpaint.cli.answer import Table, show_look, spoken_settings
+from lightpaint.cli.listing import lights as lights
+from lightpaint.cli.listing import note_scene
+from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
+from lightpaint.cli.painter import paint as paint
+from lightpaint.cli.upkeep import cache as cache
+from lightpaint.cli.upkeep import doctor as doctor
+from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
-from lightpaint.errors import BasisError, OutputError
+from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
@@ -23,40 +27,34 @@ from lightpaint.pipeline import obtain, run
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.relight import scene_of
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
-from lightpaint.renders import relight_look, relit_folder, render_look, render_template
+from lightpaint.renders import (
+    relight_look,
+    relit_folder,
+    render_look,
+    render_template,
+)
+from lightpaint.result_folder import ResultFolder
 from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import some_names
+from lightpaint.screen import some_of
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
 from lightpaint.staging import finish
 from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
 
-
-def lights(*, scene: SceneFile, as_json: bool, cd_per_unit: float | None) -> int:
-    """`lightpaint lights SCENE`"""
-    loaded = scene.content
-    for remark in remarks_of_scene(loaded):
-        terminal.say(remark)
-    if as_json:
-        listed = [tables.described(light, cd_per_unit) for light in loaded.lights]
-        scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
-        data = {"scene": str(loaded.path), **scale, "lights": listed}
-        # All but ASCII is escaped by it, and of that one character is not seen.
-        terminal.write_lines(json.dumps(data, indent=2).replace("\x7f", "\\u007f"))
-        return 0
-    tables.show_lights(loaded, cd_per_unit)
-    return 0
+#: Of an answer of which nothing is asked.
+ANY = Wanted()
 
 
-def basis(*, scene: SceneFile, output: Path, settings: Settings) -> int:
+def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
     """`lightpaint basis SCENE -o F.basis.exr`"""
     if output.suffix.lower() != ".exr":
         raise OutputError(f"{output} must end in .exr, the format that is written")
     check_writable(output.parent)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
+    note_scene(loaded)
     check_files([output], loaded.read_files)
     with terminal.Listener() as listen:
         of_film = remarks_of_film(loaded, settings)
@@ -67,7 +65,7 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> int:
     kept = " and what is kept" if made.is_fixed.any() else ""
     count = int((~made.is_fixed).sum())
     terminal.write(f"{output}: {count} lights{kept}, {made.origin.spp} samples per pixel")
-    return 0
+    return Outcome(lambda: documents.basis_document(output, made))
 
 
 def template(
@@ -77,10 +75,11 @@ def template(
     transform: ViewTransform | None,
     settings: Settings,
     force: bool,
-) -> int:
+) -> Outcome:
     """`lightpaint template SCENE -o DIR`"""
     _check_template(output, force=force)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
+    note_scene(loaded)
     replaced = (
         files_in_the_way(output) if is_folder(output) else [output, output.with_suffix(".png")]
     )
@@ -99,19 +98,22 @@ def template(
         for remark in remarks_of_scene(loaded, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
-            render_template(loaded, output, progress=listen, **how)
+            files = render_template(loaded, output, progress=listen, **how)
         else:
             linear, picture = output, render_look(loaded, output, progress=listen, **how)
+            files = [linear, picture]
     terminal.write(f"{picture}: paint over it, in any program, and save as PNG; it is denoised")
     if is_folder(output):
         terminal.write(f"{output / CLEAN}: the same in linear light, for programs that know EXR")
     terminal.write(f"{linear}: as it was rendered, with its grain")
     if is_folder(output):
         terminal.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
-    return 0
+    folder = output if is_folder(output) else output.parent
+    shown = {"picture": str(picture), "light": str(linear)}
+    return Outcome(lambda: documents.files_document(folder, files, **shown))
 
 
-def demo(*, folder: Path, variant: str | None, settings: Settings) -> int:
+def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
     """`lightpaint demo -o DIR`"""
     made = write_demo(folder)
     options = [f"--spp {settings.spp}"] if settings.spp else []
@@ -122,25 +124,30 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> int:
     terminal.say(command)
     scene = SceneFile(str(made.scene), variant=variant)
     painting, settings = Painting(str(made.painting)), replace(settings, command=command)
-    solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
+    solved = solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
     terminal.write("")
     terminal.write(f"Open {made.answer / 'report.html'} in a browser. Then paint your own:")
     terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
-    return 0
+    about = {"scene": str(made.scene), "painting": str(made.painting), "command": command}
+    return replace(solved, told=lambda: about | solved.told())
 
 
-def solve(*, jobs: Sequence[Job], table: Table = "short") -> int:
+def solve(*, jobs: Sequence[Job], table: Table = "short", wanted: Wanted = ANY) -> Outcome:
     """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`"""
     listen, obtained = terminal.Listener(), None
+    results, shortfalls = [], []
     # Those of all before the first is run, which says its own again: once is enough.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
     for job in jobs:
+        listen.note(f"files read; {spoken_settings(job.fit)}")
         with listen:
             looks = run(job, listen, bases=obtained)
         # Several paintings of one scene share its basis.
         obtained = [look.basis for look in looks]
         for view, look in zip(job.views, looks, strict=True):
+            results.append((job, view, look))
+            shortfalls += [f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.seen)]
             if job.by_sensor:
                 terminal.write("")
                 terminal.write(f"{look.basis.origin.sensor}:")
@@ -152,12 +159,17 @@ def solve(*, jobs: Sequence[Job], table: Table = "short") -> int:
             terminal.write(f"for other programs: {there}")
     if not jobs[0].scenes and jobs[0].groups is None:
         terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
-    return 0
+    if shortfalls:
+        terminal.complain("solve", some_of(shortfalls, joint="; "))
+    return Outcome(
+        lambda: {"results": [documents.result_document(*x, wanted) for x in results]},
+        1 if shortfalls else 0,
+    )
 
 
 def relight(
     *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
-) -> int:
+) -> Outcome:
     """`lightpaint relight SCENE lighting.json...`"""
     for path in lightings:
         finish(path.parent)
@@ -178,71 +190,36 @@ def relight(
         with terminal.Listener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
             relight_look(loaded, lighting, place, progress=listen, **how)
+            listen.note(f"{folder} relit and rendered")
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
-    return 0
+    return Outcome(lambda: {"results": [_relit(*x) for x in zip(lightings, results, strict=True)]})
 
 
-def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> int:
+def _relit(lighting: Path, place: ResultFolder) -> dict[str, Any]:
+    """What there is of a lighting that was relit, for programs."""
+    files = [file for file in place.files if file.is_file()]
+    return documents.files_document(place.folder, files, lighting=str(lighting))
+
+
+def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> Outcome:
     """`lightpaint verify DIR...`"""
     use_variant(variant)
-    agree = True
+    results = []
     for folder in (view for given in folders for view in result_folders(given)):
         with terminal.Listener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
             result = verify_result(folder, progress=listen, **how)
+            listen.note(f"{folder} rendered and compared")
         terminal.write(f"{folder}: {tables.spoken_agreement(result)}")
-        agree &= result.agrees
-    return 0 if agree else 1
-
-
-def cache(*, action: str, names: Sequence[str]) -> int:
-    """`lightpaint cache [list | drop NAME... | clear]`"""
-    if action != "drop" and names:
-        raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
-    if action == "list":
-        kept = bases.entries()
-        tables.show_kept(kept)
-        size = sum(entry.size for entry in kept) / 1e6
-        terminal.write(
-            f"kept in {bases.folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB"
-        )
-        return 0
-    dropped = bases.entries() if action == "clear" else _kept_by_names(names)
-    freed = bases.drop(dropped)
-    if action == "drop":
-        tables.show_kept(dropped)
-    terminal.write(f"{len(dropped)} deleted from {bases.folder()}: {freed / 1e6:.1f} MB are free")
-    return 0
-
-
-def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
-    """The bases that are meant, each once. Raises BasisError for a name of none."""
-    if not names:
-        raise BasisError(
-            "cache drop needs the name of a scene or of a file, as cache list shows it"
-        )
-    found: dict[Path, bases.Entry] = {}
-    for name in names:
-        if not (its := bases.named(name)):
-            scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
-            there = some_names(sorted(scenes)) or "none"
-            raise BasisError(f"no basis of {name!r} is kept in {bases.folder()}: it has {there}")
-        found |= {entry.path: entry for entry in its}
-    return list(found.values())
-
-
-def doctor(*, variant: str | None) -> int:
-    """`lightpaint doctor`"""
-    findings = examine(variant)
-    for finding in findings:
-        mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
-        terminal.write(f"{finding.what:18s} {mark:8s} {finding.found}")
-    missing = [finding for finding in findings if finding.state == "missing"]
-    for finding in missing:
-        if finding.remedy:
-            terminal.write(f"to mend {finding.what}: {finding.remedy}")
-    terminal.write("something is missing" if missing else "everything needed is here")
-    return 2 if missing else 0
+        results.append((folder, result))
+    agrees = all(result.agrees for _, result in results)
+    return Outcome(
+        lambda: {
+            "agrees": agrees,
+            "results": [documents.verified_document(*result) for result in results],
+        },
+        0 if agrees else 1,
+    )
 
 
 def _check_template(output: Path, *, force: bool) -> None:
@@ -277,6 +254,7 @@ def _replaced(output: Path) -> list[Path]:
 def _loaded(scene: SceneFile) -> Scene:
     """The scene, of whose lights only the sum counts."""
     loaded = scene.content
+    note_scene(loaded)
     if note := use_variant().note:
         terminal.say(note)
     return loaded

@@ -66,6 +66,13 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="leave the lights file beside the scene alone",
     )
+    parser.add_argument(
+        "--no-group-alike",
+        dest="group_alike",
+        action="store_false",
+        help="adjust emitters without names one by one, also where more than 24 are alike "
+        "(default: those are one light)",
+    )
 
 
 def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
@@ -182,9 +189,36 @@ def add_unit(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_output(parser: argparse.ArgumentParser, metavar: str, about: str) -> None:
+def add_output(parser: "argparse._ActionsContainer", metavar: str, about: str) -> None:
     """Where results go."""
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
+
+
+def add_server(parser: argparse.ArgumentParser) -> None:
+    """Where the painter's page is, and which session it shows."""
+    parser.add_argument(
+        "--new",
+        action="store_true",
+        help="start afresh; the session that is there is kept under another name (default: go on)",
+    )
+    parser.add_argument(
+        "--port",
+        type=arguments.at_least(0, most=65535),
+        metavar="N",
+        help="where the page is served; 0 for any (default: 8421, or any if that is taken)",
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        help="let others reach the page, by this address of the machine: whoever has its token can "
+        "paint (default: nobody but this machine)",
+    )
+    parser.add_argument(
+        "--no-browser",
+        dest="with_browser",
+        action="store_false",
+        help="only say where the page is",
+    )
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
@@ -193,4 +227,29 @@ def add_force(parser: argparse.ArgumentParser) -> None:
         "--force",
         action="store_true",
         help="replace results of something else, or that were changed by hand (default: refuse)",
+    )
+
+
+def add_manner(parser: argparse.ArgumentParser) -> None:
+    """How results are said, and what beside them."""
+    parser.add_argument(
+        "--json",
+        dest="as_json",
+        action="store_true",
+        help="print the results as one JSON document on stdout, for other programs",
+    )
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "-q",
+        "--quiet",
+        dest="is_quiet",
+        action="store_true",
+        help="neither progress nor remarks: only results and errors",
+    )
+    group.add_argument(
+        "-v",
+        "--verbose",
+        dest="is_verbose",
+        action="store_true",
+        help="also what was used, and how long each stage took",
     )

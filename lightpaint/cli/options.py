@@ -14,6 +14,8 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
+from lightpaint.cli.order import options_but
+from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
@@ -34,8 +36,14 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
     output = Path(asked["output"]) if asked.get("output") else None
     match options.command:
         case "lights":
-            unit = options.cd_per_unit
-            return {"scene": scene_of(options), "as_json": options.json, "cd_per_unit": unit}
+            is_drawn = output is not None or not (options.no_sheet or options.as_json)
+            return {
+                "scene": scene_of(options),
+                "cd_per_unit": options.cd_per_unit,
+                "sheet": (output or Path("lights.png")) if is_drawn else None,
+                "is_asked": output is not None,
+                "force": options.force,
+            }
         case "basis":
             output = output or Path(Path(options.scene).stem + ".basis.exr")
             return {"scene": scene_of(options), "output": output, "settings": settings}
@@ -52,7 +60,10 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             output = output or Path("lightpaint-demo")
             return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
-            return {"jobs": jobs_of(options, settings), "table": options.table}
+            wanted = Wanted(options.max_miss, options.min_fit)
+            return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
+        case "paint":
+            return _to_paint(options, settings, given)
         case "relight":
             scene = scene_of(options, is_to_solve=False, use_lights_file=False)
             paths = list(map(Path, options.lightings))
@@ -81,13 +92,14 @@ def settings_of(options: Namespace, given: Sequence[str]) -> Settings:
 
 def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> SceneFile:
     """The scene that was asked for. is_to_solve: whether its lights are chosen."""
-    path = options.source if options.command == "solve" else options.scene
+    path = options.source if options.command in ("solve", "paint") else options.scene
     if is_to_solve:
         how |= {
             "lights": options.lights,
             "groups": _groups(options.groups),
             "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
+            "group_alike": options.group_alike,
         }
     loading = {"sensor": options.sensor, "variant": options.variant, **how}
     loading["integrator"] = options.integrator
@@ -137,6 +149,45 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:
+    """What `paint` is asked for."""
+    source, asked = painted_of(options), constraints_of(options)
+    if options.lights_file and not isinstance(source, SceneFile):
+        asked = read_constraints(options.lights_file).and_then(asked)
+    name = Path(source.path).name
+    stem = name.removesuffix(".basis.exr") if name.endswith(".basis.exr") else Path(name).stem
+    [folder] = folders_of(options.output and Path(options.output), [f"{stem}.paint"])
+    # Those that `solve` has too, for the command that answers what was exported.
+    dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
+    dropped += ["as_json", "is_quiet", "is_verbose"]
+    dropped += ["lights"] * isinstance(source, GroupsFile)
+    return {
+        "source": source,
+        "folder": folder,
+        "settings": settings,
+        "constraints": asked,
+        "choice": transform_of(options),
+        "options": options_but(options.parser, given[given.index("paint") + 1 :], *dropped),
+        "new": options.new,
+        "host": options.host,
+        "port": options.port,
+        "with_browser": options.with_browser,
+    }
+
+
+def painted_of(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
+    """What `paint` paints: a scene, a basis, or light groups, also those that --lights names."""
+    given = ",".join(options.lights or ())
+    if options.source is None and not given:
+        raise BasisError("nothing to paint: give a scene, a basis, or light groups")
+    if options.source is None:
+        _check_light_groups(given)
+        options.source, options.lights = given, None
+    elif given and _is_file_to_be(given, Path(options.source)):
+        raise BasisError(f"{options.source} and --lights {given} at once: give one to paint")
+    return basis_of(options) or scene_of(options)
 
 
 def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:

@@ -7,7 +7,8 @@ then the paths; `--` ends the options, as everywhere.
 
 import argparse
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from lightpaint.cli import lines
@@ -48,25 +49,41 @@ def in_order(parser: argparse.ArgumentParser, given: Sequence[str]) -> list[str]
     An option that lacks its value comes last, so that it takes nothing else (and so that
     completion, which sees only what is typed so far, knows that it is open).
     """
-    options: list[str] = []
     plain: list[str] = []
+    options: list[str] = []
     lacking: list[str] = []
+    for _, words, is_open in _told_apart(parser, given, plain):
+        (lacking if is_open else options).extend(words)
+    if any(word.startswith("-") for word in plain):
+        return [*options, *lacking, "--", *plain]
+    return [*options, *plain, *lacking]
+
+
+def options_but(
+    parser: argparse.ArgumentParser, given: Sequence[str], *dropped: str
+) -> tuple[str, ...]:
+    """The words of all options in `given` but of those that go to `dropped`, as for a shell."""
+    found = _told_apart(parser, given, [])
+    kept = [words for option, words, _ in found if option and option.dest not in dropped]
+    return tuple(shlex.quote(word) for words in kept for word in words)
+
+
+def _told_apart(
+    parser: argparse.ArgumentParser, given: Sequence[str], plain: list[str]
+) -> Iterator[tuple[argparse.Action | None, list[str], bool]]:
+    """Each option, its words, and whether it lacks its value; other words are put to `plain`."""
     left = [*given]
     while left:
         word = left.pop(0)
         if word == "--":
             plain += left
-            break
+            return
         if _is_plain(word):
             plain.append(word)
             continue
         option = _option(parser, word)
         words = _with_value(option, word, left)
-        is_open = option is not None and option.nargs is None and words == [word]
-        (lacking if is_open else options).extend(words)
-    if any(word.startswith("-") for word in plain):
-        return [*options, *lacking, "--", *plain]
-    return [*options, *plain, *lacking]
+        yield option, words, option is not None and option.nargs is None and words == [word]
 
 
 def _is_plain(word: str) -> bool:

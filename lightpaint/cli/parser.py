@@ -8,9 +8,11 @@ from lightpaint.cli.option_groups import (
     add_cache,
     add_force,
     add_lights,
+    add_manner,
     add_output,
     add_sampling,
     add_scene,
+    add_server,
     add_spp,
     add_unit,
     add_variant,
@@ -18,8 +20,21 @@ from lightpaint.cli.option_groups import (
     add_view_transform,
 )
 from lightpaint.cli.order import CommandParser, Parser
-from lightpaint.cli.solve_options import add_constraints, add_method, add_paintings
+from lightpaint.cli.solve_options import (
+    add_constraints,
+    add_fit,
+    add_method,
+    add_paintings,
+    add_pattern,
+    add_wanted,
+)
 from lightpaint.version import __version__
+
+#: What a script asks.
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 done, but not as asked (verify disagrees, --max-miss, --min-fit); "
+    "2 an error that you can mend, in one line; 130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
+)
 
 
 def command_parser() -> argparse.ArgumentParser:
@@ -33,9 +48,10 @@ def command_parser() -> argparse.ArgumentParser:
         dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
     )
     for name, (about, add_options) in _COMMANDS.items():
-        add_options(
-            commands.add_parser(name, help=about, description=about[0].upper() + about[1:] + ".")
-        )
+        said = about[0].upper() + about[1:] + "."
+        its = commands.add_parser(name, help=about, description=said, epilog=EXIT_CODES)
+        add_options(its)
+        add_manner(its)
     return parser
 
 
@@ -43,7 +59,14 @@ def _lights(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
     add_unit(parser)
-    parser.add_argument("--json", action="store_true", help="as JSON, for other programs")
+    where = parser.add_mutually_exclusive_group()
+    add_output(where, "F.png", "what each light does alone, as a picture (default: lights.png)")
+    where.add_argument(
+        "--no-sheet", action="store_true", help="only list them; --json does that, too, without -o"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace a picture of something else (default: refuse)"
+    )
 
 
 def _basis(parser: argparse.ArgumentParser) -> None:
@@ -92,18 +115,38 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         "with their radiometry, and how sure they are (default: %(default)s)",
     )
     add_method(parser)
+    add_wanted(parser)
     add_unit(parser)
     add_lights(parser)
-    parser.add_argument(
-        "--pattern",
-        metavar="'Light_{name}'",
-        help="how the layers, parts or files of light groups are named, where no renderer that "
-        "is known names them so",
-    )
+    add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
     add_cache(parser)
     add_view(parser)
+
+
+def _paint(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "source",
+        metavar="SCENE|BASIS|LIGHTS",
+        nargs="?",
+        help="scene XML, a *.basis.exr, or light groups of another renderer, which --lights may "
+        "name, too",
+    )
+    add_output(
+        parser, "DIR", "folder for the session and what is exported (default: <scene>.paint/)"
+    )
+    add_server(parser)
+    add_fit(parser)
+    add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
+    add_lights(parser)
+    add_pattern(parser)
+    add_constraints(parser)
+    add_budget(parser)
+    add_cache(parser)
+    add_view(parser)
+    # Options are kept for the command that answers what is exported.
+    parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 
 
 def _relight(parser: argparse.ArgumentParser) -> None:
@@ -143,6 +186,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "basis": ("render the image of each light alone", _basis),
     "template": ("render the current look, to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
+    "paint": ("paint in the browser, and see the lighting that comes closest at once", _paint),
     "relight": ("write lightings into the scene and render it", _relight),
     "verify": ("render results anew and compare with the prediction", _verify),
     "cache": ("list or delete the bases kept from earlier runs", _cache),

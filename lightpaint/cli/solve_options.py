@@ -55,8 +55,18 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_method(parser: argparse.ArgumentParser) -> None:
-    """How a painting is answered."""
+def add_pattern(parser: argparse.ArgumentParser) -> None:
+    """How light groups are named."""
+    parser.add_argument(
+        "--pattern",
+        metavar="'Light_{name}'",
+        help="how the layers, parts or files of light groups are named, where no renderer that "
+        "is known names them so",
+    )
+
+
+def add_fit(parser: argparse.ArgumentParser) -> None:
+    """What it is to be close."""
     parser.add_argument(
         "--hold",
         type=arguments.number(may_be_zero=True),
@@ -83,6 +93,11 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         help="take the painting at its word, as the paper does: linear light, nothing held, any "
         "colour, noise left in; but for what other options say",
     )
+
+
+def add_method(parser: argparse.ArgumentParser) -> None:
+    """How a painting is answered."""
+    add_fit(parser)
     parser.add_argument(
         "--unpainted",
         type=arguments.number(may_be_zero=True),
@@ -132,6 +147,24 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="look for up to N (3) further point lights that would help most, with XML to paste; "
         "takes some ten seconds",
+    )
+
+
+def add_wanted(parser: argparse.ArgumentParser) -> None:
+    """What a script asks of the answer."""
+    parser.add_argument(
+        "--max-miss",
+        type=arguments.number(" of ΔE", may_be_zero=True),
+        metavar="DE",
+        help="exit with 1 if an answer misses more than this mean ΔE over what was painted, as "
+        "its first line says it; results are written all the same",
+    )
+    parser.add_argument(
+        "--min-fit",
+        type=arguments.number(" as a share", may_be_zero=True, most=1),
+        metavar="SHARE",
+        help="exit with 1 if less than this share, 0 to 1, of what was asked has come about: 1 − "
+        "that mean ΔE / the ΔE as the scene is now",
     )
 
 

@@ -1,7 +1,6 @@
 """What commands print of scenes, bases and suggestions: tables, and sentences below them."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from lightpaint.basis.cache import Entry
 from lightpaint.cli import terminal
@@ -15,7 +14,7 @@ from lightpaint.report.suggestion import spoken_position, spoken_suggestions
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.emitters import Emitter
-from lightpaint.scene.lights import WHOLE_EMISSION, Light
+from lightpaint.scene.lights import Light
 from lightpaint.scene.scene import Scene
 
 
@@ -31,7 +30,7 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             what = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
-            whole = _photometry(light, cd_per_unit)
+            whole = photometry_of(light, cd_per_unit)
             table.row(
                 light.name,
                 light.plugin,
@@ -42,8 +41,9 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
                 "" if light.is_fixed else whole.color,
                 *whole.amounts[: len(amounts)],
             )
-        for member in light.members:
-            its = _photometry(member, cd_per_unit)
+        # Of many that nobody has named one row says all.
+        for member in () if light.is_found else light.members:
+            its = photometry_of(member, cd_per_unit)
             table.row(
                 member.name if single else f"  {member.name}",
                 member.plugin,
@@ -57,8 +57,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     terminal.print_table(table)
 
 
-def _photometry(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
-    """As the scene has it."""
+def photometry_of(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
+    """Of a light or one of its emitters, as the scene has it."""
     unit, flux = MULTIPLE, None
     if isinstance(light, Light):
         unit, flux = light.unit, light.unit_flux
@@ -66,37 +66,6 @@ def _photometry(light: Light | Emitter, cd_per_unit: float | None) -> Photometry
         unit = light.kind.unit
         flux = None if light.unit_flux is None else (light.unit_flux,) * 3
     return photometry(light.emission, unit=unit, unit_flux=flux, cd_per_unit=cd_per_unit)
-
-
-def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
-    """A light, and the emitters in it, for other programs."""
-    members = [
-        {
-            "name": member.name,
-            "plugin": member.plugin,
-            "parameter": member.kind.parameter if member.kind is not None else WHOLE_EMISSION,
-            "unit": member.kind.unit if member.kind is not None else MULTIPLE,
-            "emission": list(member.emission),
-            "form": member.form,
-            "sampling_weight": member.sampling_weight,
-            "photometry": _photometry(member, cd_per_unit).fields(),
-        }
-        for member in light.members
-    ]
-    about = {
-        "name": light.name,
-        "plugin": light.plugin,
-        "parameter": light.parameter,
-        "unit": light.unit,
-        "emission": list(light.emission),
-        "form": light.form,
-        "is_fixed": light.is_fixed,
-        "photometry": _photometry(light, cd_per_unit).fields(),
-        "members": members,
-    }
-    if len(members) == 1:
-        about["sampling_weight"] = light.members[0].sampling_weight
-    return about
 
 
 def show_kept(entries: Sequence[Entry]) -> None:

@@ -1,10 +1,12 @@
 """How the command line speaks: tables to stdout, progress and remarks to stderr."""
 
 import io
+import json
 import os
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich.console import Console
 from rich.progress import (
@@ -19,6 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lightpaint.cli import lines
+from lightpaint.cli.manner import manner
 from lightpaint.cli.words import spoken
 from lightpaint.screen import visible
 
@@ -53,6 +56,8 @@ def print_table(made: Rows, swatches: Sequence[str | None] = ()) -> None:
     swatches: a colour like `#ffaa66` for each row, or None for none. They stand before the rows
     where the terminal can show them, and are nowhere else.
     """
+    if manner().as_json:
+        return
     width = None if sys.stdout.isatty() else 1000
     page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
     page.print(made)
@@ -71,14 +76,23 @@ def has_truecolour() -> bool:
 
 
 def write(text: str) -> None:
-    """A line of results, to stdout."""
-    lines.out(text)
+    """A line of results, to stdout; nowhere if they are asked for as JSON."""
+    if not manner().as_json:
+        lines.out(text)
+
+
+def write_json(told: Mapping[str, Any]) -> None:
+    """The results as a document for programs, to stdout."""
+    # All but ASCII is escaped by it, and of that one character is not seen.
+    text = json.dumps(told, indent=2, allow_nan=False).replace("\x7f", "\\u007f")
+    for line in text.split("\n"):
+        lines.out(line)
 
 
 def tell(text: str) -> None:
     """A sentence or two, to stdout: on a terminal in lines that end where words do."""
-    if not sys.stdout.isatty():
-        lines.out(text)
+    if manner().as_json or not sys.stdout.isatty():
+        write(text)
         return
     for line in textwrap.wrap(visible(text), Console().width, break_on_hyphens=False):
         lines.out(line)
@@ -87,12 +101,29 @@ def tell(text: str) -> None:
 def write_lines(text: str) -> None:
     """Several lines of results, to stdout."""
     for line in text.rstrip().split("\n"):
-        lines.out(line.rstrip())
+        write(line.rstrip())
 
 
 def say(text: str) -> None:
     """A remark, to stderr."""
-    lines.err(f"lightpaint: {spoken(text)}")
+    if not manner().is_quiet:
+        lines.err(f"lightpaint: {spoken(text)}")
+
+
+def complain(command: str, text: str) -> None:
+    """What is not as it was asked for, to stderr, however quiet it is to be."""
+    lines.err(f"lightpaint {command}: {spoken(text)}")
+
+
+def note(text: str) -> None:
+    """A stage that is done, and how long it took, to stderr, where somebody wants to know all."""
+    if manner().is_verbose:
+        say(_timed(text))
+
+
+def _timed(text: str) -> str:
+    lap, total = manner().clock.look()
+    return f"{text} [{lap:.2f} s, {total:.2f} s in all]"
 
 
 class Listener:
@@ -108,7 +139,7 @@ class Listener:
         self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> "Listener":
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and not manner().is_quiet:
             columns = (
                 TextColumn("{task.description}", markup=False),
                 BarColumn(),
@@ -127,7 +158,7 @@ class Listener:
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
         if self._bars is None:
-            if done == 0:
+            if done == 0 and not manner().is_quiet:
                 lines.err(f"{label}: {total} {unit}")
             return
         if label not in self._tasks:
@@ -144,3 +175,8 @@ class Listener:
             say(text)
             return
         self._bars.console.out(lines.cut(f"lightpaint: {spoken(text)}"), highlight=False)
+
+    def note(self, text: str) -> None:
+        """A stage that is done, where somebody wants to know all; each has a time of its own."""
+        if manner().is_verbose:
+            self.say(_timed(text))

@@ -17,10 +17,12 @@ OPTIONS = {
     "lights": "--lights",
     "literal": "--literal",
     "mask": "--mask",
+    "new": "--new",
     "noise_correction": "--correct-noise",
     "paint": "--paint",
     "parameters": "-D",
     "pattern": "--pattern",
+    "port": "--port",
     "quality": "--quality",
     "refine": "--refine",
     "resize": "--resize",
@@ -38,6 +40,7 @@ OPTIONS = {
 
 #: What is spelled otherwise than by an option and a value.
 SPELLINGS = {
+    "group_alike=False": "--no-group-alike",
     "find=False": "--no-template",
     "noise_correction=False": "--no-correct-noise",
     "use_cache=False": "--no-cache",

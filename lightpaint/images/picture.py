@@ -1,6 +1,6 @@
 """A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -40,6 +40,7 @@ class Picture:
     codes: largest integer of the file's numbers; None for floats.
     lossy: whether compression changed the numbers beyond that rounding.
     notes: what a person should know, a line each.
+    attributes: texts in the header of an EXR.
     """
 
     kind: str
@@ -53,6 +54,7 @@ class Picture:
     codes: int | None = None
     lossy: bool = False
     notes: tuple[str, ...] = field(default=())
+    attributes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -148,6 +150,7 @@ def _of_layer(layer: Layer) -> Picture:
         weight=weight,
         stored=_stored(stored_part),
         notes=notes,
+        attributes=stored_part.attributes,
     )
 
 

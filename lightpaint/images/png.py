@@ -22,6 +22,9 @@ from lightpaint.files import replacing, write_bytes
 #: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
 MAX_CHUNK = 2**24
 
+#: Bytes of a PNG in which its texts stand.
+MAX_TEXTS = 2**12
+
 #: Effort of compression: renders come out no larger than at 6, the usual, in a third of the time.
 EFFORT = 3
 
@@ -59,6 +62,13 @@ def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = N
     buffer = io.BytesIO()
     Image.fromarray(image_8_bit).save(buffer, "PNG", pnginfo=said, compress_level=EFFORT)
     return buffer.getvalue()
+
+
+def png_says(path: Path, key: str) -> bool:
+    """Whether the file at `path` is a PNG that `png_bytes` wrote with a text of that key."""
+    with path.open("rb") as file:
+        head = file.read(MAX_TEXTS)
+    return head.startswith(b"\x89PNG") and b"tEXt" + key.encode() + b"\0" in head
 
 
 def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:

@@ -38,6 +38,12 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
         >>> len(lp.read_lighting("evening.json").lights)
         2
     """
+    data = lighting_fields(lighting)
+    write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def lighting_fields(lighting: Lighting) -> dict[str, Any]:
+    """What a lighting.json has of it, as plain values."""
     data: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,
@@ -59,7 +65,7 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
     }
     if (q := lighting.certificate) is not None:
         data["solve"] = fields_of(q, "curve", "bounds", "objective_error", *FIT, *SEEN)
-    write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    return data
 
 
 def read_lighting(path: str | Path) -> Lighting:

@@ -83,6 +83,11 @@ class Fit:
         "emitters": one_of(Emitters),
     }
 
+    @property
+    def brightness(self) -> float:
+        """By how much the view transform brightens the squares of light."""
+        return 1.0 if self.transform is None else float(4.0**self.transform.stops)
+
     def __post_init__(self) -> None:
         check_fields(self, self.expected)
         if self.unpainted and self.hold:

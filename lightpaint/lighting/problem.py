@@ -28,14 +28,10 @@ from lightpaint.lighting.painting import (
     weight_of_rest,
     what_counts,
 )
-from lightpaint.lighting.pull import to_colors, to_present
+from lightpaint.lighting.pull import pull_of
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
-
-#: Strength of the pull to the present colours: of what a light would do to the picture by changing
-#: its hue, this much is missed, in proportion to what is painted.
-GENTLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -65,8 +61,8 @@ class Problem:
         squares: The linear problem that stands for the loss, the loss itself where that is one;
             before a solve has found better, the painting taken at its word.
         equations: M and b of these squares, of the basis as it is.
-        constraints: What is asked of the lights.
-        reduction: What constraints leave to solve for.
+        constraints: What is asked of the lights, beside what `fit` says of their colours.
+        reduction: What both leave to solve for.
         full: The same with all lights that `sparse` has not chosen.
         start: (n, 3), the weights to begin with: lights that reach nothing keep them.
         fit: How close is measured, and how the closest is found.
@@ -133,8 +129,6 @@ class Problem:
         ]
         views = Views(parts, tuple(fitted))
         fit = meant_by(fit, fitted)
-        if fit.colors == "white":
-            asked = white_where_free(asked, whole.lights)
         word = joint_squares(views, unpainted=weight_of_rest(views, fit))
         loss = loss_of(
             word,
@@ -173,46 +167,36 @@ class Problem:
         return "linear" if self.loss.transform is None else "display"
 
     @property
+    def asks(self) -> bool:
+        """Whether anything limits the lights: constraints, or that they are to be white."""
+        return bool(self.constraints) or self.fit.colors == "white"
+
+    @property
     def solved(self) -> NormalEquations:
         """The equations that the weights are to solve, noise taken out where that was asked."""
         return self.equations if self.corrected is None else self.corrected
 
-    @property
-    def brightness(self) -> float:
-        """By how much the view transform brightens the squares of light."""
-        transform = self.fit.transform
-        return 1.0 if transform is None else float(4.0**transform.stops)
+    @cached_property
+    def painted_share(self) -> float:
+        """Importance of all that is painted, beside the number of pixels."""
+        painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
+        return painted / sum(x.importance.size for x in self.views.targets)
 
     @property
     def pull_strength(self) -> float:
         """That of the pull to the present, of light as bright as the view transform makes it."""
-        return self.constraints.prefer_current * self.brightness
-
-    @cached_property
-    def color_strength(self) -> float:
-        """That of the pull to the present colours: in proportion to what is painted."""
-        if self.fit.colors != "gentle":
-            return 0.0
-        painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
-        pixels = sum(x.importance.size for x in self.views.targets)
-        return GENTLE * self.brightness * painted / pixels
+        return self.constraints.prefer_current * self.fit.brightness
 
     @property
     def keeps_color(self) -> Bools:
         """(n,), the lights that are pulled to their colour: free to leave it, and seen to."""
-        free = {k for knob in self.full.knobs if knob.is_free for k in knob.lights}
-        its: Bools = np.array([k in free for k in range(len(self.basis.lights))], dtype=bool)
-        return its & self.equations.reached.any(axis=1)
+        return self.full.is_free & self.equations.reached.any(axis=1)
 
     @cached_property
     def pull(self) -> NormalEquations | None:
         """What pulls to the present, or to the present colours, adds; None where none is asked."""
-        added = []
-        if self.pull_strength:
-            added.append(to_present(self.basis, self.pull_strength))
-        if self.color_strength:
-            added.append(to_colors(self.basis, self.color_strength, self.keeps_color))
-        return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
+        prefer, share = self.constraints.prefer_current, self.painted_share
+        return pull_of(self.basis, self.fit, prefer, share, self.keeps_color)
 
     def pulled(self, equations: NormalEquations) -> NormalEquations:
         """`equations` with what pulls at the weights, if something does."""
@@ -292,7 +276,12 @@ class Problem:
 
 
 def reduced_by(asked: Constraints, basis: Basis, fit: Fit) -> Reduction:
-    """What constraints leave of the lights, and the fit of their colours."""
+    """What constraints leave of the lights, and the fit of their colours.
+
+    Raises ConstraintError for a light that is to be white and cannot be what else is asked of it.
+    """
+    if fit.colors == "white":
+        asked = white_where_free(asked, basis.lights)
     return replace(reduce_to(asked, basis.lights), is_joined=fit.colors == "gentle")
 
 

@@ -9,7 +9,28 @@ import numpy as np
 from lightpaint.arrays import Bools
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
+from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.normal_equations import NormalEquations
+
+#: Strength of the pull to the present colours: of what a light would do to the picture by changing
+#: its hue, this much is missed, in proportion to what is painted.
+GENTLE = 0.5
+
+
+def pull_of(
+    basis: Basis, fit: Fit, prefer_current: float, painted_share: float, keeps_color: Bools
+) -> NormalEquations | None:
+    """All that pulls at the weights; None where nothing does.
+
+    prefer_current: as of `Constraints`. painted_share: importance of all that is painted, beside
+    the number of pixels, to which the pull to the present colours is in proportion. keeps_color:
+    (n,), the lights that it is for.
+    """
+    gentle = GENTLE * fit.brightness * painted_share if fit.colors == "gentle" else 0.0
+    added = [to_present(basis, prefer_current * fit.brightness)] if prefer_current else []
+    if gentle:
+        added.append(to_colors(basis, gentle, keeps_color))
+    return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
 
 
 def to_present(basis: Basis, strength: float) -> NormalEquations:

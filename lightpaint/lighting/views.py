@@ -74,7 +74,9 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
         half_differences=half_differences,
         emitters_seen=in_rows([basis.emitters_seen for basis in bases]),
         learned=None,
-        features=None,  # of the views, which are shown one by one
+        # Of the views, which are shown one by one.
+        features=None,
+        objects=None,
     )
     views = tuple(
         replace(

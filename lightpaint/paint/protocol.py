@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
+from lightpaint.files import one_line
 from lightpaint.records import read_record, strict_json
 
 #: Of this protocol; a page of another one is told to load itself anew.
@@ -43,7 +44,9 @@ Region: TypeAlias = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Hello:
-    """The first message of a page, and again after a dropped connection. Answered by `state`."""
+    """The first message of a page, and again after a dropped connection. Answered by `state`, or
+    by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+    """
 
     version: int
 
@@ -251,7 +254,8 @@ class Message:
 
 def to_frame(content: Mapping[str, Any], buffers: Sequence[bytes]) -> bytes:
     """One binary frame."""
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
+    # Names of files that are not UTF-8 stand in Python's text as halves of pairs.
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace")
     parts = [struct.pack("<I", len(text)), text, b"\0" * (-(4 + len(text)) % 8)]
     for buffer in buffers:
         parts += [buffer, b"\0" * (-len(buffer) % 8)]
@@ -294,7 +298,7 @@ def said_of(
     try:
         said = read_record(KINDS[kind], plain)
     except ValueError as error:
-        raise PaintError(f"{kind}: {error}") from None
+        raise PaintError(one_line(f"{kind}: {error}")) from None
     described = _described(content)
     if len(described) != len(buffers):
         raise PaintError(f"{kind}: {len(buffers)} buffers, not {len(described)} as it says")
@@ -316,7 +320,7 @@ def _json(text: bytes) -> dict[str, Any]:
     try:
         content = strict_json(text.decode())
     except (ValueError, UnicodeDecodeError) as error:
-        raise PaintError(f"a message that is no JSON: {error}") from None
+        raise PaintError(one_line(f"a message that is no JSON: {error}")) from None
     if not isinstance(content, dict):
         raise PaintError("a message that is no object")
     return content
@@ -324,12 +328,15 @@ def _json(text: bytes) -> dict[str, Any]:
 
 def _described(content: Mapping[str, Any]) -> list[tuple[tuple[int, ...], str]]:
     """Shape and dtype of each buffer that a message speaks of."""
-    listed, found = content.get("buffers", []), []
+    listed, found, names = content.get("buffers", []), [], set[str]()
     if not (isinstance(listed, list) and len(listed) <= 16):
         raise PaintError("buffers are a list of at most 16")
     for about in listed:
         if not (isinstance(about, dict) and isinstance(about.get("name"), str)):
             raise PaintError("a buffer without a name")
+        if about["name"] in names:
+            raise PaintError(f"two buffers are called {about['name'][:40]!r}")
+        names.add(about["name"])
         shape, dtype = about.get("shape"), about.get("dtype")
         if not (isinstance(dtype, str) and dtype in DTYPES):
             raise PaintError(f"a buffer of {str(dtype)[:40]!r}: expected {', '.join(DTYPES)}")

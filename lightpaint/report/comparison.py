@@ -65,7 +65,7 @@ def comparison_image(
     """
     target = target.fitted_to(basis.size, resize=False)
     looks = looks or Looks.raw(basis, predicted, verified)
-    transform = transform_of(target, predicted, verified)
+    transform = looks.through(transform_of(target, predicted, verified))
     share = float(painted(target, solution).mean())
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [

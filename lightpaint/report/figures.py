@@ -8,11 +8,12 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, largest
 from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import denoised
 from lightpaint.images.png import png_bytes
+from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.pictures import (
@@ -85,10 +86,7 @@ def thumbnail(
     brought to white; reduced in linear light. is_clean: whether it is denoised then.
     """
     height, width = image.shape[:2]
-    bright = image.max(axis=-1)
-    lit = bright[(bright > 0) & ~emitters_seen]
-    lit = lit if lit.size else bright[bright > 0]
-    stops = float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+    stops = exposure_of(image, emitters_seen)
     if width > THUMBNAIL:
         size = (THUMBNAIL, max(1, round(height * THUMBNAIL / width)))
         box = Image.Resampling.BOX
@@ -101,6 +99,20 @@ def thumbnail(
     if is_clean and width < ENOUGH * THUMBNAIL:
         image = denoised(image)
     return encode_display(image, stops=stops), stops
+
+
+def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
+    """Stops that bring the 98th percentile of what a light lights to white, seen emitters aside."""
+    bright = largest(image)
+    lit = bright[(bright > 0) & ~emitters_seen]
+    lit = lit if lit.size else bright[bright > 0]
+    return float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+
+
+def _raw_uri(look: Picture) -> str:
+    if look.raw is None:
+        return ""
+    return data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)
 
 
 def wipe(looks: list[Picture]) -> str:
@@ -116,16 +128,18 @@ def wipe(looks: list[Picture]) -> str:
             for k, look in enumerate(looks)
         )
 
+    shown = side_by_side(lambda look: data_uri(to_8_bit(look.pixels)), looks)
+    raw = side_by_side(_raw_uri, looks)
     images = "".join(
         f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
         f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
-        f'src="{data_uri(to_8_bit(look.pixels))}">'
+        f'src="{shown[k]}">'
         for k, look in enumerate(looks)
     )
     images += "".join(
         f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
         f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
-        f'src="{data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)}">'
+        f'src="{raw[k]}">'
         for k, look in enumerate(looks)
         if look.raw is not None
     )

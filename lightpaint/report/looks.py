@@ -1,9 +1,10 @@
 """The pictures of a result as people see them: each denoised once, for all places that show it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import DENOISED_KEY, Features, denoised, how_denoised
 
 #: More lights than this have their thumbnails as they are, which hundreds of them need not wait
@@ -12,17 +13,36 @@ MOST_THUMBNAILS = 64
 
 
 @dataclass(frozen=True)
+class Encoder(ViewTransform):
+    """A view transform that encodes each picture once, in however many places it is shown.
+
+    kept: by the identity of a picture, itself and its display values. Pictures must not change.
+    """
+
+    kept: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, compare=False, repr=False)
+
+    def encode(self, image: Floats) -> Floats:
+        """As of `ViewTransform`; not to be written to."""
+        if id(image) not in self.kept:
+            shown = super().encode(image)
+            shown.flags.writeable = False
+            self.kept[id(image)] = image, shown
+        return self.kept[id(image)][1]
+
+
+@dataclass(frozen=True)
 class Looks:
     """Current look, prediction and verification, (h, w, 3) linear.
 
     verified: None where there is none. texts: what a PNG of them says of itself; none where they
-    are as they were rendered.
+    are as they were rendered. encoders: what has encoded them.
     """
 
     current: Floats
     predicted: Floats
     verified: Floats | None
     texts: dict[str, str]
+    encoders: dict[ViewTransform, Encoder] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def clean(
@@ -47,6 +67,10 @@ class Looks:
         """As they were rendered."""
         present = basis.present_look
         return cls(present, predicted, verified, {})
+
+    def through(self, transform: ViewTransform) -> Encoder:
+        """That view, which encodes what all these places show once."""
+        return self.encoders.setdefault(transform, Encoder(transform.name, transform.stops))
 
     @property
     def is_clean(self) -> bool:

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
+from lightpaint.report.html import SHOWN, SPARE
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
@@ -20,6 +21,21 @@ def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
     energy = (basis.totals * lighting.weights_for(basis)) @ LUMINANCE
     total = energy.sum()
     return np.asarray(energy / total if total > 0 else np.zeros_like(energy))
+
+
+def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
+    """The same, (n,), now or as solved, whichever is more."""
+    present = energy_shares(basis, Lighting.present(basis))
+    return np.maximum(energy_shares(basis, lighting), present)
+
+
+def that_do_most(basis: Basis, lighting: Lighting) -> Indices:
+    """The lights that are shown of many, by their place in the basis; of few all of them."""
+    count = len(basis.lights)
+    if count <= SHOWN + SPARE:
+        return np.arange(count)
+    shares = largest_shares(basis, lighting)
+    return np.sort(np.argsort(-shares, kind="stable")[:SHOWN])
 
 
 def relative_residual(solution: Solution) -> float:

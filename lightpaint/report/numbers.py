@@ -14,6 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -22,6 +23,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.diagnosis import maps_limit
+from lightpaint.report.meant import meaning_of
 from lightpaint.report.measures import (
     brighter_as_allowed,
     codes_missed,
@@ -51,6 +53,7 @@ def report_numbers(
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
+    color_choices: Choices = (),
 ) -> str:
     """JSON of the numbers of `report_page`, whose arguments these are."""
     verified = None if verification is None else verification.verified.image
@@ -71,14 +74,16 @@ def report_numbers(
             "residual_pixels": 2 * residual.radius + 1,
         },
         "seen": _seen(seen or what_is_seen(solution, predicted)),
+        "meant": meaning_of(solution),
+        "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
         "fit": _fit(solution, predicted, unconstrained),
         "lights": _lights(basis, solution, uncertainty),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
         "uncertainty": None if uncertainty is None else _sure(basis, solution, uncertainty),
-        "verification": None if verification is None else _verification(verification),
+        "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggested(suggestions, solution.lighting.cd_per_unit),
     }
-    return json.dumps(_finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _basis(basis: Basis) -> dict[str, Any]:
@@ -106,8 +111,26 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
 
 
 def _seen(seen: Seen) -> dict[str, Any]:
-    """Mean CIEDE2000 over what was painted."""
-    return {"delta_e": seen.delta_e, "noise": seen.noise, "asked": seen.asked}
+    """Mean CIEDE2000 over what was painted, and what of that has come about."""
+    place = seen.place
+    return {
+        "delta_e": seen.delta_e,
+        "noise": seen.noise,
+        "asked": seen.asked,
+        "share_met": seen.share_met,
+        "region": None if place is None else place.region,
+        "object": place.object or None if place else None,
+        "held": seen.held or None,
+        "held_by_views": seen.held_by_views or None,
+    }
+
+
+def _choice(choice: ColorChoice) -> dict[str, Any]:
+    """What a choice of colours comes to, and the light that it would change most."""
+    told: dict[str, Any] = {"delta_e": choice.delta_e}
+    if choice.light:
+        told |= {"light": choice.light, "before": choice.before, "color": choice.color}
+    return told
 
 
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
@@ -190,7 +213,8 @@ def _sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[st
     }
 
 
-def _verification(v: Verification) -> dict[str, Any]:
+def verification_numbers(v: Verification) -> dict[str, Any]:
+    """Whether render and prediction agree, and how far they are apart."""
     height, width = v.verified.size
     return {
         "agrees": v.agrees,
@@ -220,13 +244,13 @@ def _suggested(
     ]
 
 
-def _finite(told: Any) -> Any:
+def finite(told: Any) -> Any:
     """The same without what there is none of, and without NumPy's numbers."""
     if isinstance(told, Mapping):
-        held = {key: _finite(value) for key, value in told.items()}
+        held = {key: finite(value) for key, value in told.items()}
         return {key: value for key, value in held.items() if value is not None}
     if isinstance(told, list | tuple):
-        return [_finite(value) for value in told]
+        return [finite(value) for value in told]
     if isinstance(told, np.generic):
         told = told.item()
     return None if isinstance(told, float) and not math.isfinite(told) else told

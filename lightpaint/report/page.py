@@ -4,6 +4,7 @@ The page's frame is page.html.in; what is filled in comes from the other modules
 are data: URIs; nothing is loaded from anywhere, and the page's own content policy forbids it.
 """
 
+import shlex
 from collections.abc import Sequence
 from html import escape
 from importlib import resources
@@ -14,18 +15,22 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import covered
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
+from lightpaint.report.colors import colors_section
 from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.figures import Picture, maps, wipe
 from lightpaint.report.lights_table import lights_table
 from lightpaint.report.looks import Looks
+from lightpaint.report.meant import spoken_meaning
+from lightpaint.report.mixer import mixer_assets, mixer_html
 from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
@@ -47,6 +52,7 @@ def report_page(
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
     looks: Looks | None = None,
+    color_choices: Choices = (),
 ) -> str:
     """The page as HTML text.
 
@@ -54,15 +60,16 @@ def report_page(
     command: the shell command that made the result.
     uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
     what they tell. seen: what `what_is_seen` says, where somebody has looked.
-    looks: the pictures without their grain, which then have it on a switch.
+    looks: the pictures without their grain, which then have it on a switch. color_choices: what
+    other colours would come to, if that is known.
 
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
     verified = None if verification is None else verification.verified.image
-    transform = transform_of(target, predicted.image, verified)
     raw = Looks.raw(basis, predicted.image, verified)
     looks = looks or raw
+    transform = looks.through(transform_of(target, predicted.image, verified))
     current = looks.current
     template = resources.files("lightpaint.report").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
@@ -70,6 +77,7 @@ def report_page(
         target=escape(target.name),
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
         verdict=escape(verdict(solution, predicted, verification, seen=seen)),
+        meant=escape(spoken_meaning(solution)),
         banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
         wipe=wipe(_pictures(target, solution, looks, raw, transform=transform)),
         exposure=_exposure(transform, predicted.image, looks.how),
@@ -77,7 +85,8 @@ def report_page(
             solution, predicted.image, current, verification=verification, transform=transform
         ),
         missed=missed_section(solution, diagnosis, current, transform=transform)
-        + constraints_section(basis, solution, unconstrained, transform=transform, looks=looks),
+        + constraints_section(basis, solution, unconstrained, transform=transform, looks=looks)
+        + colors_section(color_choices),
         suggestions=suggestion_section(
             suggestions,
             transform=transform,
@@ -89,6 +98,7 @@ def report_page(
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, predicted, verification),
+        mixer=_mixer(basis, target, solution, looks, transform=transform) + mixer_assets(),
         command=escape(command or "(made from Python, without a command line)"),
         again=_paint_again(basis, target, verification),
         versions=escape(versions(basis)),
@@ -101,7 +111,8 @@ def _pictures(
     """What can be put side by side under the wipe, in the order of its lists."""
 
     def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> Picture:
-        both = transform.encode(clean), transform.encode(noisy)
+        size = looks.predicted.shape[:2]
+        both = [covered(transform.encode(x), size) for x in (clean, noisy)]
         return Picture(name, alt, both[0], both[1] if looks.is_clean else None)
 
     pictures = [
@@ -119,10 +130,24 @@ def _pictures(
         ),
     ]
     if looks.verified is not None and raw.verified is not None:
-        about, size = "An independent render of the relit scene.", looks.predicted.shape[:2]
-        clean, grainy = (covered(x, size) for x in (looks.verified, raw.verified))
-        pictures.append(picture("verified", about, clean, grainy))
+        about = "An independent render of the relit scene."
+        pictures.append(picture("verified", about, looks.verified, raw.verified))
     return pictures
+
+
+def _mixer(
+    basis: Basis, target: Target, solution: Solution, looks: Looks, *, transform: ViewTransform
+) -> str:
+    """The lights by hand."""
+    scene = basis.origin.scene
+    return mixer_html(
+        basis,
+        solution.lighting,
+        target_picture(target, solution, looks.current, transform=transform),
+        transform=transform,
+        is_clean=looks.is_clean,
+        scene=shlex.quote(scene) if scene.endswith(".xml") else None,
+    )
 
 
 def _banner(verification: Verification | None) -> str:

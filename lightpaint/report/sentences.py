@@ -15,7 +15,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.measures import energy_shares
-from lightpaint.screen import some_of
+from lightpaint.screen import some_names, some_of
 
 CHANNELS = ("red", "green", "blue")
 
@@ -234,6 +234,13 @@ def spoken_region(place: Place) -> str:
     if row == "middle":
         return f"on the {column}"
     return f"at the {row}" if column == "middle" else f"at the {row} {column}"
+
+
+def spoken_where(place: Place) -> str:
+    """`on the statue`, or where in the picture."""
+    if not place.object:
+        return spoken_region(place)
+    return f"on the {some_names([place.object.replace('_', ' ').strip()])}"
 
 
 def spoken_place(place: Place) -> str:

@@ -8,7 +8,7 @@ from lightpaint.lighting.analysis.held_back import Held
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
-from lightpaint.report.sentences import spoken_difference, spoken_region
+from lightpaint.report.sentences import spoken_difference, spoken_where
 from lightpaint.screen import some_names
 
 #: What is asked beside the painting, as what holds the lights back.
@@ -58,7 +58,7 @@ def headline(seen: Seen) -> str:
         return "Close: it looks as painted."
     if seen.place is None:
         return f"{_manner(seen)}: too much of what was painted is out of reach."
-    where = spoken_region(seen.place)
+    where = spoken_where(seen.place)
     change = spoken_difference(seen.place.painted, seen.place.reached)
     if seen.is_far:
         return f"{_manner(seen)}: {where} it is painted {change} than they make it; {_why(seen)}."
@@ -84,7 +84,8 @@ def _why(seen: Seen) -> str:
     """What keeps the lights from the place where most is missed."""
     assert seen.place is not None
     if seen.held:
-        return " and ".join(HOLDING[one] for one in seen.held)
+        said = HOLDING | {"views": _spoken_views(seen.held_by_views)}
+        return " and ".join(said[one] for one in seen.held)
     if not seen.there:
         return "no light gets there"
     some, is_one = some_names(seen.there[:2], joint=" and "), len(seen.there) == 1
@@ -93,6 +94,15 @@ def _why(seen: Seen) -> str:
     if not seen.does_much:
         return f"{some} {'does' if is_one else 'do'} little there"
     return f"{some} would light too much else"
+
+
+def _spoken_views(names: tuple[str, ...]) -> str:
+    its = some_names(names, joint=" and ")
+    return (
+        f"view {its} asks for other light"
+        if len(names) == 1
+        else f"views {its} ask for other light"
+    )
 
 
 def _is_darker(seen: Seen) -> bool:

@@ -4,10 +4,12 @@ Everything is in document order; what is not adjusted comes last, as one light t
 """
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from lightpaint.errors import SceneError
+from lightpaint.scene.alike import alike_groups, without
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import Light, check_adjustable, keep, tie
 from lightpaint.screen import some_names
@@ -22,17 +24,26 @@ def choose_lights(
     scene: str,
     lights: Iterable[str] | None = None,
     groups: Mapping[str, Iterable[str]] | None = None,
+    group_alike: bool = True,
+    named: Iterable[str] = (),
 ) -> tuple[Light, ...]:
     """The lights of a scene: its emitters, tied by `groups`, of which `lights` are adjusted.
 
     lights: names or patterns (`window_*`) of lights and groups; None for all.
     groups: name → names or patterns of its emitters. scene: what errors call the scene.
+    group_alike: whether many that are alike and without names are one light (`alike_groups`), but
+    those that `lights` or `named`, names or patterns too, mean one by one.
 
     What is not chosen, and what cannot be scaled, is kept together in one fixed light.
     Raises SceneError for names that are not there, that clash or that are taken twice, and
     if nothing is left to adjust.
     """
     group_of = _members_of_groups(emitters, groups or {}, scene)
+    found: dict[str, tuple[Emitter, ...]] = {}
+    if group_alike:
+        asked = [*([] if lights is None else _listed(lights, "lights")), *named]
+        found = _found_alike(emitters, group_of, {*(groups or {})}, asked)
+        group_of |= {member.name: name for name, its in found.items() for member in its}
     by_light: dict[str, list[Emitter]] = {}
     for emitter in emitters:
         if not emitter.obstacle:
@@ -43,7 +54,30 @@ def choose_lights(
     if not by_light:
         listed = some_names((f"{e.name!r} {e.obstacle}" for e in emitters), "; ")
         raise SceneError(f"{scene} has no light that can be solved for: {listed}")
-    return _with_rest([tie(name, members) for name, members in by_light.items()], emitters)
+    tied = [
+        replace(tie(name, members), is_found=name in found) for name, members in by_light.items()
+    ]
+    return _with_rest(tied, emitters)
+
+
+def _found_alike(
+    emitters: Sequence[Emitter],
+    group_of: Mapping[str, str],
+    groups: Collection[str],
+    asked: Iterable[str],
+) -> dict[str, tuple[Emitter, ...]]:
+    """Lights of many emitters that are alike, without those in groups and those asked for alone."""
+    free = [emitter for emitter in emitters if emitter.name not in group_of]
+    found = alike_groups(free, {*groups, *(emitter.name for emitter in emitters)})
+    inside = {member.name for its in found.values() for member in its}
+    lights = {*groups, *found, *(emitter.name for emitter in free)} - inside
+    parted: set[str] = set()
+    for pattern in asked:
+        if pattern in inside:
+            parted.add(pattern)
+        elif not any(fnmatchcase(name, pattern) for name in lights):
+            parted |= {name for name in inside if fnmatchcase(name, pattern)}
+    return without(found, parted)
 
 
 def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:

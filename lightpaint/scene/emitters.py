@@ -21,6 +21,7 @@ from lightpaint.scene.emission import (
     read_emission,
     why_not_adjusted,
 )
+from lightpaint.scene.hanging import hangs_on, has_name
 from lightpaint.scene.parsed import ParsedScene
 
 #: Characters of a name beyond which it is a mistake.
@@ -39,6 +40,8 @@ class Emitter:
     file, offset: where its element's `<` stands: index into Scene.files, byte offset.
     obstacle: why it cannot be solved for, in words behind its name; "" if it can.
     unit_flux: watts per channel at an emission of 1; None where there is no such number.
+    has_name: whether somebody chose its name, and it is not made up here.
+    hangs_on: of one that has none, the name of its material, file or parent; "" if there is none.
     """
 
     name: str
@@ -52,6 +55,8 @@ class Emitter:
     offset: int
     obstacle: str = ""
     unit_flux: float | None = None
+    has_name: bool = True
+    hangs_on: str = ""
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"
@@ -112,6 +117,8 @@ def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
                 offset=node.offset - 1,
                 obstacle=why_not_adjusted(plugin, kind, emission),
                 unit_flux=flux_of_unit(emitter, plugin, kind),
+                has_name=has_name(parsed, node_of[name]),
+                hangs_on=hangs_on(parsed, node_of[name]),
             )
         )
     return tuple(sorted(found, key=lambda emitter: emitter.node))

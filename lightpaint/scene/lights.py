@@ -29,6 +29,7 @@ class Light:
     emission: present RGB emission in `unit`.
     is_scalar: whether it has one weight for all channels instead of three.
     is_fixed: whether it is all that stays as it is, with weight 1.
+    is_found: whether nobody tied its members, but that they are many, alike and without names.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Light:
     emission: RGB
     is_scalar: bool = False
     is_fixed: bool = False
+    is_found: bool = False
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)

@@ -6,7 +6,7 @@ lights in the solve is kept as it stands (lighting/constraints/file.py makes som
 
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ SUFFIX = ".lights.toml"
 CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
 #: What files called `prefer_current` before, as `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
-KNOWN = ("lights", "groups", *CONSTRAINTS)
+KNOWN = ("lights", "groups", "group_alike", *CONSTRAINTS)
 
 #: Longest lights file that is read, in bytes.
 MAX_BYTES = 2**20
@@ -42,18 +42,25 @@ class Asked:
         """Of all keys of the lights file at `path`."""
         return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names and patterns of lights, of which something is asked."""
+        lights, ties = self.keys.get("light"), self.keys.get("tie")
+        return (*(lights if isinstance(lights, dict) else ()), *_texts(ties))
+
 
 @dataclass(frozen=True)
 class LightsFile:
     """What a lights file says. path: None if there is none.
 
-    lights, groups: as `choose_lights` takes them. asked: what is for the solve.
+    lights, groups, group_alike: as `choose_lights` takes them. asked: what is for the solve.
     """
 
     path: Path | None = None
     lights: Iterable[str] | None = None
     groups: Mapping[str, Iterable[str]] = field(default_factory=dict)
     asked: Asked = field(default_factory=Asked)
+    group_alike: bool = True
 
     def with_more(
         self, lights: Iterable[str] | None, groups: Mapping[str, Iterable[str]] | None
@@ -63,7 +70,7 @@ class LightsFile:
         if lights is None and self.lights is not None:
             # Who makes a group here and now means to adjust it.
             lights = (*self.lights, *groups)
-        return LightsFile(self.path, lights, {**self.groups, **groups}, self.asked)
+        return replace(self, lights=lights, groups={**self.groups, **groups})
 
 
 def lights_file_beside(scene: Path) -> Path:
@@ -85,7 +92,10 @@ def read_lights_file(path: Path) -> LightsFile:
     Raises SceneError, with the line where the TOML is wrong, or with the key that is.
     """
     data = read_keys(path)
-    groups = data.get("groups", {})
+    groups, group_alike = data.get("groups", {}), data.get("group_alike", True)
+    if not isinstance(group_alike, bool):
+        said = one_line(repr(group_alike))
+        raise SceneError(f"{path}: group_alike is true or false, not {said}")
     if not isinstance(groups, dict):
         raise SceneError(f'{path}: groups is a table, [groups], with lines like a = ["b", "c"]')
     return LightsFile(
@@ -93,6 +103,7 @@ def read_lights_file(path: Path) -> LightsFile:
         _names(path, "lights", data["lights"]) if "lights" in data else None,
         {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
         Asked.of(path, data),
+        group_alike,
     )
 
 
@@ -116,6 +127,17 @@ def read_keys(path: Path) -> dict[str, Any]:
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
     return data
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts in lists, and in the `lights` of tables."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from _texts(value.get("lights"))
+    elif isinstance(value, list):
+        for one in value:
+            yield from _texts(one)
 
 
 def _integers(value: Any) -> Iterator[int]:

@@ -68,14 +68,19 @@ class ParsedScene:
         self.instead, self.replaced = self._replace_integrator(instead)
         kinds = mi.ObjectType
         self.emitter_nodes = self._nodes_of(kinds.Emitter)
-        self.sensor_nodes = self._children_of(0, kinds.Sensor)
+        self.sensor_nodes = self.children_of(0, kinds.Sensor)
         self.sensor_names = tuple(
             self.state.nodes[k].props.id() or f"sensor_{i}" for i, k in enumerate(self.sensor_nodes)
         )
         self.shape_of = {
             child: shape
             for shape in self._nodes_of(kinds.Shape)
-            for child in self._children_of(shape, kinds.Emitter)
+            for child in self.children_of(shape, kinds.Emitter)
+        }
+        self.parent_of = {
+            child: shape
+            for shape in self._nodes_of(kinds.Shape)
+            for child in self.children_of(shape, kinds.Shape)
         }
         self.names = self._name_lights()
 
@@ -93,7 +98,8 @@ class ParsedScene:
     def _nodes_of(self, kind: Any) -> list[int]:
         return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
 
-    def _children_of(self, parent: int, kind: Any = None) -> list[int]:
+    def children_of(self, parent: int, kind: Any = None) -> list[int]:
+        """Nodes that stand in that one, or are referred to by it; kind: only those of it."""
         import mitsuba as mi
 
         props = self.state.nodes[parent].props

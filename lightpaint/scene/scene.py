@@ -8,6 +8,7 @@ import gc
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +27,7 @@ from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights_file import Asked, lights_file_for
 from lightpaint.scene.parsed import ParsedScene, mitsuba_errors
+from lightpaint.scene.shapes import shape_names
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import Listed, Shown, some_names, some_of
 
@@ -220,6 +222,11 @@ class Scene(Shown):
             del loaded
             gc.collect()
 
+    @cached_property
+    def shape_names(self) -> tuple[str, ...]:
+        """What the shapes are called, in the order of a loaded scene's."""
+        return shape_names(self._parsed)
+
     @property
     def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
         """Where those stand that `instead` replaces: file, and byte offset of the element."""
@@ -248,6 +255,7 @@ def load_scene(
     groups: Mapping[str, Iterable[str]] | None = None,
     lights_file: str | Path | None = None,
     use_lights_file: bool = True,
+    group_alike: bool = True,
     integrator: str | None = None,
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
@@ -263,6 +271,8 @@ def load_scene(
             replaces what it lists, `groups` are added to its own or replace namesakes; without
             `lights` they are adjusted beside what it lists.
         use_lights_file: False leaves the one beside the scene alone.
+        group_alike: Whether more than 24 emitters that are alike and have no names are one light,
+            unless they are asked for by the names that they get here. The lights file may say no.
         integrator: To render with instead of the scene's own, like `path`, `direct` or
             `path:max_depth=8`. What its own says of max_depth, rr_depth and hide_emitters stays.
 
@@ -296,7 +306,14 @@ def load_scene(
     return Scene(
         path=path,
         parameters=values,
-        lights=choose_lights(emitters, scene=str(path), lights=said.lights, groups=said.groups),
+        lights=choose_lights(
+            emitters,
+            scene=str(path),
+            lights=said.lights,
+            groups=said.groups,
+            group_alike=group_alike and said.group_alike,
+            named=said.asked.names,
+        ),
         lights_file=said.path,
         asked=said.asked,
         _parsed=parsed,

@@ -1,6 +1,6 @@
 """What the camera sees first: colour, direction and distance of surfaces, and whose they are."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.images.blocks import block_mean, block_pixels
 from lightpaint.images.denoise import Features
+from lightpaint.images.objects import NOTHING as NOTHING_SEEN
+from lightpaint.images.objects import Objects
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, largest_pass, pass_seed
 from lightpaint.scene.scene import Scene
@@ -17,6 +19,9 @@ from lightpaint.signals import interruptible_between_pieces
 
 #: Samples of a pixel, each by itself: an index of a shape must not be averaged.
 SAMPLES = 16
+
+#: Samples that decide whose a pixel is.
+VOTES = 4
 
 #: Depth where there is nothing, as compositing programs have it.
 NOTHING = 1e10
@@ -49,6 +54,15 @@ def render_features(scene: Scene, *, seed: int = 0) -> Features:
     return scene.while_loaded(lambda loaded: _features(scene, loaded, seed))
 
 
+def render_first_hits(scene: Scene, *, seed: int = 0) -> tuple[Features, Objects]:
+    """The same, and whose surfaces these are."""
+
+    def both(loaded: Any) -> tuple[Features, Objects]:
+        return _features(scene, loaded, seed), _objects(scene, loaded, seed)
+
+    return scene.while_loaded(both)
+
+
 def _features(scene: Scene, loaded: Any, seed: int) -> Features:
     import mitsuba as mi
 
@@ -65,6 +79,33 @@ def _features(scene: Scene, loaded: Any, seed: int) -> Features:
     length = np.linalg.norm(seen[..., 3:], axis=-1, keepdims=True)
     normal = seen[..., 3:] / np.where(length > 0, length, 1)
     return Features(*(_in_half(x) for x in (np.clip(seen[..., :3], 0, 1), normal)))
+
+
+def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
+    """What most samples of a pixel see, of few."""
+    import mitsuba as mi
+
+    integrator = mi.load_dict({"type": "aov", "aovs": "i:shape_index"})
+    camera, block, samples = scene.camera(loaded), scene.film.block, []
+    with interruptible_between_pieces() as let_interrupts_through:
+        for k in range(-(-VOTES // scene.film.block_pixels)):
+            seed_k = pass_seed(seed, Stream.SURFACES, SAMPLES + 1 + k)
+            image = mi.render(loaded, sensor=camera, integrator=integrator, spp=1, seed=seed_k)
+            samples.append(block_pixels(np.array(image)[..., -1], block))
+            let_interrupts_through()
+    indices = _most_frequent(np.concatenate(samples).astype(np.int32))
+    names = _names_by_index(loaded, scene.shape_names)
+    seen = sorted(set(np.unique(indices).tolist()) - {0})
+    place = np.full(int(indices.max(initial=0)) + 1, NOTHING_SEEN, np.int32)
+    place[seen] = np.arange(len(seen))
+    return Objects(place[indices], tuple(names.get(k, "") for k in seen))
+
+
+def _most_frequent(votes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """The value that most of (k, h, w) have, (h, w); of equals the first."""
+    counts = [(votes == vote).sum(axis=0) for vote in votes[:VOTES]]
+    most = np.argmax(counts, axis=0)
+    return np.asarray(np.take_along_axis(votes, most[None], axis=0)[0])
 
 
 def _in_half(image: Floats) -> Floats:
@@ -87,7 +128,9 @@ def _surfaces(scene: Scene, loaded: Any, seed: int, progress: Progress) -> Surfa
             progress("surfaces", k + 1, count)
             let_interrupts_through()
     to_world = np.array(camera.world_transform().matrix).reshape(4, 4)
-    return _averaged(np.concatenate(samples), np.linalg.inv(to_world), _names_by_index(loaded))
+    return _averaged(
+        np.concatenate(samples), np.linalg.inv(to_world), _names_by_index(loaded, scene.shape_names)
+    )
 
 
 def _averaged(
@@ -107,7 +150,7 @@ def _averaged(
     depth = np.where(there, along, NOTHING).min(axis=0)
     coverage: dict[str, Floats] = {}
     for index in np.unique(indices[there]).tolist():
-        name = names.get(index, f"shape {index}")
+        name = names.get(index) or f"shape {index}"
         share = (indices == index).mean(axis=0, dtype=np.float32)
         coverage[name] = coverage.get(name, np.float32(0)) + share
     return Surfaces(
@@ -118,13 +161,20 @@ def _averaged(
     )
 
 
-def _names_by_index(loaded: Any) -> dict[int, str]:
-    """Name of each shape by the index that the integrator writes."""
+def _names_by_index(loaded: Any, named: Sequence[str]) -> dict[int, str]:
+    """Name of each shape by the index that the integrator writes.
+
+    named: of the shapes in their order, also of those whose author gave them none.
+    """
     import drjit as dr
     import mitsuba as mi
 
     shapes = loaded.shapes()
+    ids = [shape.id() for shape in shapes]
+    names = [its or other for its, other in zip(ids, named, strict=False)]
+    if len(named) != len(shapes):
+        names = ids
     if not dr.is_jit_v(mi.Float):
-        return {k + 1: shape.id() for k, shape in enumerate(shapes)}
+        return {k + 1: name for k, name in enumerate(names)}
     indices = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
-    return {index: shape.id() for index, shape in zip(indices, shapes, strict=True)}
+    return dict(zip(indices, names, strict=True))

@@ -6,12 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, largest
 from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.target.own import painted_of
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target
 from lightpaint.target.template import (
@@ -99,7 +100,7 @@ def read_target(
     # Pixels that the file does not store were not painted, whatever a mask says.
     there = picture.finite if picture.stored is None else picture.finite & picture.stored
     counted = np.where(there, 1 if importance is None else importance, 0)
-    image = picture.image
+    image, own = picture.image, painted_of(picture.attributes, reading.path)
     if paint == "light":
         image, counted, note = _lit(reading, counted)
     else:
@@ -115,9 +116,10 @@ def read_target(
         content="" if made is None else made.content,
         sensor="" if made is None else made.sensor,
         transform=reading.transform,
-        through_view=picture.transform is not None,
+        through_view=picture.transform is not None or (own is not None and own.through_view),
         # A layer that was saved alone lay over something; what a mask leaves out does not count.
         over_look=made is not None
+        or (own is not None and own.over_look)
         or (picture.transform is not None and picture.alpha is not None and mask is None),
         files=(
             reading.path,
@@ -158,6 +160,9 @@ def _opened(
         # It was painted on something else, and so was not shown through its transform either.
         made, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=asked)
+    own = painted_of(picture.attributes, path)
+    if own is not None:
+        otherwise = own.transform
     shown = picture.transform or (otherwise if asked.is_open else asked.over(otherwise))
     return _Reading(path, picture, made, folder, shown, notes)
 
@@ -218,7 +223,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
         )
     albedo = reading.template.albedo
     # Metals, glass and what is not there reflect no diffuse light: nothing can be said of it.
-    blind = (albedo.max(axis=-1) <= 0) & (counted > 0)
+    blind = (largest(albedo) <= 0) & (counted > 0)
     seen = np.where(blind, 0, counted)
     if not seen.any():
         raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
@@ -233,12 +238,13 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     if template is None or template.albedo is None:
         return []
     albedo = np.maximum(template.albedo, 1e-3)
-    painted = (counted > 0) & (template.albedo.max(axis=-1) > 0)
+    there_is = largest(template.albedo) > 0
+    painted = (counted > 0) & there_is
     if not painted.any():
         return []
     light = np.maximum(reading.picture.image, 0) / albedo
     there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
-    bright = float(np.percentile(there[template.albedo.max(axis=-1) > 0], 95))
+    bright = float(np.percentile(there[there_is], 95))
     # What is nearly black anyway needs little, however it is divided.
     asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.transform.white)
     share = float((asks.any(axis=-1) & painted).sum() / painted.sum())

@@ -15,15 +15,18 @@ from lightpaint.basis.checksums import CHECKSUMS_KEY
 from lightpaint.basis.file import (
     FORMAT_KEY,
     LIGHT_KEY,
+    NAMES_KEY,
+    OBJECTS_KEY,
     ORIGIN_KEY,
     is_basis_file,
     read_basis,
     read_origin,
     write_basis,
 )
-from lightpaint.errors import BasisError, ImageError
+from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.objects import Objects
 
 SIZE = (6, 5)
 
@@ -64,6 +67,52 @@ def test_there_and_back_is_exact(path: Path, basis: Basis):
     assert back.names == ("key", "Fülllicht 灯 №2", "back/rim.left")
     assert back.size == SIZE
     np.testing.assert_array_equal(back.present_weights, [x.emission for x in basis.lights])
+
+
+def _with_objects(basis: Basis) -> Basis:
+    """More of them than half floats can number, one without a name, many of the same."""
+    index = np.random.default_rng(4).integers(-1, 5000, SIZE, np.int32)
+    names = ("", "Säule <b>\n", *["column"] * 4998)
+    return replace(basis, objects=Objects(index, names))
+
+
+def test_objects_there_and_back(tmp_path: Path, basis: Basis):
+    basis = _with_objects(basis)
+    assert basis.objects is not None
+    write_basis(tmp_path / "a.basis.exr", basis)
+    back = read_basis(tmp_path / "a.basis.exr")
+    _assert_equal(back, basis)
+    assert back.objects is not None
+    assert back.objects.names == basis.objects.names
+    np.testing.assert_array_equal(back.objects.index, basis.objects.index)
+    assert back.objects.index.dtype == np.int32
+    assert back.objects.mask("column").sum() == (basis.objects.index > 1).sum()
+    assert not back.objects.mask("vase").any()
+
+
+@pytest.mark.parametrize("what", ["index", "names"])
+def test_objects_that_are_not_as_they_were_are_left_out(tmp_path: Path, basis: Basis, what: str):
+    path = tmp_path / "a.basis.exr"
+    write_basis(path, _with_objects(basis))
+    parts = read_parts(path)
+    k = next(k for k, part in enumerate(parts) if OBJECTS_KEY in part.attributes)
+    if what == "index":
+        parts[k].channels["index"][0, 0] += 1
+    else:
+        its = {**parts[k].attributes, NAMES_KEY: '["other"]'}
+        parts[k] = replace(parts[k], attributes=its)
+    write_parts(path, parts)
+    back = read_basis(path)
+    _assert_equal(back, basis)
+    assert back.objects is None
+
+
+@pytest.mark.parametrize(
+    "index", [np.zeros((2, 3)), np.full((2, 3), 2), np.full((2, 3), -2), np.zeros((2, 3, 1), int)]
+)
+def test_what_is_no_picture_of_objects(index: Any):
+    with pytest.raises(SizeError, match="objects"):
+        Objects(index, ("a", "b"))
 
 
 @pytest.mark.parametrize(

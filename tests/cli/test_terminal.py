@@ -64,7 +64,7 @@ def test_lists_are_cut_with_a_count() -> None:
 
 def test_lights_and_errors(tmp_path: Path) -> None:
     room = room_with(tmp_path, BAD.replace("\0", ""))
-    output = succeed(tmp_path, "lights", room)
+    output = succeed(tmp_path, "lights", room, "--no-sheet")
     assert SHOWN in output
     assert not STEERS.search(output)
     assert len(output.splitlines()) == 6

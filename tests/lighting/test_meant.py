@@ -12,7 +12,8 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import HOLD, Fit, meant_by
 from lightpaint.lighting.painting import weight_of_rest
-from lightpaint.lighting.problem import GENTLE, Problem
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.pull import GENTLE
 from lightpaint.lighting.solve import solution_of
 
 SRGB = lp.ViewTransform()
@@ -164,7 +165,7 @@ def test_strokes_change_what_the_rest_weighs(make_basis: Any):
         )
     np.testing.assert_allclose(solution_of(after).weights, solution_of(anew).weights, rtol=1e-9)
     # Problems that were not painted on keep theirs.
-    assert problem.color_strength != after.color_strength
+    assert problem.painted_share != after.painted_share
 
 
 def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):

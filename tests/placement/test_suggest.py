@@ -219,6 +219,7 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
         half_differences=basis.half_differences[:, :7],
         emitters_seen=basis.emitters_seen[:7],
         features=None,
+        objects=None,
     )
     with pytest.raises(SceneError, match="no blocks of those of the film"):
         suggest_lights(scene, other, solution, count=1)

@@ -181,3 +181,22 @@ def test_writing_neither_solves_nor_sums_anew(
     assert calls.count("mix") == 1 + others
     assert calls.count("func") == 1
     assert set(calls) == {"mix", "func"}
+
+
+def test_no_picture_is_encoded_twice(
+    make_basis: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The current look lies behind half of the pictures."""
+    look = _look(make_basis)
+    plain, encoded = ViewTransform.encode, []
+
+    def counted(self: ViewTransform, image: Any) -> Any:
+        encoded.append(np.asarray(image).tobytes())
+        return plain(self, image)
+
+    monkeypatch.setattr(ViewTransform, "encode", counted)
+    write_report(tmp_path, look, command="")
+    # Two suggestions have the same pictures here.
+    whole = [its for its in encoded if len(its) == look.predicted.image.nbytes]
+    assert len(whole) > 5
+    assert len(set(whole)) == len(whole)

@@ -113,15 +113,15 @@ def test_nothing_is_loaded_from_anywhere(make_basis: Any):
     text = report_page(**_result(make_basis))
     page = Page(text)
     plain = re.sub(r"base64,[A-Za-z0-9+/=]+", "base64,", text)
-    assert len(plain) < 30_000
+    assert len(plain) < 60_000
     assert not re.search(r"https?:|//\w|@import|url\(|srcset|\bfetch\b", plain, re.IGNORECASE)
     for _, attributes in page.elements:
         for key in ("src", "href", "action", "data", "poster"):
             assert (attributes.get(key) or "data:").startswith("data:")
     [policy] = [m["content"] for m in page.all("meta") if "http-equiv" in m]
     assert policy.startswith("default-src 'none'; img-src data:;")
-    # Every placeholder of the template is filled.
-    assert "$" not in plain
+    # Every placeholder of the template is filled; the mixer's script has some of its own.
+    assert "$" not in re.sub(r'<script type="module">.*?</script>', "", plain, flags=re.DOTALL)
 
 
 def test_pictures_are_the_display_encoded_images(make_basis: Any):
@@ -165,7 +165,8 @@ def test_names_are_text_whatever_they_are(make_basis: Any):
     result = _result(make_basis, names=evil, target="</title><b>'dusk'</b>")
     result["command"] = "lightpaint solve '<b>.xml' && echo $HOME ${title} \"&amp;\""
     page = Page(report_page(**result))
-    assert len(page.all("script")) == 1
+    # The wipe's, and the mixer's with its data.
+    assert [x.get("type") for x in page.all("script")] == ["application/json", "module", None]
     assert not page.all("b")
     assert len(page.all("img")) == 10
     for name in evil:
@@ -271,7 +272,7 @@ def test_a_page_of_usual_size_can_be_mailed(make_basis: Any):
         command="",
     )
     # Independent noise in every pixel is the worst there is to compress.
-    assert len(page) < 4_000_000
+    assert len(page) < 7_000_000
     assert _looks(Page(page))["verified"].shape == (360, 640, 3)
 
 

@@ -27,7 +27,7 @@ DARK, LIT = (0.1, 0.1, 0.1), (0.4, 0.4, 0.4)
 
 def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
     region, painted, reached = about.pop("at", ((1, 1), LIT, DARK))
-    place = Place(region, 0.9, (0, 0, 8, 8), painted, reached)
+    place = Place(region, 0.9, (0, 0, 8, 8), painted, reached, about.pop("on", ""))
     return replace(Seen(missed, 0.0, asked, place), **about)
 
 
@@ -68,6 +68,26 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
             _seen(5.0, held=("colors", "constraints")),
             "Part of the way, but the brighter light in the middle is out of reach: lamps are held "
             "to their colours and limits and locks hold the lights.",
+        ),
+        (
+            _seen(5.0, on="figure_hollow"),
+            "Part of the way, but the brighter light on the figure hollow is out of reach: no "
+            "light gets there.",
+        ),
+        (
+            _seen(14.0, on="<b>\x1b[1m", there=("lamp",)),
+            "These lights cannot make this: on the <b>\\x1b[1m it is painted brighter than they "
+            "make it; lamp would light too much else.",
+        ),
+        (
+            _seen(5.0, held=("views",), held_by_views=("balcony",)),
+            "Part of the way, but the brighter light in the middle is out of reach: view balcony "
+            "asks for other light.",
+        ),
+        (
+            _seen(5.0, held=("colors", "views"), held_by_views=("a", "b")),
+            "Part of the way, but the brighter light in the middle is out of reach: lamps are held "
+            "to their colours and views a and b ask for other light.",
         ),
         (
             Seen(14.0, 0.0, 20.0),

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
+from lightpaint.basis.render.render import render_basis
 from lightpaint.scene.scene import load_scene
-from lightpaint.scene.surfaces import NOTHING, Surfaces, render_surfaces
+from lightpaint.scene.surfaces import NOTHING, Surfaces, render_first_hits, render_surfaces
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,8 @@ def test_one_picture_in_every_variant(seen: Surfaces, tmp_path: Path) -> None:
     code = f"""
 import numpy as np
 from lightpaint.scene.scene import load_scene
-from lightpaint.scene.surfaces import render_surfaces
+from lightpaint.basis.render.render import render_basis
+from lightpaint.scene.surfaces import NOTHING, Surfaces, render_first_hits, render_surfaces
 seen = render_surfaces(load_scene({str(room)!r}, variant="scalar_rgb"))
 np.savez({str(tmp_path / "seen.npz")!r}, **seen.coverage)
 """
@@ -71,3 +73,41 @@ np.savez({str(tmp_path / "seen.npz")!r}, **seen.coverage)
             # Sixteen samples of an edge: a standard error of an eighth.
             assert np.abs(other[name] - seen.coverage[name]).max() < 0.75
             assert other[name].mean() == pytest.approx(seen.coverage[name].mean(), abs=0.01)
+
+
+NAMELESS = """
+    <bsdf type="diffuse" id="clay"/>
+    <shape type="sphere"><point name="center" x="-0.8" y="0.5" z="0"/>
+        <float name="radius" value="0.3"/><bsdf type="diffuse">
+        <rgb name="reflectance" value="0.1"/></bsdf></shape>
+    <shape type="cube"><transform name="to_world"><scale value="0.2"/>
+        <translate x="0.9" y="0.2" z="0.5"/></transform><ref id="clay"/></shape>
+    <shape type="shapegroup" id="heap"><shape type="sphere"><float name="radius" value="0.1"/>
+        </shape></shape>
+    <shape type="instance"><ref id="heap"/><transform name="to_world">
+        <translate y="1.2"/></transform></shape>
+"""
+
+
+def test_each_pixel_has_an_object_and_each_object_a_name(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + NAMELESS))
+    features, objects = render_first_hits(scene)
+    surfaces = render_surfaces(scene)
+    assert features.size == objects.size == scene.size
+    assert scene.shape_names[:3] == ("floor", "wall", "ball")
+    assert {"sphere", "clay", "heap"} <= set(scene.shape_names)
+    assert {"floor", "wall", "ball", "sphere", "clay"} <= set(objects.names)
+    for name in ("floor", "wall", "ball", "sphere", "clay"):
+        # Where all samples of a pixel see it, any do.
+        whole = surfaces.coverage[name] == 1
+        assert objects.mask(name)[whole].mean() > 0.95
+    nothing = sum(surfaces.coverage.values()) == 0
+    assert (objects.index[nothing] == -1).mean() > 0.95
+
+
+def test_the_basis_has_them(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"]))
+    few = render_basis(scene, spp=2)
+    assert few.objects is not None
+    more = render_basis(scene, spp=4, start=few)
+    assert more.objects is few.objects

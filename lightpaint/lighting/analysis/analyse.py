@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
+from lightpaint.lighting.analysis.color_choices import Choices, color_choices
 from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
@@ -23,6 +24,8 @@ class Analysis:
         ambiguities: Lights that it cannot tell apart, where nothing is asked of them.
         unconstrained: The best without what is asked, None where nothing is, or of one view of
             several.
+        color_choices: What each choice of `colors` comes to; none where no light could have another
+            colour.
 
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target))
@@ -36,6 +39,7 @@ class Analysis:
     seen: Seen
     ambiguities: tuple[Ambiguity, ...]
     unconstrained: Solution | None
+    color_choices: Choices = ()
 
     __repr__ = shortly
 
@@ -54,14 +58,15 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     """
     uncertainty = error_bars(solution)
     solution = with_error_bars(solution, uncertainty)
-    alike = () if solution.problem.constraints else ambiguities(solution)
+    alike = () if solution.problem.asks else ambiguities(solution)
+    looks = [what_is_seen(view) for view in solution.views]
+    choices = color_choices(solution, [seen.delta_e for seen in looks])
     found = []
-    for view in solution.views:
+    for view, seen, its in zip(solution.views, looks, choices, strict=True):
         diagnosis = diagnose(view)
-        seen = what_is_seen(view)
         told = view.told(bounds=diagnosis.bounds, **_numbers(seen))
         free = without_constraints(view)
-        found.append(Analysis(told, uncertainty, diagnosis, seen, alike, free))
+        found.append(Analysis(told, uncertainty, diagnosis, seen, alike, free, its))
     return tuple(found)
 
 

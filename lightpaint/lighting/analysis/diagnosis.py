@@ -41,6 +41,7 @@ class Place:
     region: row and column, 0 to 2, of the ninth of the image with most of it, and share, how
     much of it that is. box: top, left, bottom, right, in pixels, of its worst block.
     painted, reached: mean RGB there, of the painting and of the closest mix of any sign.
+    object: what most of it lies on, wherever; "" for nothing that is known or has a name.
     """
 
     region: tuple[int, int]
@@ -48,6 +49,7 @@ class Place:
     box: tuple[int, int, int, int]
     painted: tuple[float, float, float]
     reached: tuple[float, float, float]
+    object: str = ""
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,7 @@ def diagnose(solution: Solution) -> Diagnosis:
         bounds=bounds,
         bounds_left_out=left_out,
         lighting_total=total if whole is solution else whole.energy,
-        is_constrained=bool(solution.problem.constraints),
+        is_constrained=solution.problem.asks,
         compromise=compromise,
         painting_noise=painting_noise,
         place=_place(solution, unreachable) if lacking > 0 else None,

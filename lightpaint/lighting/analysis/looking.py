@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,11 +33,11 @@ class Looking:
     transform: ViewTransform
 
     @staticmethod
-    def at(problem: Problem) -> "Looking":
-        """At the painting of a problem, of all its views together."""
+    def at(problem: Problem, *, most: int = LOOKED_AT) -> "Looking":
+        """At the painting of a problem, of all its views together. most: pixels, about."""
         views = problem.views
         weight = views.join([target.importance for target in views.targets]).astype(np.float64)
-        step = max(int(np.sqrt((weight > 0).sum() / LOOKED_AT)), 1)
+        step = max(int(np.sqrt((weight > 0).sum() / most)), 1)
         if not weight[::step, ::step].any():
             step = 1
         every = (slice(None, None, step), slice(None, None, step))
@@ -56,6 +57,10 @@ class Looking:
     def of(self, image: Floats) -> Doubles:
         """(p, 3), the painted pixels of a whole picture (H, W, 3)."""
         return image[:: self.step, :: self.step][self.counts].astype(np.float64)
+
+    def rows(self, images: Floats) -> Floats:
+        """(n, p, 3), the painted pixels of whole pictures (n, H, W, 3)."""
+        return images[:, :: self.step, :: self.step][:, self.counts]
 
     def meant(self, pixels: Doubles) -> Doubles:
         """(p, 3), the paint, or light `pixels` (p, 3) where brighter is as good."""
@@ -85,6 +90,12 @@ class Looking:
         sums, total = self._sums(weight * values), self.block_weights
         total = total.reshape(*total.shape, *[1] * (values.ndim - 1))
         return np.asarray(sums / np.where(total > 0, total, 1))
+
+    def of_blocks(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """(p,), what each painted pixel has of its block's values, (rows, columns)."""
+        height, width = self.weight.shape
+        tall = values.repeat(BLOCK, axis=0)[:height]
+        return np.asarray(tall.repeat(BLOCK, axis=1)[:, :width][self.counts])
 
     @cached_property
     def block_weights(self) -> Doubles:

@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import mix
 from lightpaint.lighting.algebra.threads import one_thread
-from lightpaint.lighting.normal_equations import BLOCK, NormalEquations
+from lightpaint.lighting.normal_equations import BLOCK, FEW_LIGHTS, NormalEquations
 from lightpaint.lighting.solution import Solution
 
 #: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
@@ -63,29 +63,31 @@ def noise_sums(solution: Solution) -> Noise:
     pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
     unseen = ~basis.emitters_seen.ravel()
     counted = np.flatnonzero((importance > 0) | (unseen & pulled.any()))
-    for start in range(0, counted.size, BLOCK):
-        its = counted[start : start + BLOCK]
-        # Pixels in one run are looked at where they are; others have to be gathered.
-        in_one_run = its[-1] - its[0] + 1 == its.size
-        pixels = slice(int(its[0]), int(its[-1]) + 1) if in_one_run else its
-        rows = []
-        for c in range(3):
-            D = weight[pixels, c % weight.shape[1]].astype(np.float64)
-            h = halves[:, pixels, c].astype(np.float64)
-            rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
-            if pulled.any():
-                lit = np.where(unseen[pixels], images[:, pixels, c], 0).astype(np.float64)
-                rows[c] += pulled[:, c, None] * lit * h
-            power[c] += (D * h) @ h.T
-            shared = D * share[pixels, c % share.shape[1]]
-            drawn[c] += h @ (shared * present[pixels, c])
-            gradient[c, :, c] += rows[c] @ rows[c].T
-        if is_coupled:
-            # One path carries all three channels, so their noise goes together.
-            for c, d in ((0, 1), (0, 2), (1, 2)):
-                product = rows[c] @ rows[d].T
-                gradient[c, :, d] += product
-                gradient[d, :, c] += product.T
+    # Threads would wait for each other at small blocks, longer than they work.
+    with one_thread() if n <= FEW_LIGHTS else nullcontext():
+        for start in range(0, counted.size, BLOCK):
+            its = counted[start : start + BLOCK]
+            # Pixels in one run are looked at where they are; others have to be gathered.
+            in_one_run = its[-1] - its[0] + 1 == its.size
+            pixels = slice(int(its[0]), int(its[-1]) + 1) if in_one_run else its
+            rows = []
+            for c in range(3):
+                D = weight[pixels, c % weight.shape[1]].astype(np.float64)
+                h = halves[:, pixels, c].astype(np.float64)
+                rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
+                if pulled.any():
+                    lit = np.where(unseen[pixels], images[:, pixels, c], 0).astype(np.float64)
+                    rows[c] += pulled[:, c, None] * lit * h
+                power[c] += (D * h) @ h.T
+                shared = D * share[pixels, c % share.shape[1]]
+                drawn[c] += h @ (shared * present[pixels, c])
+                gradient[c, :, c] += rows[c] @ rows[c].T
+            if is_coupled:
+                # One path carries all three channels, so their noise goes together.
+                for c, d in ((0, 1), (0, 2), (1, 2)):
+                    product = rows[c] @ rows[d].T
+                    gradient[c, :, d] += product
+                    gradient[d, :, c] += product.T
     return Noise(
         power,
         drawn,

@@ -13,9 +13,11 @@ from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.colour.difference import ciede2000
 from lightpaint.images.estimate import Estimate
+from lightpaint.images.objects import Objects
 from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
 from lightpaint.lighting.analysis.held_back import Held, held_back_by
 from lightpaint.lighting.analysis.looking import Looking
+from lightpaint.lighting.analysis.on_object import object_with_most
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
@@ -46,12 +48,14 @@ class Seen:
         delta_e: Of the prediction, with its noise.
         noise: The part of it that noise explains; 0 where nothing is known of noise.
         asked: Of the scene as it is now: how much was asked for.
-        place: Where most of it is missed; None where nothing is, and of several views.
+        place: Where most of it is missed, and on what; None where nothing is, and of several views.
         is_spot: Whether what is missed in that place is seen at a glance.
         there: Lights that get to that place, the one that does most for it first; where there is
             too much light, those that it is from.
         does_much: Whether one of them does much there.
         held: What is asked beside the painting and keeps the lights from it.
+        held_by_views: Which other views do, where these are among that: their sensors, or paintings
+            where they have the same.
 
     Examples:
         >>> seen = lp.what_is_seen(lp.solve(basis, target))
@@ -67,6 +71,7 @@ class Seen:
     there: tuple[str, ...] = ()
     does_much: bool = True
     held: tuple[Held, ...] = ()
+    held_by_views: tuple[str, ...] = ()
 
     __repr__ = shortly
 
@@ -74,6 +79,13 @@ class Seen:
     def missed(self) -> float:
         """What the lighting itself misses, were it rendered without noise."""
         return self.delta_e - self.noise
+
+    @property
+    def share_met(self) -> float:
+        """Share of what was asked that has come about: 1 − `delta_e` / `asked`, at least 0."""
+        if self.asked > 0:
+            return max(1 - self.delta_e / self.asked, 0.0)
+        return float(self.delta_e == 0)
 
     @property
     def is_in_vain(self) -> bool:
@@ -117,8 +129,11 @@ def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     if seen.is_close and not seen.is_spot:
         return seen
     there, does_much = _lights_at(solution, place)
+    if (objects := solution.basis.objects) is not None:
+        seen = replace(seen, place=replace(place, object=_object(look, objects, missed, light)))
     seen = replace(seen, there=there, does_much=does_much)
-    return replace(seen, held=held_back_by(solution))
+    held, views = held_back_by(solution)
+    return replace(seen, held=held, held_by_views=views)
 
 
 def _missed(look: Looking, light: Doubles, grain: Doubles) -> tuple[Doubles, Doubles]:
@@ -163,6 +178,16 @@ def _place(look: Looking, missed: Doubles, light: Doubles) -> tuple[Place, float
         reached=as_rgb(reached),
     )
     return place, float((weights * noticed * inside).sum() / weights.sum())
+
+
+def _object(look: Looking, objects: Objects, missed: Doubles, light: Doubles) -> str:
+    """What most of that lies on which is missed, or seen at a glance; "" for no single thing."""
+    noticed = missed > NOTICED
+    told = look.of_blocks(noticed if noticed.any() else missed > 0)
+    amount = told * look.missed(light) * look.weight[look.counts]
+    return object_with_most(
+        objects, look.of(objects.index.astype(np.float32)).astype(np.intp), amount
+    )
 
 
 def _lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:

@@ -1,7 +1,7 @@
 """Which lights are meant: names and patterns, and what is asked of each by all of them."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -21,15 +21,21 @@ def of_each_light(
     constraints: Constraints, lights: Sequence[BasisLight]
 ) -> list[LightConstraint | None]:
     """All that is asked of each light, patterns below names."""
-    asked: list[Mapping[str, Any]] = [{} for _ in lights]
-    where = ["" for _ in lights]
+    return [
+        LightConstraint.of(asked, where=where) if asked else None
+        for asked, where in asked_of_each(constraints, lights)
+    ]
+
+
+def asked_of_each(
+    constraints: Constraints, lights: Sequence[BasisLight]
+) -> list[tuple[dict[str, Any], str]]:
+    """The same as keys and values, and where the last of them stands."""
+    asked: list[tuple[dict[str, Any], str]] = [({}, "") for _ in lights]
     for name, wish, origin in constraints.lights:
         for k in _found(name, lights, origin, only_keeps=wish == {"lock": True}):
-            asked[k] = overlaid(asked[k], wish)
-            where[k] = origin
-    return [
-        LightConstraint.of(a, where=w) if a else None for a, w in zip(asked, where, strict=True)
-    ]
+            asked[k] = overlaid(asked[k][0], wish), origin
+    return asked
 
 
 def tied_lights(

@@ -56,6 +56,12 @@ class Reduction:
         return tuple(tuple(range(first, last)) for first, last in pairwise(ends))
 
     @cached_property
+    def is_free(self) -> Bools:
+        """(n,), which lights may have any colour, each channel by itself."""
+        free = {light for knob in self.knobs if knob.is_free for light in knob.lights}
+        return np.array([k in free for k in range(len(self.labels))], dtype=bool)
+
+    @cached_property
     def caps(self) -> tuple[Cap, ...]:
         """Limits on sums of x."""
         return tuple(

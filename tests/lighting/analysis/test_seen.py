@@ -8,6 +8,7 @@ import pytest
 
 from lightpaint.colour.difference import delta_e
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.objects import Objects
 from lightpaint.lighting.analysis.seen import CLOSE, Seen, what_is_seen
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import combine
@@ -155,6 +156,83 @@ def test_noise_that_the_painting_does_not_share_is_told_from_a_miss(make_basis: 
     target = _over(look, where, 2.5 * look[where])
     seen = what_is_seen(solve(basis, target, hold=0.0, constraints=_locked()))
     assert seen.noise < 0.1 * seen.delta_e
+
+
+def test_what_is_missed_lies_on_an_object(make_basis: Any):
+    """Painted brighter than anything gets on a statue, and nothing missed beside it."""
+    images = _left_and_right(make_basis).images.copy()
+    statue = (slice(4, 20), slice(14, 34))
+    images[(slice(None), *statue)] = 0.01
+    basis = make_basis(images=images, names=["left", "right"], emission=[[0.4] * 3] * 2)
+    index = np.zeros(SIZE, np.int32)
+    index[statue] = 1
+    index[12:20, 14:34] = 2
+    even = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
+    for names, said in (
+        (("wall", "statue_body", "statue_head"), "statue"),
+        (("wall", "statue", "statue"), "statue"),
+        (("wall", "plinth", "statue"), ""),
+        (("wall", "sphere", "sphere"), ""),
+        (("room", "room", "room"), ""),
+    ):
+        its = replace(basis, objects=Objects(index, names))
+        seen = what_is_seen(solve(its, even))
+        assert seen.place is not None
+        assert seen.place.object == said
+
+
+def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
+    """Half of it on each of two things."""
+    images = _left_and_right(make_basis).images.copy()
+    images[:, 8:16] = 0
+    index = np.zeros(SIZE, np.int32)
+    index[8:16, :24], index[8:16, 24:] = 1, 2
+    basis = make_basis(images=images, names=["left", "right"], emission=[[0.4] * 3] * 2)
+    basis = replace(basis, objects=Objects(index, ("wall", "bench", "vase")))
+    even = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
+    seen = what_is_seen(solve(basis, even))
+    assert seen.place is not None
+    assert seen.place.object == ""
+
+
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_another_view_that_holds_is_named(make_basis: Any, space: Any):
+    """One lamp lights all three views alike, and one is to be dark."""
+    views = [_of_view(make_basis, name) for name in ("stalls", "balcony", "box")]
+    paints = (0.8, 0.05, 0.8)
+    targets = [_even(x) for x in paints]
+    solution = solve(views, targets, space=space)
+    stalls, balcony, _ = (what_is_seen(view) for view in solution.views)
+    assert stalls.held == balcony.held == ("views",)
+    assert stalls.held_by_views == ("balcony",)
+    assert balcony.held_by_views == ("stalls", "box")
+    # Views of one sensor go by their paintings.
+    same = solve([views[0]] * 3, targets, space=space)
+    assert what_is_seen(same.views[0]).held_by_views == ("0.05 painted",)
+
+
+def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
+    """A limit alone keeps both from being bright."""
+    views = [_of_view(make_basis, name) for name in ("stalls", "balcony")]
+    targets = [_even(0.8)] * 2
+    dim = Constraints.of({"lamp": {"limits": {"max": 0.1}}})
+    for view in solve(views, targets, constraints=dim).views:
+        seen = what_is_seen(view)
+        assert seen.held == ("constraints",)
+        assert seen.held_by_views == ()
+    for view in solve(views, targets).views:
+        assert what_is_seen(view).held == ()
+
+
+def _of_view(make_basis: Any, sensor: str) -> Any:
+    basis = make_basis(images=np.ones((1, *SIZE, 3)), names=["lamp"], emission=[[0.3] * 3])
+    return replace(basis, origin=replace(basis.origin, sensor=sensor))
+
+
+def _even(light: float) -> Target:
+    """As a display shows it at its own exposure."""
+    image = np.full((*SIZE, 3), light, np.float32)
+    return replace(Target.of(image, name=f"{light:g} painted"), transform=ViewTransform())
 
 
 def _locked() -> Constraints:

@@ -201,7 +201,7 @@ def test_the_command_says_it_in_one_line(tmp_path: Path, name: str) -> None:
     path = tmp_path / f"{name}.xml"
     path.write_text(_hostile()[name], encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-m", "lightpaint", "lights", str(path)],
+        [sys.executable, "-m", "lightpaint", "lights", "--no-sheet", str(path)],
         capture_output=True,
         text=True,
         timeout=100,

@@ -1,0 +1,96 @@
+"""`lightpaint paint`: opens the painter in a browser, and says where it is."""
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lightpaint.cli import lines, terminal
+from lightpaint.cli.manner import Outcome, manner
+from lightpaint.colour.transform import TransformChoice
+from lightpaint.errors import OutputError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+from lightpaint.settings import Settings
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile
+
+if TYPE_CHECKING:
+    from lightpaint.paint.server import Server
+
+#: Said of a --host.
+OPEN = (
+    "others can reach the painter at {host}: whoever has its address, with the token, can paint "
+    "here and have results written to {folder}; what is sent can be read on the way"
+)
+
+
+def paint(
+    *,
+    source: SceneFile | BasisFile | GroupsFile,
+    folder: Path,
+    settings: Settings,
+    constraints: Constraints,
+    choice: TransformChoice,
+    options: tuple[str, ...],
+    new: bool,
+    host: str | None,
+    port: int | None,
+    with_browser: bool,
+) -> Outcome:
+    """`lightpaint paint SCENE|BASIS|LIGHTS`"""
+    # The server and the session file bring much that no other command needs.
+    from lightpaint.paint.launch import paint_in_browser, subject_of
+    from lightpaint.paint.server import check_installed
+
+    check_installed()
+    how = {"settings": settings, "constraints": constraints, "choice": choice, "options": options}
+    subject = subject_of(source, folder, **how)  # type: ignore[arg-type]
+    if (scene := subject.scene) is not None:
+        remarks = *remarks_of_scene(scene), *remarks_of_film(scene, settings)
+        for remark in (*remarks, *remarks_of_memory(scene)):
+            terminal.say(remark)
+    if subject.groups is not None:
+        for remark in subject.groups.remarks:
+            terminal.say(remark)
+    addresses = []
+
+    def told() -> dict[str, str]:
+        return {"folder": str(folder), "scene": subject.name}
+
+    def opened(server: "Server") -> None:
+        addresses.append(server.url)
+        if host is not None:
+            terminal.complain("paint", OPEN.format(host=host, folder=folder))
+        said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
+        (lines.err if manner().as_json else terminal.write)(said)
+        if with_browser and _has_browser():
+            webbrowser.open(server.url_once())
+
+    try:
+        paint_in_browser(
+            subject, opened, new=new, host=host, port=port, say=lambda text: _say(text)
+        )
+    except KeyboardInterrupt:
+        if not addresses:  # it had not begun
+            raise
+        terminal.say(f"the painter has ended; what was painted is kept in {folder}")
+    except OutputError as error:  # also where an interrupt has ended it
+        terminal.complain("paint", str(error))
+        return Outcome(told, 2)
+    return Outcome(told)
+
+
+def _say(text: str) -> None:
+    """What the server says; a mistake of lightpaint's own has many lines."""
+    for line in text.rstrip().split("\n"):
+        terminal.say(line)
+
+
+def _has_browser() -> bool:
+    """Whether there is one that does not take over the terminal."""
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or os.environ.get("BROWSER")
+    ):
+        return False
+    return True

@@ -1,0 +1,44 @@
+"""On which object a miss lies, where it lies on one."""
+
+import re
+from collections import Counter
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.images.objects import Objects
+
+#: Part of the miss that must lie on an object, and of the picture that it may be, to be named.
+MOST, LARGE = 0.6, 0.5
+
+#: Kinds of shapes, and numbers that programs give: no names that tell a person anything.
+NO_NAME = re.compile(
+    r"(ply|obj|serialized|mesh|shape|object|unnamed|rectangle|cube|sphere|disk|cylinder|instance|"
+    r"merge|sdfgrid|bsplinecurve|linearcurve|ellipsoids(mesh)?|group|default|none)?[\W_\d]*",
+    re.IGNORECASE,
+)
+
+
+def object_with_most(objects: Objects, index: Indices, missed: Doubles) -> str:
+    """The name of what most is missed on, or the first word that names of several share; "".
+
+    index, missed: (p,), the object and what is missed, >= 0, of some of the pixels.
+    """
+    on_each = np.bincount(index + 1, weights=missed, minlength=len(objects.names) + 1)[1:]
+    size = np.bincount(objects.index.ravel() + 1, minlength=len(objects.names) + 1)[1:]
+    total, pixels = float(missed.sum()), objects.index.size
+    for called in (str, _first_word):
+        on: Counter[str] = Counter()
+        of: Counter[str] = Counter()
+        for name, its, large in zip(objects.names, on_each, size, strict=True):
+            on[called(name)] += its
+            of[called(name)] += large
+        name, most = max(on.items(), key=lambda item: item[1], default=("", 0.0))
+        if most >= MOST * total > 0 and of[name] <= LARGE * pixels and not NO_NAME.fullmatch(name):
+            return name
+    return ""
+
+
+def _first_word(name: str) -> str:
+    """`statue` of `statue_head`."""
+    return re.split(r"[_.\-\s]", name, maxsplit=1)[0]

@@ -1,0 +1,258 @@
+"""The answer while the brush moves: what is solved between two frames of a display.
+
+In linear light the equations follow the brush tile by tile (Eq 7-9), and the answer is that of
+`solve` but for the noise correction. What is painted and the rest have sums of their own: a hold
+weighs the rest by how much is painted, so that a stroke changes the weight of every other pixel,
+but no sum of theirs.
+
+In display space every answer changes the weight of every pixel. There the picture is averaged to
+a few thousand pixels, and a round or two from the answer before are enough to follow the brush;
+the answer of all pixels comes when it is lifted.
+"""
+
+from math import ceil
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import block_mean
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.reduced_problem import solve_reduced
+from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.fit import Fit, Space
+from lightpaint.lighting.lit_pixels import LitPixels
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.pixels import STRIP, Pixels
+from lightpaint.lighting.problem import reduced_by
+from lightpaint.lighting.pull import pull_of, to_present
+from lightpaint.lighting.reweighted import Asked, rounds
+from lightpaint.lighting.tiles import TiledEquations
+
+Region = tuple[slice, slice]
+
+#: Pixels that a picture is averaged to in display space, at most: what goes into one strip.
+FILM = STRIP
+
+#: Rounds of reweighting for an answer in display space, at most, and the change of a light that
+#: ends them sooner.
+ROUNDS, ENOUGH = 2, 1e-3
+
+
+class Live:
+    """A painting that changes under a brush, and the lighting for it. Updated in place.
+
+    basis: of one view. image: (h, w, 3) linear; importance: (h, w): the painting, which whoever
+    paints writes to and then says `painted`. fit: with nothing left open, as `meant_by` makes it.
+    constraints: all that is asked of the lights.
+    """
+
+    def __init__(
+        self,
+        basis: Basis,
+        image: Floats,
+        importance: Floats,
+        *,
+        fit: Fit,
+        constraints: Constraints,
+    ) -> None:
+        self._basis, self._image, self._importance = basis, image, importance
+        self._sums = np.zeros((len(importance), 2))
+        self._count_rows(slice(0, len(importance)))
+        self._light: _Tiles | None = None
+        self._display: _Film | None = None
+        self.asks(fit, constraints)
+
+    def asks(self, fit: Fit, constraints: Constraints) -> None:
+        """Go on with these. Raises ConstraintError for what is impossible."""
+        reduction = reduced_by(constraints, self._basis, fit)
+        self._fit, self._constraints, self._reduction = fit, constraints, reduction
+
+    @property
+    def mode(self) -> Space:
+        """In which space answers are found."""
+        return self._fit.space or "linear"
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether anything is."""
+        return bool(self._sums[:, 0].any())
+
+    def painted(self, region: Region) -> None:
+        """A rectangle of the painting is another now."""
+        self._count_rows(region[0])
+        for kind in (self._light, self._display):
+            if kind is not None:
+                kind.painted(region)
+
+    def answer(self, start: Doubles) -> Doubles:
+        """The weights (n, 3) that are best now, from those before.
+
+        Before anything is painted, lights stay as they are but for what is asked of them.
+        """
+        if not self.is_painted:
+            return untouched(self._basis, self._reduction)
+        fit, reduction = self._fit, self._reduction
+        keeps_color = reduction.is_free & self._basis.power.any(axis=1)
+        prefer = self._constraints.prefer_current
+        pull = pull_of(self._basis, fit, prefer, self._painted_share, keeps_color)
+
+        def best(equations: NormalEquations, begin: Doubles) -> Doubles:
+            asked = equations if pull is None else equations + pull
+            return solve_reduced(asked, reduction, begin, method=fit.method).weights
+
+        if self.mode == "linear":
+            return best(self._tiles().equations(self._rest_weight), start)
+        lit = self._film().lit(self._rest_weight, fit.transform)
+        how: dict[str, Any] = {"from_clipping": False, "until": ENOUGH, "at_most": ROUNDS}
+        return rounds(lit, Asked(pull), start, best, **how).weights
+
+    @property
+    def _painted_share(self) -> float:
+        """Importance of all that is painted, beside the number of pixels."""
+        return float(self._sums[:, 0].sum()) / self._importance.size
+
+    @property
+    def _rest_weight(self) -> float:
+        """What a pixel counts that is not painted."""
+        fit = self._fit
+        painted, rest = self._sums.sum(axis=0)
+        if fit.unpainted or not fit.hold:
+            return fit.unpainted
+        return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
+
+    def _count_rows(self, rows: slice) -> None:
+        a = self._importance[rows].astype(np.float64)
+        self._sums[rows, 0] = a.sum(axis=1)
+        left = np.where(self._basis.emitters_seen[rows], 0, np.maximum(1 - a, 0))
+        self._sums[rows, 1] = left.sum(axis=1)
+
+    def _tiles(self) -> "_Tiles":
+        if self._light is None:
+            self._light = _Tiles(self._basis, self._image, self._importance)
+        return self._light
+
+    def _film(self) -> "_Film":
+        if self._display is None:
+            self._display = _Film(self._basis, self._image, self._importance)
+        return self._display
+
+
+def untouched(basis: Basis, reduction: Reduction) -> Doubles:
+    """The weights (n, 3) nearest to the present ones, of what constraints leave."""
+    present = to_present(basis, 1.0)
+    return solve_reduced(present, reduction, basis.present_weights).weights
+
+
+class _Tiles:
+    """Equations of what is painted and of the rest, each at weight 1, in linear light."""
+
+    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+        self._importance, self._seen = importance, basis.emitters_seen
+        self._left = np.empty(importance.shape, np.float32)
+        everything = slice(0, len(importance)), slice(0, importance.shape[1])
+        self._leave(everything)
+        self._paint = TiledEquations(basis.images, image, importance)
+        self._rest = TiledEquations(basis.images, basis.present_look, self._left)
+
+    def _leave(self, region: Region) -> None:
+        left = np.maximum(1 - self._importance[region], 0)
+        self._left[region] = np.where(self._seen[region], 0, left)
+
+    def painted(self, region: Region) -> None:
+        before = self._left[region].copy()
+        self._leave(region)
+        self._paint.update(region)
+        if not np.array_equal(before, self._left[region]):
+            self._rest.update(region)
+
+    def equations(self, rest_weight: float) -> NormalEquations:
+        equations, rest = self._paint.equations, self._rest.equations
+        if not rest_weight:
+            return equations
+        return NormalEquations(
+            equations.M + rest_weight * rest.M,
+            equations.b + rest_weight * rest.b,
+            equations.target_norm2 + rest_weight * rest.target_norm2,
+        )
+
+
+class _Film:
+    """The picture averaged to few pixels; what is painted of each, by its importance."""
+
+    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+        height, width = importance.shape
+        self._side = side = max(1, ceil((height * width / FILM) ** 0.5))
+        self._image, self._importance, self._seen = image, importance, basis.emitters_seen
+        rows, columns = -(-height // side), -(-width // side)
+        self._size = rows, columns
+        small = np.stack([_averaged(x, side) for x in basis.images])
+        self._rows = np.ascontiguousarray(small.reshape(len(small), -1, 3))
+        self._current = _planes(_averaged(basis.present_look, side))
+        self._painted = self._current.copy()
+        self._a, self._left = np.zeros((2, rows * columns))
+        self.painted((slice(0, height), slice(0, width)))
+
+    def painted(self, region: Region) -> None:
+        """Average anew what a rectangle touches."""
+        side, (height, width) = self._side, self._importance.shape
+        (top, bottom), (left, right) = (
+            _around(part, side, length)
+            for part, length in zip(region, (height, width), strict=True)
+        )
+        if top >= bottom or left >= right:
+            return
+        where = slice(top, bottom), slice(left, right)
+        a = self._importance[where].astype(np.float64)
+        light = self._image[where] * a[..., None]
+        rest = np.where(self._seen[where], 0, np.maximum(1 - a, 0))
+        total, lit, unpainted = (_summed(x, side) for x in (a, light, rest))
+        rows = slice(top // side, -(-bottom // side))
+        columns = slice(left // side, -(-right // side))
+        some = total > 0
+        mean = lit / np.where(some, total, 1)[..., None]
+        painted = self._painted.reshape(3, *self._size)[:, rows, columns]
+        current = self._current.reshape(3, *self._size)[:, rows, columns]
+        painted[...] = np.where(some, mean.transpose(2, 0, 1), current)
+        self._a.reshape(self._size)[rows, columns] = total
+        self._left.reshape(self._size)[rows, columns] = unpainted
+
+    def lit(self, rest_weight: float, transform: ViewTransform | None) -> LitPixels:
+        """The loss of these pixels; an average counts as much as all that are in it."""
+        rest = rest_weight * self._left
+        weight = self._a + rest
+        some = weight > 0
+        share = np.where(some, rest / np.where(some, weight, 1), 0)
+        pixels = Pixels(self._painted, weight, share, self._current, None, transform)
+        return LitPixels(self._rows, pixels)
+
+
+def _around(along: slice, side: int, length: int) -> tuple[int, int]:
+    """The pixels of all blocks that a slice touches."""
+    start, stop, _ = along.indices(length)
+    return start // side * side, min(-(-stop // side) * side, length)
+
+
+def _summed(values: npt.NDArray[np.float64], side: int) -> Doubles:
+    """Sums over blocks; those that the border cuts off are of what there is."""
+    height, width = values.shape[:2]
+    rows, columns = (np.arange(0, length, side) for length in (height, width))
+    return np.asarray(np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1))
+
+
+def _averaged(image: Floats, side: int) -> Floats:
+    """(h, w, 3) means over blocks."""
+    height, width = image.shape[:2]
+    if side == 1:
+        return image
+    if not (height % side or width % side):
+        return block_mean(image, side)
+    ones = _summed(np.ones((height, width)), side)
+    return np.asarray(_summed(image.astype(np.float64), side) / ones[..., None], np.float32)
+
+
+def _planes(image: Floats) -> Doubles:
+    return np.ascontiguousarray(image.reshape(-1, 3).T, np.float64)

@@ -1,0 +1,13 @@
+"""The page for hosts that take one script and one style sheet: notebooks."""
+
+from lightpaint.browser import bundled, styles
+
+
+def widget_script() -> str:
+    """The painter as one ES module, whose default export is an anywidget's."""
+    return bundled("widget.js")
+
+
+def widget_style() -> str:
+    """Its style sheet."""
+    return styles("style.css")

@@ -1,0 +1,130 @@
+"""From what was named to a page that paints it: session file, studio and server, until the end."""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.render import basis_lights
+from lightpaint.colour.transform import TransformChoice
+from lightpaint.files import check_writable
+from lightpaint.job import NOT_IN_GROUPS, RENDERED
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import constraints_of
+from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.paint.database import set_aside
+from lightpaint.paint.server import Server, check_installed
+from lightpaint.paint.steps import Identity
+from lightpaint.paint.store import Store
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.scene.quality import on_film
+from lightpaint.settings import Settings
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile, check_needed
+
+#: The session in the folder of what is painted.
+SESSION = "session.db"
+
+#: Seconds in which a pass of a render ends.
+PATIENCE_S = 60.0
+
+
+def subject_of(
+    source: SceneFile | BasisFile | GroupsFile,
+    folder: Path,
+    *,
+    settings: Settings | None = None,
+    constraints: Constraints | None = None,
+    choice: TransformChoice | None = None,
+    options: Sequence[str] = (),
+) -> Subject:
+    """What is to be painted, read and checked before anything is rendered.
+
+    Raises LightpaintError for what cannot be painted, or asked of its lights.
+    """
+    settings, constraints = settings or Settings(), constraints or Constraints()
+    about: dict[str, Any] = {
+        "source": source.path,
+        "folder": folder,
+        "settings": settings,
+        "constraints": constraints,
+        "choice": choice or TransformChoice(),
+        "options": tuple(options),
+    }
+    if not isinstance(source, SceneFile):
+        default = Settings()
+        names = NOT_IN_GROUPS if isinstance(source, GroupsFile) else RENDERED
+        idle = [name for name in names if getattr(settings, name) != getattr(default, name)]
+        check_needed(idle, source)
+        found = source.content
+        groups = found if isinstance(found, LightGroups) else None
+        basis = found.basis if isinstance(found, LightGroups) else found
+        reduce_to(constraints_of(basis.asked).and_then(constraints), basis.lights)
+        return Subject(basis=basis, groups=groups, **about)
+    scene = on_film(source.content, settings.quality, settings.resolution)
+    reduce_to(constraints_of(scene.asked).and_then(constraints), basis_lights(scene))
+    return Subject(scene=scene, **about)
+
+
+def identity_of(subject: Subject) -> Identity:
+    """What its session is of; of a scene that of the basis which is still to be rendered."""
+    if subject.basis is not None:
+        return Identity.of(subject.basis)
+    scene = subject.scene
+    assert scene is not None
+    names = tuple(light.name for light in scene.lights)
+    sensor = scene.sensor_names[scene.sensor]
+    return Identity(scene.path.name, scene.identity, scene.size, names, sensor)
+
+
+def paint_in_browser(
+    subject: Subject,
+    opened: Callable[[Server], None],
+    *,
+    new: bool = False,
+    host: str | None = None,
+    port: int | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> None:
+    """Serve a page that paints `subject`, until Ctrl-C or the like; all that was done is kept.
+
+    opened: called when the page can be opened. new: whether an earlier session is put aside. host,
+    port: as of `Server`. say: hears remarks.
+
+    Raises PaintError where the session cannot be had, OutputError where what was done last could
+    not be written.
+    """
+    check_installed()
+    check_writable(subject.folder)
+    path = subject.folder / SESSION
+    if new and (aside := set_aside(path)) is not None:
+        say(f"the earlier session is kept as {aside}")
+    store = Store.open(path, identity_of(subject))
+    studio = Studio(subject, lambda _: store)
+    try:
+        server = Server(studio, store, host=host, port=port, say=say)
+        try:
+            opened(server)
+            studio.start()
+            server.run()
+        finally:
+            server.close()
+    finally:
+        _end(studio, store)
+
+
+def _end(studio: Studio, store: Store) -> None:
+    """Close both, and the store also where the studio fails; then let renders come to an end.
+
+    What Mitsuba is at in another thread cannot be left alone at the end of a process.
+    """
+    try:
+        studio.close()
+    finally:
+        store.close()
+    end_s = time.monotonic() + PATIENCE_S
+    for thread in threading.enumerate():
+        if thread.name.startswith("lightpaint-"):
+            thread.join(max(0.0, end_s - time.monotonic()))

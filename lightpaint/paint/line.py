@@ -1,0 +1,213 @@
+"""The line between pages and one session: who has it, what is said, and in which order.
+
+One page has the session. Another is told so, and may take it over; the first is told that. What
+a page says waits in a queue of its own and is done by one thread, a message after the other; of
+live paint that another stroke's part already covers, only the newest. What goes to a page that
+is slow is replaced by what is newer where only the newest counts.
+
+Whatever happens in the session is an answer to the page, and never the end of the line.
+"""
+
+import asyncio
+import traceback
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+import numpy.typing as npt
+
+from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.files import first_line
+from lightpaint.paint.client import Client, Heard
+from lightpaint.paint.protocol import Message, Said
+from lightpaint.paint.store import Store
+
+#: Pages that are told that another has the session, at most.
+MOST_PAGES = 16
+
+#: Seconds after which a store that could not write tries again; and for pages to hear the end.
+TRY_S, GOODBYE_S = 2.0, 1.0
+
+_Made = TypeVar("_Made")
+
+
+class Painted(Protocol):
+    """What a session is to a server."""
+
+    on_message: Callable[[Message], None] | None
+
+    def said(self, said: Said, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+        """What is answered; the first answers the message. Raises LightpaintError."""
+
+    def state(self) -> Message:
+        """All that a page has to know."""
+
+    def resource(self, name: str) -> npt.NDArray[Any]:
+        """A picture. Raises PaintError if there is none of that name."""
+
+
+class Line:
+    """Pages of one session.
+
+    say: hears, in plain text, what somebody at the terminal should know.
+    """
+
+    def __init__(
+        self, session: Painted, store: Store | None, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self.session, self.store, self.say = session, store, say
+        self.generations: dict[str, int] = {}
+        self._holder: Client | None = None
+        self._clients: set[Client] = set()
+        self._worker = ThreadPoolExecutor(1, "lightpaint-session")
+        self._unsaved: str | None = None
+        self._watch: asyncio.Task[None] | None = None
+        self._is_over = False
+        self._leaving: asyncio.Future[None] | None = None
+
+    def begin(self) -> None:
+        """Hear the session from now on, in the running loop."""
+        loop = asyncio.get_running_loop()
+
+        def post(message: Message) -> None:
+            with suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(self._post, message)
+
+        self.session.on_message = post
+        self._watch = loop.create_task(self._watched())
+
+    async def end(self) -> None:
+        """Tell all pages, and finish what the session is at."""
+        self._is_over = True
+        self.session.on_message = None
+        if self._watch is not None:
+            self._watch.cancel()
+        for client in self._clients:
+            text = "the painter has ended; what was painted is kept"
+            client.send(Message("closed", {"reason": "ended", "text": text}))
+        leaving = [asyncio.ensure_future(client.sent()) for client in self._clients]
+        if leaving:
+            await asyncio.wait(leaving, timeout=GOODBYE_S)
+        await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
+
+    async def serve(self, client: Client) -> None:
+        """Answer one page until it leaves."""
+        if self._is_over or len(self._clients) >= MOST_PAGES:
+            await client.leave(1013)
+            return
+        self._clients.add(client)
+        sending = asyncio.create_task(client.keep_sending())
+        answering = asyncio.create_task(self._answering(client))
+        try:
+            await client.keep_hearing()
+        finally:
+            self._clients.discard(client)
+            if self._holder is client:
+                self._holder = None
+            for task in (sending, answering):
+                task.cancel()
+            await asyncio.gather(sending, answering, return_exceptions=True)
+
+    async def resource(self, name: str) -> npt.NDArray[Any]:
+        """A picture of the session. Raises PaintError if there is none of that name."""
+        return await self._done(self.session.resource, name)
+
+    async def _done(self, work: Callable[..., _Made], *given: Any) -> _Made:
+        """What the session does, one thing at a time."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._worker, partial(work, *given))
+
+    async def _answering(self, client: Client) -> None:
+        while True:
+            heard = await client.next_heard()
+            answers = await self._answers(client, heard)
+            for message in answers:
+                self._note(message)
+            first, *others = answers or [Message("done")]
+            for seq in heard.replies or (None,):
+                client.send(first, seq)
+            for message in others:
+                client.send(message)
+            self._tell_store()
+
+    async def _answers(self, client: Client, heard: Heard) -> list[Message]:
+        """What is said to one message; whatever goes wrong is said, too."""
+        try:
+            if heard.refusal is not None:
+                return [heard.refusal]
+            if heard.asks_for_session:
+                if self._holder not in (None, client) and not (
+                    heard.takes_over or _same_page(self._holder, client)
+                ):
+                    return [_taken("another tab has this session")]
+                self._give(client)
+                return [await self._done(self.session.state)]
+            if self._holder is not client:
+                return [_taken("this tab does not have the session")]
+            assert heard.said is not None
+            return await self._done(self.session.said, heard.said, heard.arrays)
+        except LightpaintError as error:
+            return [Message("failed", {"text": str(error)})]
+        except Exception as error:
+            # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
+            self.say("".join(traceback.format_exception(error)))
+            text = f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
+            return [Message("failed", {"text": text})]
+
+    def _give(self, client: Client) -> None:
+        """`client` has the session from now on."""
+        before, self._holder = self._holder, client
+        if before is None or before is client:
+            return
+        if _same_page(before, client):  # it is at the other end of a lost connection
+            self._leaving = asyncio.ensure_future(before.leave(1001))
+        else:
+            before.send(_taken("another tab has taken this session over"))
+
+    def _post(self, message: Message) -> None:
+        """What the session says by itself."""
+        self._note(message)
+        if self._holder is not None:
+            self._holder.send(message)
+
+    def _note(self, message: Message) -> None:
+        """Remember which pictures there are by now."""
+        if message.kind in ("state", "renewed"):
+            found = {str(k): int(v) for k, v in message.fields.get("resources", {}).items()}
+            self.generations = found if message.kind == "state" else {**self.generations, **found}
+
+    async def _watched(self) -> None:
+        """Try again to write what could not be written."""
+        while True:
+            await asyncio.sleep(TRY_S)
+            if self.store is not None and self.store.unsaved is not None:
+                await asyncio.to_thread(self.store.flush)
+                self._tell_store()
+
+    def _tell_store(self) -> None:
+        unsaved = None if self.store is None else self.store.unsaved
+        if (unsaved is None) == (self._unsaved is None):
+            return
+        self._unsaved = unsaved
+        text = "all that was painted is kept again" if unsaved is None else unsaved
+        self.say(text)
+        tone = "info" if unsaved is None else "warn"
+        self._post(Message("say", {"text": text, "tone": tone}))
+
+
+def _taken(text: str) -> Message:
+    return Message("closed", {"reason": "taken", "text": text})
+
+
+def _same_page(holder: Client | None, client: Client) -> bool:
+    """Whether it is the page that has the session, back after its connection was dropped."""
+    return holder is not None and client.page != "" and holder.page == client.page
+
+
+async def pictured(line: Line, name: str) -> Message:
+    """A picture as a message, whose bytes can be sent. Raises PaintError."""
+    if len(name) > 200:
+        raise PaintError("no picture has such a name")
+    return Message("fetched", {"name": name}, {"picture": await line.resource(name)})

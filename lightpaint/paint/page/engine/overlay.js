@@ -1,0 +1,113 @@
+/**
+ * What is laid over a picture to say something of it. The arithmetic of cpu.js; glsl.js says the
+ * same in the shader's language, and a test holds the two together.
+ *
+ * Nothing is said by colour alone: too dark and too bright are hatched in two directions, too.
+ */
+
+/** Light at the middle of false colour. */
+export const GREY = 0.18;
+
+/** Codes of false colour: from six stops below grey to six above, in whole stops. */
+export const BANDS = [
+  [24, 10, 40],
+  [52, 18, 96],
+  [46, 44, 150],
+  [30, 84, 178],
+  [18, 128, 170],
+  [20, 152, 120],
+  [128, 128, 128],
+  [120, 170, 60],
+  [196, 190, 40],
+  [232, 164, 40],
+  [236, 116, 44],
+  [220, 60, 56],
+  [255, 220, 228],
+];
+
+/** Codes of: too dark, too bright, beyond reach, importance. */
+export const INKS = {
+  dark: [64, 132, 255],
+  bright: [255, 148, 40],
+  beyond: [232, 72, 200],
+  importance: [72, 208, 140],
+};
+
+/** Difference of codes at which ink covers what it lies on. */
+export const FULL = 64;
+
+/** Luma of codes, for what stays under ink. */
+export const LUMA = [0.2126, 0.7152, 0.0722];
+
+/** Device pixels from one line of a hatch to the next, and of them, how many have less ink. */
+export const HATCH = { period: 8, thin: 4, strength: 0.55 };
+
+/** Band of false colour of a luminance, exposure included. @param {number} luminance */
+export function band(luminance) {
+  const stops = Math.log2(Math.max(luminance, 1e-9) / GREY);
+  return Math.min(BANDS.length - 1, Math.max(0, Math.floor(stops + 0.5) + 6));
+}
+
+/** How much ink a hatch lets through at a pixel of the picture; slope ±1.
+ * @param {number} x @param {number} y @param {number} slope */
+export function hatch(x, y, slope) {
+  const along = (((x + slope * y) % HATCH.period) + HATCH.period) % HATCH.period;
+  return along < HATCH.thin ? HATCH.strength : 1;
+}
+
+/** Lay ink over a pixel of RGBA: what is below loses its colour and half its light.
+ * @param {Uint8ClampedArray} rgba @param {number} at @param {number[]} ink
+ * @param {number} amount 0 to 1 */
+export function lay(rgba, at, ink, amount) {
+  const grey = (LUMA[0] * rgba[at] + LUMA[1] * rgba[at + 1] + LUMA[2] * rgba[at + 2]) * 0.6;
+  for (let c = 0; c < 3; c++) rgba[at + c] = grey + (ink[c] - grey) * amount;
+}
+
+/** Which pixels a picture shows: of (height, width), each `step`th of each `step`th row.
+ * @typedef {{height: number, width: number, step: number}} Grid */
+
+/** For each pixel shown: its place in RGBA, and its column, row and place in the whole picture.
+ * @param {Grid} grid @param {(at: number, x: number, y: number, p: number) => void} visit */
+function each({ height, width, step }, visit) {
+  let at = 0;
+  for (let y = 0; y < height; y += step)
+    for (let x = 0; x < width; x += step, at += 4) visit(at, x, y, y * width + x);
+}
+
+/** Missed: solution beside painting, both as codes, where something is painted.
+ * @param {Uint8ClampedArray} rgba of the solution, changed @param {Uint8ClampedArray} painting
+ * @param {Float32Array} importance @param {Grid} grid of the solution */
+export function missed(rgba, painting, importance, grid) {
+  each(grid, (at, x, y, p) => {
+    const r = rgba[at] - painting[4 * p];
+    const g = rgba[at + 1] - painting[4 * p + 1];
+    const b = rgba[at + 2] - painting[4 * p + 2];
+    const most = Math.max(Math.abs(r), Math.abs(g), Math.abs(b));
+    const isDark = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b < 0;
+    const amount = importance[p] > 0 ? Math.min(1, most / FULL) : 0;
+    lay(rgba, at, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1));
+  });
+}
+
+/** @param {Uint8ClampedArray} rgba changed @param {ArrayLike<number>} amounts (h, w)
+ * @param {number} most what stands for all @param {number[]} ink @param {Grid} grid */
+export function inked(rgba, amounts, most, ink, grid) {
+  each(grid, (at, x, y, p) => {
+    const amount = Math.min(1, Math.max(0, amounts[p] / most)) * 0.8;
+    lay(rgba, at, ink, amount * hatch(x, y, 1));
+  });
+}
+
+/** @param {Uint8ClampedArray} rgba changed @param {Float32Array} light (…, 3)
+ * @param {number} gain of the exposure */
+export function falseColour(rgba, light, gain) {
+  for (let p = 0; p < light.length / 3; p++) {
+    const i = 3 * p;
+    const y = LUMA[0] * light[i] + LUMA[1] * light[i + 1] + LUMA[2] * light[i + 2];
+    const [r, g, b] = BANDS[band(y * gain)];
+    rgba[4 * p] = r;
+    rgba[4 * p + 1] = g;
+    rgba[4 * p + 2] = b;
+    rgba[4 * p + 3] = 255;
+  }
+}

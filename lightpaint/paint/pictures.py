@@ -1,0 +1,104 @@
+"""The pictures that a page fetches: planes of the lights, and what helps to see and to paint."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.errors import PaintError
+from lightpaint.images.denoise import denoised
+from lightpaint.report.figures import thumbnail
+
+#: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
+#: precision.
+BRIGHTEST = 1024.0
+
+#: Points along each side of a lookup table, and the light, in stops, that its ends stand for.
+SIDE, LOW, HIGH = 48, -13.0, 7.0
+
+#: Built-in transforms that a page may show through.
+TRANSFORMS = ("srgb", "filmic", "agx", "linear")
+
+Picture = npt.NDArray[Any]
+
+
+class Pictures:
+    """Pictures by name, each with the number of its generation; made when they are first asked for.
+
+    Updated in place. Names are those of the protocol: `plane/3`, `lut/agx`, `painting`.
+    """
+
+    def __init__(self) -> None:
+        self.generations: dict[str, int] = {}
+        self._made: dict[str, Picture] = {}
+        self._makers: dict[str, Callable[[], Picture]] = {}
+
+    def offer(self, name: str, make: Callable[[], Picture]) -> None:
+        """From now on there is this picture; what it was before is gone."""
+        self.generations[name] = self.generations.get(name, 0) + 1
+        self._makers[name] = make
+        self._made.pop(name, None)
+
+    def put(self, name: str, picture: Picture) -> None:
+        """The same, of one that is made already."""
+        self.offer(name, lambda: picture)
+
+    def withdraw(self, name: str) -> None:
+        """There is none from now on."""
+        self.generations.pop(name, None)
+        self._makers.pop(name, None)
+        self._made.pop(name, None)
+
+    def __getitem__(self, name: str) -> Picture:
+        """The picture of that name. Raises PaintError if there is none."""
+        make = self._makers.get(name)
+        if make is None:
+            raise PaintError(f"there is no picture {name[:40]!r}")
+        if name in ("painting", "importance"):
+            return make()  # they change under the brush
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
+
+    def named(self) -> dict[str, int]:
+        """Generation of each, by name."""
+        return dict(self.generations)
+
+
+def scale_of(plane: Floats) -> float:
+    """What a plane is divided by to be sent as half floats: a power of two."""
+    brightest = float(plane.max(initial=0))
+    return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST))) if brightest > 0 else 1.0
+
+
+def as_halves(plane: Floats, scale: float = 1.0) -> Picture:
+    """Light as half floats, what they cannot hold clipped."""
+    return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
+
+
+def clean_plane(basis: Basis, k: int) -> Floats:
+    """What light k does at unit emission, without its grain."""
+    return denoised(basis.images[k], basis.features)
+
+
+def small(basis: Basis, k: int) -> Picture:
+    """A thumbnail of what light k does, as a display shows it."""
+    picture, _ = thumbnail(basis.images[k], basis.emitters_seen)
+    return np.round(picture * 255).astype(np.uint8)
+
+
+def table_of(transform: ViewTransform) -> Picture:
+    """(SIDE, SIDE, SIDE, 3), display values over the logarithm of light, from LOW to HIGH stops.
+
+    The first point of each axis is black, the next stands for LOW + (HIGH - LOW) / (SIDE - 1).
+    """
+    axis = 2.0 ** np.linspace(LOW, HIGH, SIDE)
+    axis[0] = 0.0
+    r, g, b = np.meshgrid(axis, axis, axis, indexing="ij")
+    light = np.stack([r, g, b], axis=-1).reshape(1, -1, 3)
+    shown = transform.encode(light).reshape(SIDE, SIDE, SIDE, 3)
+    return np.asarray(shown, np.float16)

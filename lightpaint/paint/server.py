@@ -1,0 +1,199 @@
+"""The painter's server: carries messages and pictures between one session and its pages.
+
+It knows nothing of light. The page is a table of files; pictures are raw bytes by name and
+generation; all else goes over one WebSocket. `guard.py` says who may ask.
+"""
+
+import signal
+import socket
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from importlib.util import find_spec
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+from lightpaint.errors import PaintError
+from lightpaint.paint.client import Client
+from lightpaint.paint.guard import App, Guard
+from lightpaint.paint.line import Line, Painted, pictured
+from lightpaint.paint.page_files import PageFile, page_files
+from lightpaint.paint.protocol import MAX_FRAME
+from lightpaint.paint.store import Store
+
+if TYPE_CHECKING:
+    import uvicorn
+    from starlette.requests import Request
+    from starlette.responses import Response
+    from starlette.websockets import WebSocket
+
+#: Where it listens unless somebody says otherwise or another does already: at one place, so that
+#: the browser finds again what the page has put down for itself.
+PORT = 8421
+
+#: Bytes of a message beside its pixels, and of each pixel (light and importance) that it may bring.
+BESIDE, OF_PIXEL = 2**20, 16
+
+
+def check_installed() -> None:
+    """Raise PaintError, with what to do, unless the libraries of the server are here."""
+    for name in ("starlette", "uvicorn", "websockets"):
+        if find_spec(name) is None:
+            raise PaintError(
+                f"painting in the browser needs {name}: pip install 'lightpaint[paint]'"
+            )
+
+
+def page_app(line: Line, *, files: dict[str, PageFile] | None = None) -> App:
+    """What is answered to those who may ask."""
+    from starlette.applications import Starlette
+    from starlette.responses import Response
+    from starlette.routing import Route, WebSocketRoute
+
+    table = page_files() if files is None else files
+
+    async def page(request: "Request") -> "Response":
+        file = table.get(request.scope["path"])
+        if file is None:
+            return Response("no such page", 404, media_type="text/plain")
+        return Response(file.content, headers={"content-type": file.kind})
+
+    async def data(request: "Request") -> "Response":
+        name, asked = request.path_params["name"], request.query_params.get("g")
+        before = line.generations.get(name)
+        try:
+            picture = await pictured(line, name)
+        except PaintError as error:
+            return Response(str(error), 404, media_type="text/plain")
+        [about], [content] = picture.content()["buffers"], picture.buffers()
+        headers = {
+            "content-type": "application/octet-stream",
+            "x-dtype": about["dtype"],
+            "x-shape": ",".join(map(str, about["shape"])),
+        }
+        if asked is not None and asked == str(before) == str(line.generations.get(name)):
+            # Another launch has another cookie, and other pictures.
+            headers |= {"cache-control": "private, max-age=31536000, immutable", "vary": "Cookie"}
+        return Response(content, headers=headers)
+
+    async def live(websocket: "WebSocket") -> None:
+        await websocket.accept()
+        await line.serve(Client(websocket, websocket.query_params.get("page", "")))
+
+    @asynccontextmanager
+    async def lifespan(_: Any) -> AsyncIterator[None]:
+        line.begin()
+        yield
+        await line.end()
+
+    routes = [
+        WebSocketRoute("/live", live),
+        Route("/data/{name:path}", data),
+        Route("/{path:path}", page),
+    ]
+    return Starlette(routes=routes, lifespan=lifespan)
+
+
+def listening(host: str, port: int | None) -> socket.socket:
+    """A socket to hear on. port: None for the usual one, or any if that is taken.
+
+    Raises PaintError where there is none.
+    """
+    reason = "ports are numbers up to 65535"
+    for tried in (PORT, 0) if port is None else (port,):
+        if not 0 <= tried < 2**16:
+            break
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            return socket.create_server((host, tried), family=family)
+        except OSError as error:
+            reason = error.strerror or str(error)
+    raise PaintError(f"cannot listen at {host}:{tried}: {reason}; choose another with port=...")
+
+
+class Server:
+    """One session, served.
+
+    host, port: where to listen; a host other than the loopback is for those who know why. say: as
+    of `Line`.
+    """
+
+    def __init__(
+        self,
+        session: Painted,
+        store: Store | None = None,
+        *,
+        host: str | None = None,
+        port: int | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        check_installed()
+        self._line = Line(session, store, say)
+        self._socket = listening(host or "127.0.0.1", port)
+        self.port = int(self._socket.getsockname()[1])
+        self._guard = Guard(page_app(self._line), port=self.port, host=host)
+        self._host = _shown(host)
+        pixels = MAX_FRAME if store is None or store.identity is None else prod(store.identity.size)
+        self._largest = min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
+
+    @property
+    def url(self) -> str:
+        """Where the page is, with the token that opens it."""
+        return f"http://{self._host}:{self.port}/?token={self._guard.token}"
+
+    def url_once(self) -> str:
+        """The same, for a browser that is started now: good once."""
+        return f"http://{self._host}:{self.port}/?token={self._guard.once()}"
+
+    def run(self) -> None:
+        """Serve until Ctrl-C or the like, which is raised again when all has ended well."""
+        import uvicorn
+
+        line = self._line
+
+        class Ending(uvicorn.Server):
+            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+                await line.end()  # while pages can still be told
+                await super().shutdown(sockets)
+
+        config = uvicorn.Config(
+            self._guard,
+            http="h11",
+            ws="websockets-sansio",
+            ws_max_size=self._largest,
+            ws_per_message_deflate=False,
+            ws_ping_interval=10.0,
+            ws_ping_timeout=20.0,
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            limit_concurrency=256,
+            timeout_graceful_shutdown=5,
+        )
+        with _hanging_up(server := Ending(config)):
+            server.run(sockets=[self._socket])
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._socket.close()
+
+
+@contextmanager
+def _hanging_up(server: "uvicorn.Server") -> Iterator[None]:
+    """A terminal that closes ends `server` as SIGTERM does, unless that is ignored (nohup)."""
+    before = signal.getsignal(signal.SIGHUP)
+    is_heard = threading.current_thread() is threading.main_thread() and callable(before)
+    if is_heard:
+        signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
+    try:
+        yield
+    finally:
+        if is_heard:
+            signal.signal(signal.SIGHUP, before)
+
+
+def _shown(host: str | None) -> str:
+    """As it stands in an address; where all are listened to, the machine's own."""
+    if host is None or host in ("0.0.0.0", "::"):
+        return "127.0.0.1" if host is None else socket.gethostname()
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,308 @@
+"""The session file: each step is in it when `append` returns, whatever happens next.
+
+It is a SQLite database in WAL mode, and no journal of our own. What ends a process, or the
+current, in the middle of a write leaves the last whole step; SQLite has been tried at that far more
+than a file format of ours would be. Undo cuts the tail off in one transaction with the step that
+takes its place; looks change their names and go, and the room they took is used again or given
+back; and of a long history only what is to be seen is read at a start, since labels and pixels
+stand in two tables. An append-only journal would need all of that built.
+
+Pixels are kept packed (`packed.py`) and read when somebody asks for them, so that a history
+without limit takes no memory.
+
+A full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
+`flush` or the next step writes it.
+"""
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from threading import RLock
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.errors import OutputError, PaintError
+from lightpaint.files import first_line
+from lightpaint.paint.database import damaged, opened, transaction
+from lightpaint.paint.packed import packed, packed_patch, unpacked, unpacked_patch
+from lightpaint.paint.steps import Identity, KeptLook, Patch, Pixels, Region, Step
+from lightpaint.records import strict_json
+
+#: What looks are made of.
+DTYPES = ("float32", "float64", "float16", "uint8", "int16")
+
+_Write = Callable[[sqlite3.Connection], object]
+
+
+class Store:
+    """Steps and looks of one session, and a file that has them too.
+
+    Attributes:
+        path: The file; None for a session in memory only.
+        identity: What is painted on.
+        steps: All, in order, also those that were taken back; `append` cuts these off. Their
+            pixels are read from the file when they are asked for. To look at only.
+        position: How many of them are done.
+        unsaved: Why the last steps are in memory only, in one line; None if all is written.
+    """
+
+    def __init__(self, path: Path | None, identity: Identity | None) -> None:
+        self.path, self.identity = path, identity
+        self.steps: list[Step] = []
+        self.position = 0
+        self.unsaved: str | None = None
+        self._lock = RLock()
+        self._looks: dict[int, KeptLook] = {}
+        self._ids: list[int] = []  # of the steps; they only grow
+        self._last = 0  # id of the last step there ever was
+        self._waiting: list[_Write] = []  # what is still to be written, in order
+        self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
+        self._arrays: dict[int, _Packed] = {}  # the same of looks
+        self._database = opened(path, identity)
+        try:
+            self._read()
+        except (sqlite3.Error, ArithmeticError, KeyError, TypeError, ValueError) as error:
+            self._database.close()
+            raise damaged(path, error) from None
+        except BaseException:
+            self._database.close()
+            raise
+
+    @classmethod
+    def open(cls, path: Path, identity: Identity) -> "Store":
+        """The session at `path`, as it was left, or a new one; for this process alone.
+
+        Raises PaintError for one that another process has, that is damaged, or that is of other
+        lights or another size; OutputError for a place that cannot be written.
+        """
+        return cls(path, identity)
+
+    def append(self, step: Step) -> None:
+        """Do `step`, after what is done; what was taken back is cut off."""
+        with self._lock:
+            region = None if step.patch is None else tuple(map(int, step.patch.region))
+            fields, shape = _text(step.fields), json.dumps(region)
+            blobs = None if step.patch is None else packed_patch(step.patch)
+            del self.steps[self.position :], self._ids[self.position :]
+            kept = self._ids[-1] if self._ids else 0
+            self._last = number = self._last + 1
+            if blobs is not None:
+                self._blobs[number] = blobs
+            self.steps.append(self._step(number, step.kind, step.label, fields, shape))
+            self._ids.append(number)
+            self.position += 1
+
+            def write(database: sqlite3.Connection) -> None:
+                database.execute("DELETE FROM step WHERE id > ?", (kept,))
+                database.execute("DELETE FROM pixels WHERE step > ?", (kept,))
+                values = (number, step.kind, step.label, fields, shape)
+                database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", values)
+                if blobs is not None:
+                    database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (number, *blobs))
+
+            self._write(write)
+
+    def move_to(self, position: int) -> None:
+        """Take steps back, or do them again: `position` of them are done."""
+        with self._lock:
+            if not 0 <= position <= len(self.steps):
+                raise PaintError(f"no step {position}: there are {len(self.steps)}")
+            self.position = position
+            self._write(lambda _: None)
+
+    def looks(self) -> list[KeptLook]:
+        """All looks, the oldest first; their arrays are read when they are asked for."""
+        with self._lock:
+            return list(self._looks.values())
+
+    def put_look(self, look: KeptLook) -> None:
+        """Keep a look, in the place of the one of its number if there is one."""
+        with self._lock:
+            fields, arrays = _text(look.fields), look.arrays
+            number, blobs = look.id, None
+            if not (isinstance(arrays, _LookArrays) and arrays.is_of(self, number)):
+                blobs = _packed_arrays(arrays)
+                self._arrays[number] = blobs
+            self._looks[number] = KeptLook(number, strict_json(fields), _LookArrays(self, number))
+
+            def write(database: sqlite3.Connection) -> None:
+                said = (number, fields)
+                database.execute("INSERT OR REPLACE INTO look VALUES (?, ?)", said)
+                if blobs is not None:
+                    database.execute("DELETE FROM look_array WHERE look = ?", (number,))
+                    rows = [(number, name, *row) for name, row in blobs.items()]
+                    database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
+
+            self._write(write)
+
+    def drop_look(self, number: int) -> None:
+        """Forget a look. Raises PaintError if there is none of that number."""
+        with self._lock:
+            if self._looks.pop(number, None) is None:
+                raise PaintError(f"no look {number}")
+            self._arrays.pop(number, None)
+
+            def write(database: sqlite3.Connection) -> None:
+                database.execute("DELETE FROM look WHERE id = ?", (number,))
+                database.execute("DELETE FROM look_array WHERE look = ?", (number,))
+
+            self._write(write)
+
+    def flush(self) -> str | None:
+        """Write what is in memory only. Returns why that is not possible, or None."""
+        with self._lock:
+            if not self._waiting:
+                return self.unsaved
+            try:
+                with transaction(self._database):
+                    for write in self._waiting:
+                        write(self._database)
+                    about = ("position", self.position)
+                    self._database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", about)
+            except sqlite3.Error as error:
+                self.unsaved = (
+                    f"what was done last is in memory only, since {self.path} cannot be written "
+                    f"({first_line(error)}): it is written as soon as there is room"
+                )
+                return self.unsaved
+            self._waiting, self.unsaved = [], None
+            self._blobs.clear()
+            self._arrays.clear()
+            return None
+
+    def close(self) -> None:
+        """Write what is left, and let others have the file.
+
+        Raises OutputError if something cannot be written; it is lost then.
+        """
+        with self._lock:
+            unsaved = self.flush()
+            self._waiting, self.unsaved = [], None  # closed again, there is nothing left to say
+            try:
+                self._database.close()
+            except sqlite3.Error as error:  # what is beside the file goes into it next time
+                unsaved = unsaved or first_line(error)
+        if unsaved is not None:
+            raise OutputError(f"the last steps are lost: {unsaved}")
+
+    def __enter__(self) -> "Store":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _write(self, write: _Write) -> None:
+        self._waiting.append(write)
+        self.flush()
+
+    def _read(self) -> None:
+        """All but pixels, of the file."""
+        ask = self._database.execute
+        rows = ask("SELECT id, kind, label, fields, region FROM step ORDER BY id").fetchall()
+        for row in rows:
+            self.steps.append(self._step(*row))
+            self._ids.append(row[0])
+        self._last = self._ids[-1] if self._ids else 0
+        self.position = len(self.steps)
+        for (position,) in ask("SELECT value FROM about WHERE name = 'position'"):
+            self.position = min(int(position), len(self.steps))
+        for number, fields in ask("SELECT id, fields FROM look ORDER BY id").fetchall():
+            self._looks[number] = KeptLook(number, strict_json(fields), _LookArrays(self, number))
+
+    def _step(self, number: int, kind: str, label: str, fields: str, region: str) -> Step:
+        where, patch = strict_json(region), None
+        if where is not None:
+            top, bottom, left, right = (int(edge) for edge in where)
+            patch = _KeptPatch((top, bottom, left, right), self, number)
+        return Step(str(kind), str(label), strict_json(fields), patch)
+
+    def _pixels(self, number: int, region: Region) -> tuple[Pixels, Pixels]:
+        with self._lock:
+            blobs = self._blobs.get(number)
+            if blobs is None:
+                found = "SELECT before, change FROM pixels WHERE step = ?"
+                blobs = self._database.execute(found, (number,)).fetchone()
+        if blobs is None:
+            raise PaintError(f"a step that was cut off: {number}")
+        return unpacked_patch(region, *blobs)
+
+    def _look_arrays(self, number: int) -> "_Packed":
+        with self._lock:
+            if number in self._arrays:
+                return self._arrays[number]
+            found = "SELECT name, dtype, shape, data FROM look_array WHERE look = ? ORDER BY rowid"
+            rows = self._database.execute(found, (number,)).fetchall()
+        return {name: (dtype, shape, data) for name, dtype, shape, data in rows}
+
+
+class MemoryStore(Store):
+    """The same without a file, for notebooks and tests."""
+
+    def __init__(self, identity: Identity | None = None) -> None:
+        super().__init__(None, identity)
+
+
+#: Arrays of a look by name: dtype, shape as JSON, data.
+_Packed = dict[str, tuple[str, str, bytes]]
+
+
+class _KeptPatch(Patch):
+    """A patch whose pixels are in the store."""
+
+    def __init__(self, region: Region, store: Store, number: int) -> None:
+        vars(self).update(region=region, _store=store, _number=number)
+
+    @property
+    def before(self) -> Pixels:
+        return self._pixels()[0]
+
+    @property
+    def after(self) -> Pixels:
+        return self._pixels()[1]
+
+    def _pixels(self) -> tuple[Pixels, Pixels]:
+        kept: Store = vars(self)["_store"]
+        return kept._pixels(vars(self)["_number"], self.region)
+
+
+class _LookArrays(Mapping[str, npt.NDArray[Any]]):
+    """Arrays of a look that are in the store."""
+
+    def __init__(self, store: Store, number: int) -> None:
+        self._store, self._number = store, number
+
+    def is_of(self, store: Store, number: int) -> bool:
+        """Whether these are of that look."""
+        return (self._store, self._number) == (store, number)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        dtype, shape, data = self._store._look_arrays(self._number)[name]
+        if dtype not in DTYPES:
+            raise PaintError(f"a damaged look: {dtype}")
+        return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._store._look_arrays(self._number))
+
+    def __len__(self) -> int:
+        return len(self._store._look_arrays(self._number))
+
+
+def _text(fields: Mapping[str, Any]) -> str:
+    """Fields as JSON. Raises PaintError for what JSON has no word for."""
+    try:
+        return json.dumps(dict(fields), ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise PaintError(f"this cannot be kept: {first_line(error)}") from None
+
+
+def _packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> _Packed:
+    found = {}
+    for name, array in arrays.items():
+        if array.dtype.name not in DTYPES:
+            raise PaintError(f"a look of {array.dtype.name}: expected {', '.join(DTYPES)}")
+        found[name] = (array.dtype.name, json.dumps(array.shape), packed(array))
+    return found

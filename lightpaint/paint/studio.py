@@ -1,0 +1,391 @@
+"""Where somebody paints: a session, and all that goes on beside it while the brush moves.
+
+Answers to messages come at once, from one thread at a time. The basis that is still being
+rendered, exact answers, clean planes, exports and the verifying render have threads of their own,
+which say what has come of them through `on_message`.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from threading import Condition, Lock, RLock, Thread
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.images.denoise import denoised
+from lightpaint.lighting.analysis.analyse import analyse, with_findings
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.solution import Solution
+from lightpaint.paint import pictures, protocol
+from lightpaint.paint.exports import command_line, export, verified
+from lightpaint.paint.looks import Looks
+from lightpaint.paint.pictures import Pictures
+from lightpaint.paint.protocol import Message
+from lightpaint.paint.session import Moment, Session
+from lightpaint.paint.steps import Identity
+from lightpaint.paint.store import Store
+from lightpaint.paint.subject import Subject
+from lightpaint.paint.told import analysis_fields, light_fields, lights_fields
+from lightpaint.paint.wishes import Wishes
+
+#: Seconds of rest after a stroke before the exact answer is looked for.
+REST_S = 0.08
+
+
+class StoppedError(Exception):
+    """Somebody does not want it any more."""
+
+
+class Studio:
+    """A subject under the brush.
+
+    Args:
+        subject: What is painted.
+        open_store: The store of a session of it, opened when its lights are known.
+
+    Attributes:
+        on_message: Hears what is said unasked, from other threads.
+    """
+
+    def __init__(self, subject: Subject, open_store: Callable[[Identity], Store]) -> None:
+        self.subject, self._open_store = subject, open_store
+        self.on_message: Callable[[Message], None] | None = None
+        self.pictures = Pictures()
+        self._session: Session | None = None
+        self._looks: Looks | None = None
+        self._solution: Solution | None = None
+        self._lock, self._bell = RLock(), Condition()
+        self._unsettled, self._is_open, self._failed = False, True, ""
+        self._render, self._renders = Lock(), False
+        self._threads = [
+            Thread(target=work, name=f"lightpaint-{work.__name__}", daemon=True)
+            for work in (self._obtain, self._settle)
+        ]
+
+    @property
+    def session(self) -> Session:
+        """What is painted. Raises PaintError before there is a basis."""
+        if self._session is None:
+            raise PaintError(self._failed or "the first picture is still being rendered")
+        return self._session
+
+    @property
+    def store(self) -> Store | None:
+        """Where it is kept; None before there is a basis."""
+        return None if self._session is None else self._session.store
+
+    def start(self) -> None:
+        """Begin to obtain the basis."""
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """End; all that was done is kept."""
+        with self._bell:
+            self._is_open = False
+            self._bell.notify_all()
+        with self._lock:
+            if self._session is not None:
+                self._session.store.close()
+
+    # What a page asks
+
+    def state(self) -> Message:
+        """All there is, for a page that opens."""
+        with self._lock:
+            session = self._session
+            about: dict[str, Any] = {
+                "version": protocol.VERSION,
+                "scene": self.subject.name,
+                "folder": str(self.subject.folder),
+                "can_render": self.subject.scene is not None,
+            }
+            if session is None:
+                return Message("waiting", {**about, "text": self._failed})
+            basis = session.basis
+            about |= self._of_basis(basis, session)
+            answer = {"lights_answer": lights_fields(basis, session.weights)}
+            arrays = session.weights_array
+            return Message("state", {**about, **session.about, **answer}, arrays)
+
+    def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
+        """What comes of a message at once. Raises LightpaintError for what cannot be done."""
+        if isinstance(message, protocol.Hello | protocol.TakeOver):
+            return [self.state()]
+        if isinstance(message, protocol.Fetch):
+            return [
+                Message("fetched", {"name": message.name}, {"data": self.resource(message.name)})
+            ]
+        with self._lock:
+            session, looks = self.session, self._looks
+            assert looks is not None
+            match message:
+                case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
+                    return [looks.said(message)]
+                case protocol.DropLook():
+                    return [looks.said(message)]
+                case protocol.LoadLook():
+                    made = [looks.load(message)]
+                case protocol.Export():
+                    return self._later(self._export, message)
+                case protocol.Verify():
+                    return self._verify(message)
+                case protocol.Explain():
+                    return self._later(self._explain, message)
+                case _:
+                    made = session.said(message, arrays)
+        self._ring()
+        return made
+
+    def moment(self) -> Moment:
+        """What is painted and asked now. Raises PaintError before there is a basis."""
+        with self._lock:
+            return self.session.moment()
+
+    def load(self, image: Floats, importance: Floats, wishes: Wishes, label: str) -> Message:
+        """Go on from another painting and what was asked with it: one step, a `patch`.
+
+        Raises LightpaintError for what cannot be asked, and has changed nothing then.
+        """
+        with self._lock:
+            made = self.session.load(image, importance, wishes, label)
+        self._ring()
+        return made
+
+    def resource(self, name: str) -> npt.NDArray[Any]:
+        """A picture by name. Raises PaintError if there is none."""
+        with self._lock:
+            return self.pictures[name]
+
+    # Beside it
+
+    def _say(self, message: Message | None) -> None:
+        if message is not None and self.on_message is not None and self._is_open:
+            self.on_message(message)
+
+    def _hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        if not self._is_open:
+            raise StoppedError
+        self._say(Message("progress", {"what": label, "done": done, "total": total, "unit": unit}))
+
+    def _later(self, work: Callable[[Any], None], message: Any) -> list[Message]:
+        """Do it in a thread of its own; what fails is said."""
+
+        def run() -> None:
+            try:
+                work(message)
+            except StoppedError:
+                self._say(Message("progress", {"what": "", "done": 1, "total": 1}))
+            except LightpaintError as error:
+                self._say(Message("say", {"text": str(error), "tone": "warn"}))
+
+        Thread(target=run, name=f"lightpaint-{work.__name__}", daemon=True).start()
+        return [Message("started", {"what": type(message).__name__.lower()})]
+
+    def _obtain(self) -> None:
+        """The basis, better and better."""
+        try:
+            for basis in self.subject.bases(self._hears):
+                self._take(basis)
+            self._say(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
+            self._clean()
+        except StoppedError:
+            pass
+        except LightpaintError as error:
+            self._failed = str(error)
+            self._say(Message("say", {"text": self._failed, "tone": "warn"}))
+
+    def _take(self, basis: Basis) -> None:
+        """Paint on with this basis."""
+        present = denoised(basis.present_look, basis.features)
+        with self._lock:
+            if not self._is_open:
+                raise StoppedError
+            if self._session is None:
+                store = self._open_store(Identity.of(basis))
+                self._session = Session(
+                    basis,
+                    present,
+                    store,
+                    settings=self.subject.settings,
+                    transform=self.subject.transform(basis),
+                    constraints=self.subject.constraints,
+                )
+                self._looks = Looks(self._session, self.pictures)
+            else:
+                self._session.improve(basis, present)
+            self._offer(self._session)
+        self._say(self.state())
+        self._ring()
+
+    def _offer(self, session: Session) -> None:
+        basis, offer = session.basis, self.pictures.offer
+        for k, plane in enumerate(basis.images):
+            offer(f"plane/{k}", lambda p=plane: pictures.as_halves(p, pictures.scale_of(p)))  # type: ignore[misc]
+            offer(f"thumb/{k}", lambda k=k: pictures.small(basis, k))  # type: ignore[misc]
+            self.pictures.withdraw(f"clean/{k}")
+        offer("present", lambda: pictures.as_halves(session.present))
+        offer("painting", lambda: session.image.copy())
+        offer("importance", lambda: session.importance.copy())
+        if basis.features is not None:
+            albedo = basis.features.albedo
+            offer("albedo", lambda: pictures.as_halves(albedo))
+        if basis.objects is not None:
+            index = basis.objects.index
+            offer("objects", lambda: index.astype(np.int16))
+        for transform in self._transforms(session):
+            offer(f"lut/{transform.name}", lambda t=transform: pictures.table_of(t))  # type: ignore[misc]
+
+    def _transforms(self, session: Session) -> list[Any]:
+        own = session.transform.name
+        names = [*pictures.TRANSFORMS, *([own] if own not in pictures.TRANSFORMS else [])]
+        return [type(session.transform)(name) for name in names]
+
+    def _of_basis(self, basis: Basis, session: Session) -> dict[str, Any]:
+        wanted = self.subject.wanted
+        looks = self._looks.listed() if self._looks is not None else []
+        scales = [pictures.scale_of(plane) for plane in basis.images]
+        return {
+            "size": list(basis.size),
+            "lights": [
+                {**light_fields(light), "scale": scale}
+                for light, scale in zip(basis.lights, scales, strict=True)
+            ],
+            "objects": [] if basis.objects is None else list(basis.objects.names),
+            "transforms": [x.name for x in self._transforms(session)],
+            "transform": {"name": session.transform.name, "stops": session.transform.stops},
+            "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
+            "resources": self.pictures.named(),
+            "looks": looks,
+            "basis": {
+                "spp": basis.origin.spp,
+                "wanted": wanted or basis.origin.spp,
+                "done": wanted is None or basis.origin.spp >= wanted,
+            },
+            "has_noise": basis.knows_noise,
+            "first": not session.store.steps,
+            "stroke": session.stroke,
+            "command": command_line(self.subject, session.wishes),
+        }
+
+    def _clean(self) -> None:
+        """Planes without their grain, one after the other."""
+        session = self._session
+        assert session is not None
+        basis = session.basis
+        if not basis.knows_noise:
+            return
+        for k, plane in enumerate(basis.images):
+            if not self._is_open or session.basis is not basis:
+                return
+            clean = pictures.as_halves(pictures.clean_plane(basis, k), pictures.scale_of(plane))
+            with self._lock:
+                self.pictures.put(f"clean/{k}", clean)
+                new = {f"clean/{k}": self.pictures.generations[f"clean/{k}"]}
+            self._say(Message("renewed", {"resources": new}))
+
+    def _ring(self) -> None:
+        with self._bell:
+            self._unsettled = True
+            self._bell.notify_all()
+
+    def _settle(self) -> None:
+        """The exact answer, whenever the brush rests; then what is known of it."""
+        while True:
+            with self._bell:
+                self._bell.wait_for(lambda: self._unsettled or not self._is_open)
+                if not self._is_open:
+                    return
+                self._unsettled = False
+            time.sleep(REST_S)
+            with self._bell:
+                if self._unsettled:
+                    continue
+            try:
+                self._find()
+            except LightpaintError as error:
+                self._say(Message("say", {"text": str(error), "tone": "warn"}))
+
+    def _find(self) -> None:
+        with self._lock:
+            session = self._session
+            if session is None or session.is_open:
+                return
+            moment = session.moment()
+        solution = moment.solution()
+        self._tell(lambda: session.settled(moment, solution))
+        with self._lock:
+            self._solution = solution if moment.version == session.version else self._solution
+        if solution is None or moment.version != session.version:
+            return
+        [analysis] = analyse(solution)
+        with self._lock:
+            if moment.version == session.version:
+                self._solution = with_findings(solution, (analysis,))
+        self._tell(lambda: session.settled(moment, solution, **analysis_fields(analysis)))
+
+    def _tell(self, make: Callable[[], Message | None]) -> None:
+        with self._lock:
+            message = make()
+        self._say(message)
+
+    # Long work
+
+    def _answer(self) -> tuple[Session, Lighting]:
+        """The exact answer to what is painted now."""
+        with self._lock:
+            session = self._session
+            assert session is not None
+            moment = session.moment()
+        solution = moment.solution()
+        if solution is None:
+            return session, Lighting.of_weights(session.basis, session.weights)
+        solution = with_findings(solution, analyse(solution))
+        return session, solution.lighting
+
+    def _export(self, message: protocol.Export) -> None:
+        session, lighting = self._answer()
+        with self._render:
+            files = export(self.subject, session.moment(), lighting, message.what, self._hears)
+        command = command_line(self.subject, session.wishes)
+        self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
+
+    def _verify(self, message: protocol.Verify) -> list[Message]:
+        if not message.run:
+            self._renders = False
+            return [Message("started", {"what": "stop"})]
+        if self.subject.scene is None:
+            raise PaintError("there is no scene to render: it was opened from a saved basis")
+        return self._later(self._verified, message)
+
+    def _verified(self, _: protocol.Verify) -> None:
+        session, lighting = self._answer()
+
+        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+            if not self._renders:
+                raise StoppedError
+            self._hears(label, done, total, unit)
+
+        self._renders = True
+        with self._render:
+            picture, said, agrees = verified(self.subject, session.basis, lighting, hears)
+        with self._lock:
+            self.pictures.put("verified", pictures.as_halves(picture))
+            new = {"verified": self.pictures.generations["verified"]}
+        self._say(Message("renewed", {"resources": new}))
+        self._say(Message("verified", {"agrees": agrees, "text": said}))
+
+    def _explain(self, _: protocol.Explain) -> None:
+        with self._lock:
+            assert self._session is not None
+            moment = self._session.moment()
+        said, beyond = moment.beyond()
+        with self._lock:
+            self.pictures.put("beyond", beyond)
+            new = {"beyond": self.pictures.generations["beyond"]}
+        self._say(Message("renewed", {"resources": new}))
+        self._say(Message("explained", {"sentences": said}))

@@ -1,0 +1,76 @@
+"""What a page is told of an answer: short sentences, and of each light what people go by."""
+
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
+from lightpaint.colour.photometry import photometry
+from lightpaint.lighting.analysis.analyse import Analysis
+from lightpaint.report.sentences import spoken_errors, what_holds
+from lightpaint.report.verdict import headline
+
+#: Distance from Planck's locus up to which a colour is called white, and part of the present light
+#: under which one is off.
+WHITE, OFF = 0.02, 1e-4
+
+
+def light_fields(light: BasisLight) -> dict[str, Any]:
+    """Of a light, what does not change."""
+    members = list(light.members)
+    return {
+        "name": light.name,
+        "label": light.name,
+        "unit": light.unit,
+        "parameter": light.parameter,
+        "plugin": light.plugin,
+        "form": light.form,
+        "members": members,
+        "group": light.name if len(members) > 1 else None,
+        "present": list(light.emission),
+        "is_fixed": light.is_fixed,
+        "is_scalar": light.is_scalar,
+    }
+
+
+def lights_fields(basis: Basis, weights: Doubles) -> list[dict[str, Any]]:
+    """Of each light as it is answered: emission, change, colour, part of the picture."""
+    lit = (basis.totals * weights) @ LUMINANCE
+    whole = float(lit.sum())
+    return [
+        _light(light, weight, float(lit[k]) / whole if whole > 0 else 0.0)
+        for k, (light, weight) in enumerate(zip(basis.lights, weights, strict=True))
+    ]
+
+
+def _light(light: BasisLight, weight: Doubles, share: float) -> dict[str, Any]:
+    seen = photometry(as_rgb(weight), unit=light.unit)
+    now, then = (float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight))
+    is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
+    return {
+        "emission": [float(x) for x in weight],
+        "stops": float(np.log2(then / now)) if now > 0 and then > OFF * now else None,
+        "kelvin": seen.kelvin if is_white else None,
+        "swatch": seen.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
+        "is_on": then > OFF * now,
+        "share": share,
+    }
+
+
+def analysis_fields(analysis: Analysis) -> dict[str, Any]:
+    """The headline, what holds the lights, and of each light how sure it is and whether held."""
+    solution, seen = analysis.solution, analysis.seen
+    errors = spoken_errors(analysis.uncertainty, len(solution.basis.names))
+    settings = solution.lighting.lights
+    return {
+        "headline": headline(seen),
+        "delta_e": seen.delta_e,
+        "delta_e_asked": seen.asked,
+        "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],
+        "of_lights": [
+            {"error": error, "held": its.is_active, "unreached": not any(its.reached)}
+            for error, its in zip(errors, settings, strict=True)
+        ],
+    }

@@ -1,0 +1,119 @@
+"""What is asked in a session beside the paint: of single lights, of dimmers, of the answer."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from shlex import quote
+from typing import Any
+
+from lightpaint.basis.basis import BasisLight
+from lightpaint.errors import PaintError
+from lightpaint.lighting.constraints.addressing import asked_of_each, tied_lights
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.settings import Settings
+
+#: What may be asked of the answer: of its fit, and of all lights together.
+OF_FIT, OF_ALL = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """Plain values all, as JSON has them.
+
+    lights: by name of light, keys and values as of a lights file. ties: names that are on one
+    dimmer. values: of OF_FIT and OF_ALL, what is not as it follows from the painting.
+    """
+
+    lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    ties: tuple[tuple[str, ...], ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> "Wishes":
+        """From what `as_json` made."""
+        ties = tuple(tuple(names) for names in data.get("ties", ()))
+        return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})))
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        lights = {name: dict(asked) for name, asked in self.lights.items()}
+        return {"lights": lights, "ties": [list(x) for x in self.ties], "values": dict(self.values)}
+
+    def of_light(self, name: str, asked: Mapping[str, Any]) -> "Wishes":
+        """With this asked of one light, and nothing else of it."""
+        lights = {key: value for key, value in self.lights.items() if key != name}
+        return replace(self, lights=lights | ({name: dict(asked)} if asked else {}))
+
+    def of_answer(self, values: Mapping[str, Any]) -> "Wishes":
+        """With these values, None for what follows from the painting. Raises PaintError."""
+        if unknown := [key for key in values if key not in (*OF_FIT, *OF_ALL)]:
+            raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
+        kept = {k: v for k, v in ({**self.values, **values}).items() if v not in (None, False)}
+        return replace(self, values=kept)
+
+    @classmethod
+    def asking(
+        cls, constraints: Constraints, lights: Sequence[BasisLight], values: Mapping[str, Any]
+    ) -> "Wishes":
+        """What constraints ask of these lights, patterns spelled out; of `values` what is OF_FIT.
+
+        Raises ConstraintError for lights that there are none of, PaintError for what a session has
+        no place for.
+        """
+        each = zip(lights, asked_of_each(constraints, lights), strict=True)
+        asked = {light.name: its for light, (its, _) in each if its}
+        ties = {id(tie): (tie, its) for tie, its in tied_lights(constraints, lights).values()}
+        for tie, _ in ties.values():
+            if tie.color is not None:
+                raise PaintError(f"{tie.where}: ask for the colour of each light; ties have none")
+        names = tuple(tuple(lights[k].name for k in its) for _, its in ties.values())
+        kept = {key: value for key, value in values.items() if key in OF_FIT}
+        together = {key: getattr(constraints, key) for key in OF_ALL}
+        return cls(asked, names, kept).of_answer({k: v for k, v in together.items() if v})
+
+    def constraints(self) -> Constraints:
+        """What is asked of the lights. Raises ConstraintError for what means nothing."""
+        together = {key: self.values[key] for key in OF_ALL if key in self.values}
+        return Constraints.of(self.lights, tie=self.ties, **together)
+
+    def settings(self, given: Settings) -> Settings:
+        """`given`, of whose answer this is asked. Raises LightpaintError for what is no value."""
+        asked = {key: self.values[key] for key in OF_FIT if key in self.values}
+        if "hold" in asked and given.unpainted:
+            asked["unpainted"] = 0.0
+        return replace(given, **asked)
+
+    def options(self) -> list[str]:
+        """The same as options of `lightpaint solve`."""
+        made = []
+        for name, asked in self.lights.items():
+            made += [option for key in asked for option in _options(name, key, asked)]
+        for names in self.ties:
+            made.append(f"--tie {quote(','.join(names))}")
+        for key, value in self.values.items():
+            option = f"--{key.replace('_', '-')}"
+            made.append(option if value is True else f"{option} {value}")
+        return made
+
+
+def _options(name: str, key: str, asked: Mapping[str, Any]) -> list[str]:
+    """One of the keys asked of a light, as options; duv goes with its kelvin."""
+    value = asked[key]
+    if key in ("off", "lock") and value is True:
+        return [f"--{key} {quote(name)}"]
+    if key == "limits":
+        ends = ":".join("" if end not in value else _said(value[end]) for end in ("min", "max"))
+        return [f"--limit {quote(f'{name}={ends}')}"]
+    if key == "kelvin":
+        duv = f",duv={asked['duv']:g}" if "duv" in asked else ""
+        kelvin = ":".join(map(_said, value)) if isinstance(value, list | tuple) else _said(value)
+        return [f"--kelvin {quote(f'{name}={kelvin}{duv}')}"]
+    if key == "duv":
+        return []
+    return [f"--{key} {quote(f'{name}={_said(value)}')}"]
+
+
+def _said(value: Any) -> str:
+    """A value of a lights file as an option has it, to its last digit."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ",".join(map(_said, value))
+    return repr(float(value)) if isinstance(value, int | float) else str(value)

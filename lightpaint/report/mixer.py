@@ -1,0 +1,208 @@
+"""The light mixer of a page: its lights by hand, with no server behind it.
+
+The mix is what the painter's own browser modules make of planes that stand in the page, one for
+each light that matters, small and compact; what is left is one more. A page that is sent by mail is
+a mixer in any browser, offline.
+"""
+
+import base64
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.browser import bundled, styles
+from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.lattice import curve_of, lattice_of
+from lightpaint.colour.photometry import photometry
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import block_mean
+from lightpaint.images.compact import Compact, compact
+from lightpaint.images.denoise import denoised
+from lightpaint.lighting.file import lighting_fields
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import ALL_REACHED
+from lightpaint.report.figures import ENOUGH, data_uri
+from lightpaint.report.measures import that_do_most
+
+#: Pixels of a plane from left to right, and of all planes together, at most.
+WIDEST, MOST_PIXELS = 480, 1_000_000
+
+#: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
+#: locus up to which a colour is one.
+COOLEST, WARMEST, STEPS, WHITE = 15000.0, 1500.0, 41, 0.02
+
+#: Points of the table of a transform: as a curve, as each side of a lattice; its ends in stops.
+CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
+
+#: What stands above it.
+ABOUT = (
+    "Every light by hand, from the answer on. Stops count from the light as it is in the scene; "
+    "S shows a light alone, M all others."
+)
+
+
+def mixer_html(
+    basis: Basis,
+    lighting: Lighting,
+    painting: Floats | None = None,
+    *,
+    transform: ViewTransform | None = None,
+    is_clean: bool = False,
+    scene: str | None = None,
+    title: str = "Light mixer",
+) -> str:
+    """A section of HTML; a page with any of them needs `mixer_assets` after the last.
+
+    Args:
+        basis: What the lights do.
+        lighting: The answer, which it starts from.
+        painting: (h, w, 3) display values, to be wiped over the mix.
+        transform: What the mix is seen through.
+        is_clean: Whether planes are denoised.
+        scene: For the command line; None where there is no scene to relight.
+        title: Heading.
+    """
+    shown = that_do_most(basis, lighting)
+    pictures = _pictures(basis, lighting, shown, is_clean=is_clean)
+    transform = transform or ViewTransform()
+    data = {
+        "size": list(pictures[0].shape[:2]),
+        "planes": [_written(compact(picture)) for picture in pictures],
+        "lights": [_light(basis, lighting, k) for k in shown],
+        "rest": _rest(basis, lighting, shown),
+        "kelvins": _kelvins(),
+        "transform": _transform(transform),
+        "painting": None if painting is None else _painting(painting, basis, len(pictures)),
+        "lighting": _file(lighting),
+        "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
+    }
+    # In a script nothing is escaped, and only `<` can end it.
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = text.replace("<", "\\u003c")
+    return (
+        f'<section class="mixer" hidden><h2>{title}</h2><p>{ABOUT}</p>'
+        f'<script type="application/json">{text}</script></section>'
+    )
+
+
+def mixer_assets() -> str:
+    """Style and script of all mixers of a page."""
+    style, script = styles("mixer.css"), bundled("mixer.js")
+    return f'<style>\n{style}</style><script type="module">\n{script}</script>'
+
+
+def _factor(basis: Basis, count: int) -> int:
+    """Side of the blocks of pixels that one of a plane stands for."""
+    height, width = basis.size
+    factor = max(1, -(-width // WIDEST))
+    while count * (height // factor) * (width // factor) > MOST_PIXELS and factor < min(
+        height, width
+    ):
+        factor += 1
+    return min(factor, height, width)
+
+
+def _pictures(basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool) -> list[Floats]:
+    """Of each light its plane; then all others, as they are in the answer and at present."""
+    rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
+    factor = _factor(basis, len(shown) + 2 * bool(rest.size))
+    planes = [basis.images[k] for k in shown]
+    for weights in (lighting.weights_for(basis), basis.present_weights) if rest.size else ():
+        its = np.zeros_like(weights)
+        its[rest] = weights[rest]
+        planes.append(mix(basis.images, its))
+    small = [np.asarray(block_mean(plane, factor), np.float32) for plane in planes]
+    if not is_clean or factor >= ENOUGH:
+        return small
+    features = basis.features and basis.features.reduced(factor)
+    return [denoised(plane, features) for plane in small]
+
+
+def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:
+    light = basis.lights[k]
+    looks = {"present": light.emission, "answer": lighting[light.name].emission}
+    return {
+        "name": light.name,
+        "unit": light.unit,
+        "isFixed": light.is_fixed,
+        "isScalar": light.is_scalar,
+        **{look: [float(x) for x in emission] for look, emission in looks.items()},
+        "kelvin": {look: _kelvin(emission, light.unit) for look, emission in looks.items()},
+    }
+
+
+def _kelvin(emission: Any, unit: str) -> float | None:
+    seen = photometry(emission, unit=unit)
+    is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
+    return seen.kelvin if is_white else None
+
+
+def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | None:
+    rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
+    if not rest.size:
+        return None
+
+    def by_name(weights: Doubles) -> dict[str, list[float]]:
+        return {basis.names[k]: weights[k].tolist() for k in rest if not basis.is_fixed[k]}
+
+    return {
+        "label": f"{len(rest)} more lights together",
+        "answer": by_name(lighting.weights_for(basis)),
+        "present": by_name(basis.present_weights),
+    }
+
+
+def _kelvins() -> list[Any]:
+    mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
+    return [
+        [float(1e6 / mired), [round(float(x), 6) for x in kelvin_to_rgb(float(1e6 / mired))]]
+        for mired in mireds
+    ]
+
+
+def _transform(transform: ViewTransform) -> dict[str, Any]:
+    """A transform for the page: sRGB it knows; else a curve, or where channels mix a lattice."""
+    about: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
+    plain = ViewTransform(transform.name)
+    curve, lattice = None, None
+    if transform.name != "srgb" and transform.is_per_channel:
+        curve = [round(float(x), 5) for x in curve_of(plain, CURVE, LOW, HIGH)]
+    elif transform.name != "srgb":
+        table = lattice_of(plain, SIDE, LOW, HIGH).reshape(SIDE * SIDE, SIDE, 3)
+        lattice = _written(compact(table, dropped=1))
+    return {**about, "curve": curve, "lattice": lattice}
+
+
+def _painting(painting: Floats, basis: Basis, count: int) -> str:
+    small = block_mean(np.asarray(painting, np.float32), _factor(basis, count))
+    return data_uri(to_8_bit(np.clip(small, 0, 1)))
+
+
+def _written(its: Compact) -> dict[str, Any]:
+    data = "data:;base64," + base64.b64encode(its.data).decode("ascii")
+    return {"data": data, "scale": its.scale, "dropped": its.dropped, "size": list(its.size)}
+
+
+def _file(lighting: Lighting) -> dict[str, Any]:
+    """The answer's file without what is said of the answer alone."""
+    lights = tuple(
+        replace(
+            light,
+            constraint="",
+            is_active=False,
+            reached=ALL_REACHED,
+            standard_error=None,
+            interval=None,
+        )
+        for light in lighting.lights
+    )
+    target = f"{lighting.target}-mix" if lighting.target else "mix"
+    data = lighting_fields(replace(lighting, lights=lights, certificate=None, target=target))
+    for light in data["lights"].values():
+        light.pop("photometry", None)
+    return data

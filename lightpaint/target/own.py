@@ -1,0 +1,59 @@
+"""Our own file of a painting: its light, its importance, and how it was painted.
+
+An EXR says nothing of a display, and of what is not painted only that it does not count. A
+painting that was made here says both, so that it is answered as it was when it was painted.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.errors import TargetError
+from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.records import fields_of, read_record, strict_json
+from lightpaint.target.target import Target
+
+#: Text attribute of the EXR.
+KEY = "lightpaint.painting"
+
+FORMAT: Literal["lightpaint-painting 1"] = "lightpaint-painting 1"
+
+
+@dataclass(frozen=True)
+class Painted:
+    """How a target was painted, as of `Target`. view, stops: the transform; "" for none."""
+
+    format: Literal["lightpaint-painting 1"] = FORMAT
+    over_look: bool = False
+    through_view: bool = False
+    view: str = ""
+    stops: float = 0.0
+
+    @property
+    def transform(self) -> ViewTransform | None:
+        """What it was seen through."""
+        return ViewTransform(self.view, self.stops) if self.view else None
+
+
+def write_painting(path: Path, target: Target) -> None:
+    """Write a target as an EXR, from which `read_target` reads the same, to the last bit."""
+    seen = target.transform
+    name, stops = ("", 0.0) if seen is None else (seen.name, seen.stops)
+    painted = Painted(FORMAT, target.over_look, target.through_view, name, stops)
+    channels = rgb_channels(target.image) | {"W": target.importance.astype(np.float32)}
+    write_parts(path, [Part("rgb", channels, {KEY: json.dumps(fields_of(painted))})])
+
+
+def painted_of(attributes: Mapping[str, str], path: Path) -> Painted | None:
+    """How the EXR at `path` was painted; None if it says nothing. Raises TargetError."""
+    if KEY not in attributes:
+        return None
+    try:
+        return read_record(Painted, strict_json(attributes[KEY]))
+    except ValueError as error:
+        raise TargetError(f"{path}: its attribute {KEY} is damaged: {error}") from None

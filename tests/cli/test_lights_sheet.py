@@ -1,0 +1,90 @@
+"""`lightpaint lights` draws what each light does, and never at the cost of the listing."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from command import refused, run
+from PIL import Image
+from renderer import LIGHTS, write_room
+
+from lightpaint import renders
+from lightpaint.images.png import png_says
+from lightpaint.renders import SHEET_KEY
+from lightpaint.scene.variant import use_variant
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    return write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["sky"])
+
+
+def test_the_sheet_is_drawn_and_drawn_anew(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, sheet = room.parent, room.parent / "lights.png"
+    # A cache of its own: another test's basis of this room would do as well.
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(folder / "cache"))
+    first = run(folder, "lights", room)
+    assert first.returncode == 0, first.stderr
+    lines = first.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["light", "bulb", "sky", "lights.png:"]
+    assert "basis:" in first.stderr
+    assert png_says(sheet, SHEET_KEY)
+    with Image.open(sheet) as picture:
+        assert picture.info["lightpaint.denoised"]
+        assert picture.width > picture.height
+    drawn = sheet.read_bytes()
+    # Its own is replaced, from the basis that was kept.
+    again = run(folder, "lights", room)
+    assert again.stdout == first.stdout
+    assert "basis:" not in again.stderr
+    assert sheet.read_bytes() == drawn
+    told = run(folder, "lights", room, "--json", "-o", "other.png")
+    assert json.loads(told.stdout)["sheet"] == "other.png"
+    assert (folder / "other.png").read_bytes() == drawn
+
+    # Somebody else's is not, and is no reason to list nothing.
+    sheet.write_bytes(b"mine")
+    kept = run(folder, "lights", room)
+    assert (kept.returncode, kept.stdout) == (0, "\n".join([*lines[:-1], ""]))
+    assert "no lights.png: lights.png is there, and no sheet of lights" in kept.stderr
+    assert "choose another name with -o, or pass --force" in kept.stderr
+    assert sheet.read_bytes() == b"mine"
+    assert "no sheet of lights" in refused(folder, "lights", room, "-o", "lights.png")
+    assert run(folder, "lights", room, "--force").returncode == 0
+    assert sheet.read_bytes() == drawn
+
+
+def test_only_where_it_is_wanted(room: Path) -> None:
+    for how in ("--no-sheet", "--json"):
+        done = run(room.parent, "lights", room, how)
+        assert done.returncode == 0
+        assert "sheet" not in done.stdout
+    assert [path.name for path in room.parent.iterdir()] == ["room.xml"]
+    assert "must end in .png" in refused(room.parent, "lights", room, "-o", "a.jpg")
+    (room.parent / "link.png").symlink_to(room)
+    assert "is read by this command" in refused(room.parent, "lights", room, "-o", "link.png")
+    assert "not allowed with" in refused(room.parent, "lights", room, "-o", "a.png", "--no-sheet")
+
+
+def test_where_rendering_is_slow_the_list_is_all(
+    room: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow = replace(use_variant(), note="rendering is slow here")
+    monkeypatch.setattr(renders, "use_variant", lambda: slow)
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
+    done = run(room.parent, "lights", room)
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 3
+    assert done.stderr == "lightpaint: no lights.png: rendering is slow here\n"
+
+
+def test_a_render_for_each_light_is_not_made_just_to_look(
+    room: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(renders, "why_not_one_pass", lambda _scene: "fog")
+    monkeypatch.setattr(renders, "FEW_RENDERS", 1)
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
+    done = run(room.parent, "lights", room)
+    assert "no lights.png: fog, so that each light takes a render of its own" in done.stderr
+    assert not (room.parent / "lights.png").exists()

@@ -1,0 +1,246 @@
+"""`lightpaint paint`: what it paints, where it says the page is, and how it ends."""
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import urllib.request
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import refused
+from light_groups import interleaved, pictures
+from websockets.exceptions import ConnectionClosedError
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from lightpaint.basis.file import write_basis
+from lightpaint.cli.options import painted_of, settings_of, values_of
+from lightpaint.cli.parser import command_parser
+from lightpaint.paint.launch import subject_of
+from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
+from lightpaint.paint.steps import Identity, Step
+from lightpaint.paint.store import Store
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_basis: Any) -> Path:
+    """A folder with light groups, a scene and a basis."""
+    monkeypatch.chdir(tmp_path)
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
+    interleaved(tmp_path / "groups.exr", layers)
+    (tmp_path / "scene.xml").write_text("<scene/>")
+    write_basis(tmp_path / "room.basis.exr", make_basis(2))
+    return tmp_path
+
+
+def asked(line: str) -> dict[str, Any]:
+    """What the command is called with."""
+    given = ["paint", *line.split()]
+    return values_of(command_parser().parse_args(given), given)
+
+
+@pytest.mark.parametrize(
+    ("line", "kind", "path", "folder"),
+    [
+        ("scene.xml", SceneFile, "scene.xml", "scene.paint"),
+        ("scene.xml --lights a,b", SceneFile, "scene.xml", "scene.paint"),
+        ("room.basis.exr", BasisFile, "room.basis.exr", "room.paint"),
+        ("groups.exr", GroupsFile, "groups.exr", "groups.paint"),
+        ("--lights groups.exr", GroupsFile, "groups.exr", "groups.paint"),
+        ("--lights groups.exr -o other", GroupsFile, "groups.exr", "other"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_what_is_painted_and_where_it_is_kept(
+    line: str, kind: type, path: str, folder: str
+) -> None:
+    values = asked(line)
+    assert type(values["source"]) is kind
+    assert values["source"].path == path
+    assert values["folder"] == Path(folder)
+
+
+@pytest.mark.usefixtures("here")
+def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> None:
+    line = "--new scene.xml -q --spp 8 --lock a=40% --port 0 -s 1 --no-browser --hold 0.5 -o x"
+    values = asked(f"{line} --group g=a,b* --view agx --host 127.0.0.1")
+    words = ("--spp=8", "--lock=a=40%", "-s", "1", "--hold=0.5", "'--group=g=a,b*'")
+    assert values["options"] == words
+    given = ["solve", "scene.xml", "painting.exr", *shlex.split(" ".join(words))]
+    options = command_parser().parse_args(given)
+    assert settings_of(options, given).hold == values["settings"].hold == 0.5
+    assert asked("--lights groups.exr --lock a")["options"] == ("--lock=a",)
+    assert (values["new"], values["port"], values["host"]) == (True, 0, "127.0.0.1")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("", "nothing to paint: give a scene, a basis, or light groups"),
+        ("--lights key,fill", "no such file or folder of light groups: --lights key,fill"),
+        ("scene.xml --lights groups.exr", "at once: give one to paint"),
+        ("room.basis.exr --lights a", "chooses lights of a scene|--lights cannot"),
+        ("room.basis.exr --spp 8", "--spp cannot change a saved basis"),
+        ("groups.exr --seed 3", "--seed cannot be used with groups.exr"),
+        ("room.basis.exr --lock lamp", "lamp"),
+        ("none.basis.exr", "none.basis.exr"),
+        ("room.basis.exr --port 70000", "70000"),
+        ("room.basis.exr -o room.basis.exr", "cannot write"),
+    ],
+)
+def test_what_cannot_be_painted_is_said_in_one_line(here: Path, line: str, said: str) -> None:
+    assert re.search(said, refused(here, "paint", *line.split(), "--no-browser"))
+
+
+@pytest.mark.usefixtures("here")
+def test_a_subject_of_light_groups_knows_them() -> None:
+    subject = subject_of(asked("groups.exr")["source"], Path("x"))
+    assert subject.groups is not None
+    assert subject.basis is subject.groups.basis
+    assert subject.scene is None
+    options = command_parser().parse_args(["paint", "groups.exr"])
+    assert isinstance(painted_of(options), GroupsFile)
+
+
+#: `lightpaint …` where no renderer is installed.
+WITHOUT = """
+import sys
+sys.modules["mitsuba"] = sys.modules["drjit"] = None
+from lightpaint.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@contextmanager
+def painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Popen[str]", str]]:
+    """The process, and the address that it said."""
+    command = [sys.executable, "-c", WITHOUT, "paint", *given, "--no-browser", "--port", "0"]
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    with process:
+        try:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            found = re.search(r"http://\S+", process.stdout.readline())
+            assert found is not None, process.stderr.read()
+            yield process, found[0]
+        finally:
+            process.kill()
+
+
+def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
+    here: Path, make_basis: Any
+) -> None:
+    path = here / "room.paint" / "session.db"
+    with painting(here, "room.basis.exr") as (process, url):
+        assert url.startswith("http://127.0.0.1:")
+        with urllib.request.urlopen(url) as answer:
+            assert "lightpaint_" in answer.headers["set-cookie"]
+        # Another process is told, and leaves it alone.
+        again = refused(here, "paint", "room.basis.exr", "--no-browser", "--port", "0")
+        assert re.search(r"session.db is in use: .* folder \(-o\)$", again)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=60) == 0
+        assert process.stderr is not None
+        said = process.stderr.read()
+        assert "Traceback" not in said
+        assert said.endswith("what was painted is kept in room.paint\n")
+    identity = Identity.of(make_basis(2))
+    with Store.open(path, identity) as store:
+        store.append(Step("stroke", "mine"))
+    with painting(here, "room.basis.exr", "--new") as (process, _):
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=60) == 0
+        assert process.stderr is not None
+        assert "the earlier session is kept as room.paint/session-1.db" in process.stderr.read()
+    with Store.open(path.with_name("session-1.db"), identity) as store:
+        assert [step.label for step in store.steps] == ["mine"]
+
+
+def live(url: str) -> ClientConnection:
+    """The socket of a page that was opened at `url`."""
+    with urllib.request.urlopen(url) as answer:
+        cookie = answer.headers["set-cookie"].partition(";")[0]
+    base = url.partition("/?")[0]
+    headers = {"Cookie": cookie}
+    where = f"{base.replace('http', 'ws')}/live"
+    return connect(where, origin=Origin(base), additional_headers=headers, max_size=None)
+
+
+def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
+    """Say something, and hear the answer to it; to `hello` the state when there is a picture."""
+    arrays = {name: fields.pop(name) for name in ("image", "importance") if name in fields}
+    message = Message(kind, {"seq": seq, **fields}, arrays)
+    socket.send(to_frame(message.content(), message.buffers()))
+    while True:
+        frame = socket.recv(timeout=60)
+        assert isinstance(frame, bytes)
+        content, _ = of_frame(frame)
+        if "size" in content if kind == "hello" else content.get("reply") == seq:
+            return content
+
+
+def greeted(socket: ClientConnection) -> dict[str, Any]:
+    return said(socket, 0, "hello", version=VERSION)
+
+
+def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:
+    pixels = {"image": np.ones((2, 3, 3), np.float32), "importance": np.ones((2, 3), np.float32)}
+    stroke = {"stroke": 1, "region": [0, 2, 0, 3], "done": True, "label": "mine"}
+    with painting(here, "room.basis.exr") as (process, url), live(url) as socket:
+        assert greeted(socket)["history"]["undo"] == []
+        assert said(socket, 1, "paint", **stroke, **pixels)["kind"] == "answer"
+        process.kill()
+        process.wait()
+    with painting(here, "room.basis.exr") as (_, url), live(url) as socket:
+        assert greeted(socket)["history"]["undo"] == ["mine"]
+
+
+def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(here: Path) -> None:
+    with painting(here, "room.basis.exr") as (_, url):
+        with live(url) as socket:
+            greeted(socket)
+            socket.send(bytes(2**20 + 16 * 12 * 10 + 1))
+            with pytest.raises(ConnectionClosedError) as closed:
+                deque(socket, 0)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1009
+        with live(url) as socket:
+            assert greeted(socket)["kind"] == "state"
+            assert socket.protocol.extensions == []  # nothing is compressed
+
+
+def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(here: Path) -> None:
+    with painting(here, "groups.exr", "--host", "127.0.0.1") as (process, url):
+        with urllib.request.urlopen(url):
+            process.send_signal(signal.SIGHUP)
+        assert process.wait(timeout=60) == 0
+        assert process.stderr is not None
+        said = process.stderr.read()
+    assert "whoever has its address, with the token, can paint here" in said
+    assert "Traceback" not in said
+    assert said.endswith("what was painted is kept in groups.paint\n")
+
+
+def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:
+    folder = here / "room.paint"
+    Store.open(folder / "session.db", Identity.of(make_basis(2, (6, 5)))).close()
+    said = refused(here, "paint", "room.basis.exr", "--no-browser")
+    assert "is a session of 5x6 pixels, and scene.xml has 10x12" in said
+    assert "(-o)" in said
+    assert "(--new)" in said

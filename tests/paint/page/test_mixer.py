@@ -1,0 +1,260 @@
+"""The mixer of a report, opened from a disk with the network off: its pixels are Σ w Φ."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.lattice import curve_of, lattice_of
+from lightpaint.images.compact import BRIGHTEST, DROPPED, compact, expanded
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.report.html import SHOWN
+from lightpaint.report.mixer import mixer_assets, mixer_html
+from lightpaint.report.page import report_page
+
+SIZE = (36, 64)
+EVIL = "</script><script>document.title='x'</script>"
+
+
+def lit(make_basis: Any, n: int, **how: Any) -> lp.Basis:
+    """Soft spots of light of whitish colours, over 12 stops."""
+    rng = np.random.default_rng(4)
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    cy, cx = rng.uniform(0, 1, (2, n, 1, 1))
+    away = np.hypot(y - cy, x - 1.7 * cx)
+    images = np.exp(-7 * away)[..., None] * rng.uniform(0.6, 1, (n, 1, 1, 3))
+    emission = rng.uniform(0.5, 1, (n, 3))
+    emission[:, 0] = 1.2
+    return make_basis(images=images, emission=emission, **how)
+
+
+def solved(basis: lp.Basis, **how: Any) -> tuple[lp.Target, lp.Solution]:
+    """The answer to a painting of other weights."""
+    weights = np.random.default_rng(1).uniform(0.1, 1.5, (len(basis.lights), 3))
+    image = basis.mix(weights).astype(np.float32)
+    target = lp.Target("evening", image, np.ones(SIZE, np.float32), everything=True, **how)
+    return target, lp.solve(basis, target)
+
+
+def report(basis: lp.Basis, **how: Any) -> str:
+    """A whole report."""
+    target, solution = solved(basis, **how)
+    predicted = lp.combine(basis, solution.lighting)
+    about: dict[str, Any] = {"target": target, "solution": solution, "predicted": predicted}
+    return report_page(basis=basis, verification=None, command="lightpaint solve", **about)
+
+
+@pytest.fixture
+def opened(browser: Any, tmp_path: Path) -> Any:
+    """Opens a page from a file; whatever goes wrong in it fails the test."""
+    wrong: list[str] = []
+    context = browser.new_context(offline=True, viewport={"width": 1100, "height": 800})
+    page = context.new_page()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
+    page.on("requestfailed", lambda request: wrong.append(request.url))
+
+    def open_(text: str) -> Any:
+        path = tmp_path / "report.html"
+        path.write_text(text, encoding="utf-8")
+        page.goto(path.as_uri())
+        page.locator(".mixer-body").first.wait_for()
+        return page
+
+    yield open_
+    assert wrong == []
+    context.close()
+
+
+def pixels(page: Any) -> Any:
+    """Codes truly on the canvas of the mix, (h, w, 3)."""
+    h, w, flat = page.evaluate(
+        """async () => {
+          for (let k = 0; k < 2; k++) await new Promise(requestAnimationFrame)
+          const canvas = document.querySelector('.mixer-mix')
+          const { width, height } = canvas
+          const data = canvas.getContext('2d').getImageData(0, 0, width, height).data
+          return [height, width, [...data]]
+        }"""
+    )
+    return np.array(flat, np.int16).reshape(h, w, 4)[..., :3]
+
+
+def codes(basis: lp.Basis, weights: Any, transform: lp.ViewTransform) -> Any:
+    """What is to be there."""
+    return to_8_bit(transform.encode(basis.mix(np.asarray(weights)))).astype(np.int16)
+
+
+def shown_through(basis: lp.Basis) -> lp.ViewTransform:
+    """The transform of the report of `report(basis)`."""
+    from lightpaint.report.pictures import transform_of
+
+    target, solution = solved(basis)
+    return transform_of(target, lp.combine(basis, solution.lighting).image, None)
+
+
+def move(page: Any, light: int, slider: int, value: float) -> None:
+    """Move one of a light's sliders."""
+    row = page.locator(".mixer-light").nth(light)
+    row.locator("input[type=range]").nth(slider).evaluate(
+        "(input, value) => { input.value = value; input.dispatchEvent(new Event('input')) }",
+        str(value),
+    )
+
+
+def check(page: Any, expected: Any) -> None:
+    """Within a code of the display, but for what rounding of the planes adds up to."""
+    off = np.abs(pixels(page) - expected)
+    assert off.mean() < 0.5
+    assert off.max() <= 2
+
+
+def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opened: Any) -> None:
+    basis = lit(make_basis, 3)
+    transform, answer = shown_through(basis), solved(basis)[1].weights
+    page = opened(report(basis))
+    check(page, codes(basis, answer, transform))
+    weights = answer.copy()
+    # From the present by stops; the colour stays.
+    y = np.array([0.2126, 0.7152, 0.0722])
+    weights[1] *= 2**1.5 * (basis.present_weights[1] @ y) / (answer[1] @ y)
+    move(page, 1, 0, 1.5)
+    check(page, codes(basis, weights, transform))
+    rows = page.locator(".mixer-light")
+    rows.nth(1).get_by_text("S", exact=True).click()
+    alone = np.where(np.arange(3)[:, None] == 1, weights, 0)
+    check(page, codes(basis, alone, transform))
+    rows.nth(1).get_by_text("S", exact=True).click()
+    rows.nth(0).get_by_text("M", exact=True).click()
+    check(page, codes(basis, np.where(np.arange(3)[:, None] == 0, 0, weights), transform))
+    page.get_by_text("Present", exact=True).click()
+    check(page, codes(basis, basis.present_weights, transform))
+    move(page, 0, 0, -8)
+    dark = basis.present_weights.copy()
+    dark[0] = 0
+    check(page, codes(basis, dark, transform))
+    page.get_by_text("Solved", exact=True).click()
+    check(page, codes(basis, answer, transform))
+
+
+def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, opened: Any) -> None:
+    basis = lit(make_basis, 2)
+    transform, answer = shown_through(basis), solved(basis)[1].weights
+    page = opened(report(basis))
+    move(page, 0, 1, 1e6 / 3000)
+    warm = np.asarray(kelvin_to_rgb(3000.0))
+    weights = answer.copy()
+    weights[0] = warm * (answer[0] @ [0.2126, 0.7152, 0.0722])
+    check(page, codes(basis, weights, transform))
+    assert "3000 K" in page.locator(".mixer-light").nth(0).inner_text()
+
+
+@pytest.mark.parametrize("name", ["filmic", "agx", "linear"])
+def test_through_other_transforms(make_basis: Any, opened: Any, name: str) -> None:
+    basis = lit(make_basis, 3)
+    transform = lp.ViewTransform(name, 0.5)
+    lighting = solved(basis)[1].lighting
+    text = mixer_html(basis, lighting, transform=transform) + mixer_assets()
+    page = opened(f"<!doctype html><body>{text}")
+    off = np.abs(pixels(page) - codes(basis, lighting.weights_for(basis), transform))
+    assert off.mean() < 1
+
+
+def test_what_is_copied_is_read(make_basis: Any, opened: Any, tmp_path: Path) -> None:
+    """Names, whatever they are, are text on the page and in the file."""
+    basis = lit(make_basis, 3, names=(EVIL, 'a "b" <i>', "key"))
+    page = opened(report(basis))
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    assert page.title().startswith("evening")
+    assert [x.inner_text() for x in page.locator(".mixer-name").all()] == list(basis.names)
+    move(page, 2, 0, -1.0)
+    page.get_by_text("Copy as lighting.json").click()
+    page.get_by_text("is on the clipboard").wait_for()
+    (tmp_path / "lighting.json").write_text(page.evaluate("navigator.clipboard.readText()"))
+    lighting = lp.read_lighting(tmp_path / "lighting.json")
+    answer = solved(basis)[1].weights
+    weights = lighting.weights_for(basis)
+    # As the answer has them to the last bit, but for the one that was moved.
+    np.testing.assert_array_equal(weights[:2], answer[:2])
+    level = weights[2] @ [0.2126, 0.7152, 0.0722]
+    now = basis.present_weights[2] @ [0.2126, 0.7152, 0.0722]
+    assert level == pytest.approx(now / 2, rel=1e-9)
+    assert lighting.certificate is None
+    page.get_by_text("Copy command").click()
+    page.get_by_text("The command is on the clipboard").wait_for()
+    copied = page.evaluate("navigator.clipboard.readText()")
+    assert copied == "lightpaint relight scene.xml lighting.json"
+
+
+def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> None:
+    basis = lit(make_basis, 60)
+    transform, answer = shown_through(basis), solved(basis)[1].weights
+    page = opened(report(basis))
+    assert page.locator(".mixer-light").count() == SHOWN + 1
+    check(page, codes(basis, answer, transform))
+    page.get_by_text("Present", exact=True).click()
+    check(page, codes(basis, basis.present_weights, transform))
+    data = json.loads(page.locator(".mixer script").inner_text())
+    assert len(data["rest"]["answer"]) == 60 - SHOWN
+    rest = [basis.names.index(name) for name in data["rest"]["present"]]
+    weights = basis.present_weights.copy()
+    weights[rest] *= 2
+    move(page, SHOWN, 0, 1)
+    check(page, codes(basis, weights, transform))
+
+
+def test_the_wipe(make_basis: Any, opened: Any) -> None:
+    page = opened(report(lit(make_basis, 2)))
+    stage = page.locator(".mixer-stage")
+    box = stage.bounding_box()
+    stage.click(position={"x": 0.25 * box["width"], "y": 20})
+    part = float(stage.evaluate("x => x.style.getPropertyValue('--p')").rstrip("%"))
+    assert part == pytest.approx(25, abs=1)
+
+
+def test_without_scripts_a_report_is_as_it_was(
+    make_basis: Any, browser: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "report.html").write_text(report(lit(make_basis, 2)), encoding="utf-8")
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    assert not page.locator(".mixer").is_visible()
+    assert page.locator("#lights").is_visible()
+    context.close()
+
+
+def test_twelve_lights_of_noise_can_be_mailed(make_basis: Any) -> None:
+    """Independent noise in every pixel is the worst there is to compress."""
+    basis = make_basis(12, (360, 640))
+    page = mixer_html(basis, Lighting.present(basis))
+    assert len(page) + len(mixer_assets()) < 6_000_000
+
+
+@pytest.mark.parametrize("dropped", [0, DROPPED])
+def test_a_compact_picture_is_the_picture(dropped: int) -> None:
+    rng = np.random.default_rng(0)
+    image = np.exp2(rng.uniform(-12, 9, (7, 11, 3))).astype(np.float32)
+    image[2, 3], image[4] = 0, [0, 5, 1e-9]
+    its = compact(image, dropped=dropped)
+    assert its.scale * BRIGHTEST >= image.max()
+    made = expanded(its)
+    # Rounded to the 11 bits of halves, then to those that are left; and there is a least value.
+    rtol = 2.0**-11 + (2.0 ** (dropped - 11) if dropped else 0)
+    np.testing.assert_allclose(made, image, rtol=rtol, atol=its.scale * 2.0**-20)
+    assert not made[2, 3].any()
+
+
+def test_a_lattice_has_what_the_transform_has_at_its_points() -> None:
+    transform = lp.ViewTransform("agx", 1.0)
+    axis = np.r_[0.0, 2.0 ** np.linspace(-4, 2, 4)[1:]]
+    lattice = lattice_of(transform, 4, -4, 2)
+    expected = transform.encode(np.array([axis[3], axis[1], axis[0]]))
+    np.testing.assert_allclose(lattice[3, 1, 0], expected, atol=1e-6)
+    curve = curve_of(lp.ViewTransform("filmic"), 4, -4, 2)
+    np.testing.assert_allclose(curve, lp.ViewTransform("filmic").encode(axis), atol=1e-6)

@@ -1,0 +1,242 @@
+"""Both views show what NumPy mixes and lightpaint encodes, and so the same."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+
+from lightpaint.colour.transform import ViewTransform
+
+N, H, W = 5, 27, 40
+GAP = 4
+#: Half a code of rounding in each of two places, and the steps of tables and lattices.
+CODES = 2
+
+
+@pytest.fixture
+def pictures(site: Any) -> dict[str, np.ndarray]:
+    """Planes as halves with their scales, weights, a painting; on the site, too."""
+    rng = np.random.default_rng(3)
+    shape = np.exp(rng.normal(-3, 1.5, (N, H, W, 3)))
+    scales = rng.uniform(0.5, 8, N)
+    planes = (shape / scales[:, None, None, None]).astype(np.float16)
+    weights = rng.uniform(0, 2, (N, 3))
+    made = {
+        "planes": planes.astype(np.float64) * scales[:, None, None, None],
+        "scales": scales,
+        "weights": weights,
+        "painting": np.exp(rng.normal(-1, 1.5, (H, W, 3))).astype(np.float32),
+        "importance": (rng.random((H, W)) < 0.5).astype(np.float32),
+        "beyond": rng.integers(0, 256, (H, W)).astype(np.uint8),
+    }
+    site.arrays |= {f"plane/{k}": plane for k, plane in enumerate(planes)}
+    site.arrays |= {name: made[name] for name in ("weights", "painting", "importance", "beyond")}
+    return made
+
+
+def shown(
+    page: Any, which: str, pictures: dict[str, Any], params: Any = None, lut: Any = None
+) -> np.ndarray:
+    """Codes of the left and the right picture, pixel by pixel, (2, H, W, 3)."""
+    asked = {"count": N, "scales": pictures["scales"].tolist(), "lut": lut}
+    asked |= {"width": 2 * W + GAP, "height": H}
+    got = page.evaluate("([which, asked]) => bench.viewOf(which, asked)", [which, asked])
+    assert got == which
+    rgba = page.evaluate("(params) => bench.shown(params)", params or {})
+    codes = np.reshape(rgba, (H, 2 * W + GAP, 4))[..., :3]
+    return np.stack([codes[:, :W], codes[:, W + GAP :]])
+
+
+def mixed(pictures: dict[str, np.ndarray]) -> np.ndarray:
+    return np.einsum("khwc,kc->hwc", pictures["planes"], pictures["weights"])
+
+
+def codes(light: np.ndarray, name: str = "srgb", stops: float = 0.0) -> np.ndarray:
+    return np.round(ViewTransform(name, stops).encode(light) * 255)
+
+
+def lattice(name: str, side: int, low: float, high: float) -> np.ndarray:
+    """Display values over log2 of light, as the session makes it."""
+    light = 2 ** np.linspace(low, high, side)
+    light[0] = 0
+    axes = np.stack(np.meshgrid(light, light, light, indexing="ij"), axis=-1)
+    return ViewTransform(name).encode(axes).astype(np.float16)
+
+
+def interpolated(lut: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Codes by a lattice, as SciPy has them."""
+    axis = np.linspace(-14, 6, len(lut))
+    between = RegularGridInterpolator((axis, axis, axis), lut.astype(np.float64))
+    return np.round(255 * between(np.clip(np.log2(light), -14, 6)))
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+@pytest.mark.parametrize("stops", [0.0, -2.3])
+def test_both_pictures_are_shown_in_srgb(page: Any, pictures: Any, which: str, stops: float):
+    left, right = shown(page, which, pictures, {"stops": stops})
+    assert np.abs(left - codes(pictures["painting"], stops=stops)).max() <= 1
+    assert np.abs(right - codes(mixed(pictures), stops=stops)).max() <= 1
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+@pytest.mark.parametrize("name", ["agx", "filmic"])
+def test_view_transforms_are_those_of_the_library(
+    page: Any, site: Any, pictures: Any, which: str, name: str
+):
+    lut = {"name": name, "side": 48, "low": -14.0, "high": 6.0}
+    site.arrays["lut"] = lattice(name, 48, -14, 6)
+    for got, light in zip(
+        shown(page, which, pictures, {"stops": 0.7}, lut),
+        (pictures["painting"], mixed(pictures)),
+        strict=True,
+    ):
+        assert np.abs(got - interpolated(site.arrays["lut"], light * 2**0.7)).max() <= CODES
+        # Between its points a lattice is straight, which the transform is not.
+        assert np.abs(got - codes(light, name, 0.7)).mean() < 0.5
+
+
+@pytest.mark.parametrize("overlay", [None, "missed", "beyond", "importance", "falsecolor"])
+def test_views_agree(page: Any, pictures: Any, overlay: str | None):
+    params = {"overlay": overlay, "stops": 0.4}
+    one, other = (shown(page, which, pictures, params) for which in ("cpu", "gl"))
+    off = np.abs(one - other).max(axis=-1)
+    # On the border of two bands of false colour, or of too dark and too bright, they may differ.
+    assert (off <= 1).mean() > 0.99
+    if overlay:
+        plain = shown(page, "cpu", pictures, {"stops": 0.4})
+        changed = [bool((one[k] != plain[k]).any()) for k in (0, 1)]
+        assert changed == [overlay in ("importance", "falsecolor"), overlay != "importance"]
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+def test_wipe_blink_and_zoom(page: Any, pictures: Any, which: str):
+    shown(page, which, pictures)
+    painting, solution = codes(pictures["painting"]), codes(mixed(pictures))
+    width = 2 * W + GAP
+
+    def whole(params: Any) -> np.ndarray:
+        rgba = page.evaluate("(params) => bench.shown(params)", params)
+        return np.reshape(rgba, (H, width, 4))[..., :3]
+
+    at = (width - W) // 2  # one picture in the middle
+    blinked = whole({"layout": "blink", "blink": "left"})[:, at : at + W]
+    assert np.abs(blinked - painting).max() <= 1
+    wiped = whole({"layout": "wipe", "wipe": 0.5})[:, at : at + W]
+    half = width // 2 - at
+    assert np.abs(wiped[:, :half] - painting[:, :half]).max() <= 1
+    assert np.abs(wiped[:, half:] - solution[:, half:]).max() <= 1
+    # Three times as large around pixel (12, 10): single pixels are squares.
+    pan = [12.5 - W / 2, 10.5 - H / 2]
+    near = whole({"layout": "blink", "blink": "right", "zoom": 3, "pan": pan})
+    middle = near[H // 2, width // 2]
+    assert np.abs(middle - solution[10, 12]).max() <= 1
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+def test_light_at_a_pixel_is_light(page: Any, pictures: Any, which: str):
+    shown(page, which, pictures, {"stops": 3})
+    planes = page.evaluate("() => Array.from(view.planesAt(7, 9))")
+    want = pictures["planes"][:, 9, 7]
+    # Halves times a scale, in float32.
+    np.testing.assert_allclose(np.reshape(planes, (N, 3)), want, rtol=1e-6)
+    solution = page.evaluate("() => view.lightAt('solution', 7, 9)")
+    np.testing.assert_allclose(solution, mixed(pictures)[9, 7], rtol=1e-6)
+    painting = page.evaluate("() => view.lightAt('painting', 7, 9)")
+    np.testing.assert_array_equal(painting, pictures["painting"][9, 7].astype(float))
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+def test_a_region_of_the_painting_changes_alone(page: Any, pictures: Any, which: str):
+    shown(page, which, pictures)
+    rgba = page.evaluate(
+        """([H, W]) => {
+            const image = new Float32Array(3 * H * W).fill(1), full = new Float32Array(H * W);
+            view.setCanvas([0, H, 0, W], image, full);
+            bench.shown({});
+            image.fill(0.25);
+            view.setCanvas([5, 9, 3, 20], image, full);
+            return bench.shown({});
+        }""",
+        [H, W],
+    )
+    left = np.reshape(rgba, (H, 2 * W + GAP, 4))[:, :W, 0]
+    want = np.full((H, W), 255)
+    want[5:9, 3:20] = codes(np.array(0.25))
+    np.testing.assert_array_equal(left, want)
+
+
+def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
+    shown(page, "cpu", pictures)
+    differences = page.evaluate(
+        """() => {
+            const weights = Array.from(view.mixes.solution.weights);
+            bench.shown({ live: true });
+            for (let k = 0; k < 20; k++) {
+                weights[3] = k / 10;
+                view.setWeights(weights);
+                bench.shown({ live: true });
+            }
+            const carried = view.mixes.solution.light.slice();
+            bench.shown({});
+            const { light } = view.mixes.solution;
+            return Array.from(light, (x, i) => Math.abs(carried[i] - x) / (1e-3 + x));
+        }"""
+    )
+    assert max(differences) < 1e-4  # 20 sums in float32
+
+
+def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
+    shown(page, "cpu", pictures)
+    light = page.evaluate(
+        "() => { view.pace = 1e9; bench.shown({ live: true }); "
+        "return [Array.from(view.mixes.solution.light), view.step] }"
+    )
+    assert light[1] == 2
+    half = np.reshape(light[0], ((H + 1) // 2, W // 2, 3))
+    np.testing.assert_allclose(half, mixed(pictures)[::2, ::2], rtol=1e-5)  # float32
+    step = page.evaluate("() => { bench.shown({}); return view.step }")
+    assert step == 1
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+def test_bright_halves_spread_nothing(page: Any, site: Any, pictures: Any, which: str):
+    plane = site.arrays["plane/0"].copy()
+    plane[0, 0], plane[0, 1] = np.inf, np.nan
+    site.arrays["plane/0"] = plane
+    site.arrays["weights"] = np.zeros((N, 3))
+    _, right = shown(page, which, pictures)
+    np.testing.assert_array_equal(right, 0)  # and no Inf · 0
+    site.arrays["weights"] = np.ones((N, 3))
+    _, right = shown(page, which, pictures)
+    np.testing.assert_array_equal(right[0, 0], 255)
+    rest = mixed(pictures | {"weights": np.ones((N, 3))})[1:]
+    assert np.abs(right[1:] - codes(rest)).max() <= 1
+
+
+def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
+    shown(page, "gl", pictures)
+    lost = page.evaluate(
+        """async () => {
+            const away = view.gl.getExtension("WEBGL_lose_context");
+            away.loseContext();
+            await new Promise((done) => setTimeout(done, 50));
+            const lost = view.lost();
+            const back = new Promise((done) =>
+                view.canvas.addEventListener("webglcontextrestored", done, { once: true }));
+            away.restoreContext();
+            await back;
+            return [lost, view.lost(), view.planes.count];
+        }"""
+    )
+    assert lost == [True, False, 0]
+
+
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, which: str):
+    shown(page, which, pictures)
+    planes = {"cpu": 6, "gl": 8}[which] * N * H * W
+    rest = page.evaluate("() => view.memory()") - planes
+    rows = 8 * 2**18 if which == "gl" else 0  # on their way to the GPU
+    # Mix and two canvases of codes, or their textures; painting and codes; nothing by the light.
+    assert 0 < rest <= 40 * H * W + rows + 8 * (2 * W + GAP) * H

@@ -1,0 +1,187 @@
+"""Messages of page and session: round trips, and junk that is refused in one line."""
+
+import json
+import struct
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from lightpaint.errors import PaintError
+from lightpaint.paint.protocol import (
+    DTYPES,
+    KINDS,
+    MAX_TEXT,
+    Message,
+    Paint,
+    Set,
+    TakeOver,
+    Tie,
+    of_frame,
+    said_of,
+    to_frame,
+)
+
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | TEXTS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3),
+    max_leaves=8,
+)
+FIELDS = st.dictionaries(TEXTS.filter(lambda x: x not in ("kind", "reply", "buffers")), PLAIN)
+ARRAYS = st.dictionaries(
+    st.sampled_from(["image", "importance", "weights"]),
+    st.sampled_from(sorted(DTYPES)).flatmap(
+        lambda dtype: arrays.arrays(dtype, arrays.array_shapes(min_dims=0, max_dims=3, min_side=0))
+    ),
+    max_size=3,
+)
+#: As long as they are, paint arrays are finite; what a page may say of pixels is the session's.
+FINITE = arrays.arrays(
+    "float32", (2, 3, 3), elements=st.floats(-1e9, 1e9, width=32, allow_nan=False)
+)
+
+
+@given(FIELDS, ARRAYS, st.none() | st.integers(0, 2**53))
+def test_what_a_session_says_arrives(fields: Any, given_arrays: Any, reply: int | None) -> None:
+    message = Message("say", fields, given_arrays)
+    frame = to_frame(message.content(reply), message.buffers())
+    content, buffers = of_frame(frame)
+    assert content.pop("kind") == "say"
+    assert content.pop("reply", None) == reply
+    described = content.pop("buffers")
+    assert content == json.loads(json.dumps(_finite(fields)))
+    assert len(frame) % 8 == 0
+    for (name, array), about, buffer in zip(given_arrays.items(), described, buffers, strict=True):
+        assert (about["name"], about["shape"]) == (name, list(array.shape))
+        got = np.frombuffer(buffer, DTYPES[about["dtype"]]).reshape(array.shape)
+        np.testing.assert_array_equal(got, array)
+        assert got.dtype.name == array.dtype.name
+
+
+def _finite(value: Any) -> Any:
+    """NaN and Inf have no word in JSON."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+@given(st.integers(0, 2**53 - 1), FINITE, st.integers(0, 100), st.booleans())
+def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, done: bool) -> None:
+    fields = {"seq": seq, "stroke": stroke, "region": [1, 3, 0, 3], "done": done}
+    message = Message("paint", fields, {"image": image, "importance": image[..., 0]})
+    number, said, got = said_of(*of_frame(to_frame(message.content(), message.buffers())))
+    assert number == seq
+    assert said == Paint(stroke, (1, 3, 0, 3), done)
+    assert got["image"].tobytes() == image.tobytes()
+    assert not got["importance"].flags.writeable
+
+
+def test_what_is_said_is_read_as_it_is_meant() -> None:
+    for kind, fields, meant in (
+        ("take_over", {}, TakeOver()),
+        ("tie", {"ties": [["a", "b"], []]}, Tie((("a", "b"), ()))),
+        (
+            "set",
+            {"values": {"hold": None, "space": "display"}},
+            Set({"hold": None, "space": "display"}),
+        ),
+    ):
+        assert said_of({"kind": kind, "seq": 0, **fields}, [])[1] == meant
+    assert all(kind.__name__.lower() == name.replace("_", "") for name, kind in KINDS.items())
+
+
+def _refused(frame: bytes) -> None:
+    with suppress(PaintError):
+        said_of(*of_frame(frame))
+
+
+@given(st.binary(max_size=300))
+def test_noise_is_refused(noise: bytes) -> None:
+    _refused(noise)
+    _refused(struct.pack("<I", max(0, len(noise) - 4)) + noise)
+
+
+@given(PLAIN)
+def test_any_json_is_refused_or_read(content: Any) -> None:
+    _refused(to_frame(_finite(content), []))
+
+
+@given(
+    st.fixed_dictionaries(
+        {"kind": st.sampled_from([*KINDS, "x"]), "seq": st.just(1) | PLAIN},
+        optional={
+            "buffers": st.lists(
+                st.fixed_dictionaries(
+                    {},
+                    optional={
+                        "name": TEXTS | PLAIN,
+                        "dtype": st.sampled_from(sorted(DTYPES)) | PLAIN,
+                        "shape": st.lists(st.integers(-2, 2**17), max_size=5) | PLAIN,
+                    },
+                ),
+                max_size=3,
+            )
+            | PLAIN,
+            "stroke": PLAIN,
+            "region": st.lists(st.integers(-1, 5), max_size=5) | PLAIN,
+            "version": PLAIN,
+            "values": PLAIN,
+            "ties": PLAIN,
+            "what": PLAIN,
+        },
+    ),
+    st.binary(max_size=64),
+)
+def test_nearly_right_messages_are_refused_or_read(content: Any, rest: bytes) -> None:
+    _refused(to_frame(_finite(content), []) + rest)
+
+
+@given(FINITE, st.data())
+def test_a_frame_cut_short_is_refused(image: Any, data: Any) -> None:
+    message = Message("paint", {"seq": 1, "stroke": 1, "region": [0, 2, 0, 3]}, {"image": image})
+    frame = to_frame(message.content(), message.buffers())
+    end = data.draw(st.integers(0, len(frame) - 1))
+    with pytest.raises(PaintError):
+        said_of(*of_frame(frame[:end]))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("dtype", ["float16", "float32", "float64"])
+def test_what_is_no_number_is_refused(value: float, dtype: str) -> None:
+    array = np.ones((1, 2, 3), dtype)
+    array[0, 1, 2] = value
+    message = Message("paint", {"seq": 1, "stroke": 1, "region": [0, 1, 0, 2]}, {"image": array})
+    with pytest.raises(PaintError, match="NaN or Inf"):
+        said_of(*of_frame(to_frame(message.content(), message.buffers())))
+
+
+def test_two_buffers_of_one_name_are_refused() -> None:
+    about = {"name": "image", "dtype": "uint8", "shape": [1]}
+    with pytest.raises(PaintError, match="image"):
+        said_of({"kind": "undo", "seq": 1, "buffers": [about, about]}, [b"a", b"b"])
+
+
+def test_lengths_that_nobody_has_are_refused_at_once() -> None:
+    for length in (MAX_TEXT + 1, 2**32 - 1):
+        with pytest.raises(PaintError):
+            of_frame(struct.pack("<I", length) + bytes(16))
+    about = {"name": "image", "dtype": "float64", "shape": [65536] * 4}
+    with pytest.raises(PaintError, match="shorter"):
+        of_frame(to_frame({"kind": "paint", "seq": 1, "buffers": [about]}, []))
+    deep = b"[" * 50_000
+    with pytest.raises(PaintError, match="no JSON"):
+        of_frame(struct.pack("<I", len(deep)) + deep)
+
+
+def test_a_refusal_is_short_whatever_is_refused() -> None:
+    for content in ({"version": "x" * 10**5}, {"version": 1, "x\n" * 10**4: 1}):
+        with pytest.raises(PaintError) as refusal:
+            said_of({"kind": "hello", "seq": 1, **content}, [])
+        assert len(str(refusal.value)) < 500

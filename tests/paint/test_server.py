@@ -1,0 +1,564 @@
+"""The painter's server: who may ask, what strangers and junk are told, who has the session."""
+
+import json
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from posixpath import dirname, join, normpath
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_session import FakeSession
+from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
+from starlette.websockets import WebSocketDisconnect
+
+from lightpaint.errors import PaintError
+from lightpaint.paint import client, line, server
+from lightpaint.paint.guard import Guard
+from lightpaint.paint.line import Line
+from lightpaint.paint.page_files import page_files
+from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
+from lightpaint.paint.server import Server, listening, page_app
+
+PORT = 8421
+HOST = f"127.0.0.1:{PORT}"
+REFUSED = (WebSocketDisconnect, WebSocketDenialResponse)
+HERE = {"origin": f"http://{HOST}"}
+
+
+class Served:
+    """A session behind its guard, and a browser that has not shown its token yet."""
+
+    def __init__(self, folder: Path, **how: Any) -> None:
+        (folder / "engine").mkdir(parents=True)
+        (folder / "index.html").write_text("<!doctype html><title>page</title>", "utf-8")
+        (folder / "engine" / "gl.js").write_text("export {}", "utf-8")
+        (folder / "secret.py").write_text("secret", "utf-8")
+        (folder / ".hidden.js").write_text("secret", "utf-8")
+        self.session, self.said = FakeSession(), list[str]()
+        self.line = Line(self.session, None, self.said.append)
+        self.guard = Guard(page_app(self.line, files=page_files(folder)), port=PORT, **how)
+        self.browser = TestClient(self.guard, base_url=f"http://{HOST}")
+
+    def enter(self) -> None:
+        assert self.browser.get(f"/?token={self.guard.token}").status_code == 200
+
+    def socket(self, page: str = "", **headers: str) -> WebSocketTestSession:
+        return self.browser.websocket_connect(
+            f"ws://{HOST}/live?page={page}", headers={**HERE, **headers}
+        )
+
+
+@pytest.fixture
+def stranger(tmp_path: Path) -> Iterator[Served]:
+    served = Served(tmp_path / "page")
+    with served.browser:
+        yield served
+
+
+@pytest.fixture
+def served(stranger: Served) -> Served:
+    stranger.enter()
+    return stranger
+
+
+def frame(kind: str, seq: int, arrays: dict[str, Any] | None = None, **fields: Any) -> bytes:
+    message = Message(kind, {"seq": seq, **fields}, arrays or {})
+    return to_frame(message.content(), message.buffers())
+
+
+def paint(seq: int, stroke: int = 1, region: tuple[int, ...] = (0, 1, 0, 1), **how: Any) -> bytes:
+    size = region[1] - region[0], region[3] - region[2]
+    arrays = {"image": np.ones((*size, 3), np.float32), "importance": np.ones(size, np.float32)}
+    return frame("paint", seq, arrays, stroke=stroke, region=list(region), **how)
+
+
+def heard(socket: WebSocketTestSession) -> dict[str, Any]:
+    return of_frame(socket.receive_bytes())[0]
+
+
+def greet(socket: WebSocketTestSession, seq: int = 0) -> dict[str, Any]:
+    socket.send_bytes(frame("hello", seq, version=VERSION))
+    return heard(socket)
+
+
+# Who may ask
+
+
+def test_a_stranger_gets_nothing(stranger: Served) -> None:
+    for path in ("/", "/engine/gl.js", "/data/present", "/?token=", "/?token=wrong", "/nowhere"):
+        answer = stranger.browser.get(path, follow_redirects=False)
+        assert answer.status_code == 403
+        assert "page" not in answer.text.replace("painter", "")
+    with pytest.raises(REFUSED), stranger.socket():
+        pass
+
+
+def test_the_token_becomes_a_cookie_that_no_script_and_no_other_page_can_use(
+    stranger: Served,
+) -> None:
+    answer = stranger.browser.get(f"/?token={stranger.guard.token}")
+    said = answer.headers["set-cookie"]
+    assert said.startswith(f"lightpaint_{PORT}=")
+    for word in ("HttpOnly", "SameSite=Strict", "Path=/"):
+        assert word in said.split("; ")
+    assert stranger.guard.token not in said
+    assert stranger.guard.token not in answer.text
+    assert 'content="0; url=/"' in answer.text
+    page = stranger.browser.get("/")
+    assert page.status_code == 200
+    assert page.headers["content-type"] == "text/html;charset=utf-8"
+
+
+def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
+    token = stranger.guard.once()
+    assert stranger.browser.get(f"/?token={token}").status_code == 200
+    stranger.browser.cookies.clear()
+    assert stranger.browser.get(f"/?token={token}").status_code == 403
+
+
+def test_a_cookie_of_another_launch_is_worth_nothing(stranger: Served) -> None:
+    for value in ("", "wrong", "é", '"'):
+        headers = {"cookie": f"lightpaint_{PORT}={value}".encode()}
+        assert stranger.browser.get("/", headers=headers).status_code == 403
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", f"evil.example:{PORT}", "", "127.0.0.1.evil.example", "192.168.1.2"]
+)
+def test_another_name_is_refused_even_with_the_cookie(served: Served, host: str) -> None:
+    assert served.browser.get("/", headers={"host": host}).status_code == 403
+    with pytest.raises(REFUSED), served.socket(host=host):
+        pass
+
+
+@pytest.mark.parametrize("host", ["localhost:8421", "127.0.0.1:9000", "[::1]:8421", "LOCALHOST"])
+def test_names_of_the_machine_itself_and_ports_of_tunnels_are_right(
+    served: Served, host: str
+) -> None:
+    [cookie] = served.browser.cookies.jar
+    headers = {"host": host, "cookie": f"{cookie.name}={cookie.value}"}
+    assert served.browser.get("/", headers=headers).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", f"https://{HOST}", "http://127.0.0.1:9999", ""]
+)
+def test_a_page_of_another_server_is_refused_even_with_the_cookie(
+    served: Served, origin: str
+) -> None:
+    assert served.browser.get("/data/present", headers={"origin": origin}).status_code == 403
+    with pytest.raises(REFUSED), served.socket(origin=origin):
+        pass
+
+
+def test_a_socket_that_says_nothing_of_its_page_is_refused(served: Served) -> None:
+    url = f"ws://{HOST}/live"
+    with pytest.raises(REFUSED), served.browser.websocket_connect(url):
+        pass
+
+
+def test_where_others_are_let_in_addresses_are_right_and_foreign_names_are_not(
+    tmp_path: Path,
+) -> None:
+    served = Served(tmp_path / "page", host="0.0.0.0")
+    with served.browser:
+        for host, code in (("192.168.1.2:8421", 200), ("[fe80::1]:8421", 200), ("evil.net", 403)):
+            answer = served.browser.get(f"/?token={served.guard.token}", headers={"host": host})
+            assert answer.status_code == code
+
+
+def test_only_reading_is_answered(served: Served) -> None:
+    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
+        assert served.browser.request(method, "/").status_code == 405
+
+
+def test_every_answer_has_the_policy(served: Served) -> None:
+    for path in ("/", "/engine/gl.js", "/data/present", "/data/none", "/none", "/?token=wrong"):
+        headers = served.browser.get(path).headers
+        policy = dict(x.split(" ", 1) for x in headers["content-security-policy"].split("; "))
+        assert policy["default-src"] == "'none'"
+        assert policy["script-src"] == "'self' 'wasm-unsafe-eval'"
+        assert policy["style-src"] == "'self'"
+        assert policy["connect-src"] == f"'self' ws://{HOST}"
+        assert policy["frame-ancestors"] == "'none'"
+        assert "unsafe-inline" not in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["referrer-policy"] == "no-referrer"
+        assert headers["cache-control"] == "no-store"
+
+
+# Files and pictures
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/secret.py",
+        "/.hidden.js",
+        "/../secret.py",
+        "/engine/../secret.py",
+        "/%2e%2e/secret.py",
+        "/engine/",
+        "/engine",
+        "//etc/passwd",
+        "/engine/gl.js/",
+        "/engine\\gl.js",
+        "/engine/gl.js%00",
+    ],
+)
+def test_what_is_not_in_the_table_is_not_there(served: Served, path: str) -> None:
+    answer = served.browser.get(path, follow_redirects=False)
+    assert answer.status_code == 404
+    assert "secret" not in answer.text
+
+
+def test_the_page_as_it_ships_is_whole_and_keeps_its_policy() -> None:
+    """What it refers to is there, and nothing stands in it that the policy forbids."""
+    table = page_files()
+    page = table["/"].content.decode()
+    assert not re.search(r"<script(?![^>]* src=)|<style|\s(?:style|on\w+)=", page)
+    named = re.findall(r'(?:src|href)="(?!data:)([^"]+)"', page)
+    assert named
+    for name in named:
+        assert f"/{name}" in table, name
+    imports = re.compile(
+        r"""(?:^|\n)(?:import|export)\b[^'"\n;]*?(?:\n[^'";]*?)?from ['"]([^'"]+)"""
+    )
+    for path, file in table.items():
+        if path.endswith(".js"):
+            text = re.sub(r"/\*.*?\*/", "", file.content.decode(), flags=re.DOTALL)
+            for name in imports.findall(text):
+                assert normpath(join(dirname(path), name)) in table, f"{name} in {path}"
+    assert any(path.startswith("/vendor/LICENSE") for path in table)
+
+
+def test_a_link_out_of_the_page_is_no_file_of_it(tmp_path: Path) -> None:
+    (tmp_path / "page").mkdir()
+    (tmp_path / "other.js").write_text("secret", "utf-8")
+    (tmp_path / "page" / "other.js").symlink_to(tmp_path / "other.js")
+    assert page_files(tmp_path / "page") == {}
+
+
+def test_pictures_are_raw_bytes_by_name(served: Served) -> None:
+    for name, picture in served.session.pictures.items():
+        answer = served.browser.get(f"/data/{name}")
+        assert answer.headers["x-dtype"] == picture.dtype.name
+        shape = tuple(map(int, answer.headers["x-shape"].split(",")))
+        got = np.frombuffer(answer.content, picture.dtype.newbyteorder("<")).reshape(shape)
+        np.testing.assert_array_equal(got, picture)
+    for name in ("none", "../present", "%2e%2e/present", "present/", "x" * 999, "plane/%00"):
+        assert served.browser.get(f"/data/{name}").status_code == 404
+
+
+def test_a_picture_is_kept_by_its_generation_only(served: Served) -> None:
+    with served.socket() as socket:
+        greet(socket)
+        kept = served.browser.get("/data/present?g=1").headers
+        assert "immutable" in kept["cache-control"]
+        assert kept["vary"] == "Cookie"
+        for asked in ("", "?g=0", "?g=2", "?g=x"):
+            answer = served.browser.get(f"/data/present{asked}")
+            assert answer.headers["cache-control"] == "no-store"
+        assert served.session.on_message is not None
+        served.session.on_message(Message("renewed", {"resources": {"present": 2}}))
+        assert heard(socket)["kind"] == "renewed"
+        assert "immutable" in served.browser.get("/data/present?g=2").headers["cache-control"]
+        assert served.browser.get("/data/present?g=1").headers["cache-control"] == "no-store"
+
+
+# What is said
+
+
+def test_each_message_is_answered_by_its_number(served: Served) -> None:
+    with served.socket() as socket:
+        assert greet(socket, 7) | {"reply": 7, "kind": "state"} == greet(socket, 7)
+        socket.send_bytes(paint(8))
+        content, [weights] = of_frame(socket.receive_bytes())
+        assert (content["kind"], content["reply"]) == ("answer", 8)
+        np.testing.assert_array_equal(np.frombuffer(weights, "<f8"), np.full(6, 3.0))
+        socket.send_bytes(frame("undo", 9))
+        assert heard(socket) == {"kind": "done", "of": "Undo", "reply": 9, "buffers": []}
+        assert heard(socket) == {"kind": "say", "text": "said", "buffers": []}
+        socket.send_bytes(paint(10, label="nothing"))
+        assert heard(socket)["reply"] == 10
+    assert len(served.session.threads) == 1
+    assert threading.get_ident() not in served.session.threads
+
+
+def test_mistakes_are_answered_and_end_nothing(served: Served) -> None:
+    with served.socket() as socket:
+        greet(socket)
+        socket.send_bytes(paint(1, label="refuse"))
+        assert heard(socket)["text"] == "this cannot be painted"
+        socket.send_bytes(paint(2, label="break"))
+        failed = heard(socket)
+        assert (failed["kind"], failed["reply"]) == ("failed", 2)
+        assert "ZeroDivisionError" in failed["text"]
+        assert "Traceback" not in failed["text"]
+        assert "Traceback" in served.said[-1]
+        socket.send_bytes(paint(3))
+        assert heard(socket)["kind"] == "answer"
+
+
+NAN = {"image": np.full((1, 1, 3), np.nan, np.float32), "importance": np.ones((1, 1), np.float32)}
+SHORT = to_frame(
+    {"kind": "paint", "seq": 5, "buffers": [{"name": "image", "dtype": "float32", "shape": [9]}]},
+    [b""],
+)
+
+
+@pytest.mark.parametrize(
+    ("junk", "seq"),
+    [
+        (b"", None),
+        (b"\xff\xff\xff\xff", None),
+        (b"\x02\0\0\0[]", None),
+        (b"\x02\0\0\0{}", None),
+        (bytes(1000), None),
+        (frame("hello", 5, version="1"), 5),
+        (frame("hello", 5), 5),
+        (frame("launch", 5), 5),
+        (frame("undo", -1), None),
+        (frame("paint", 5, NAN, stroke=1, region=[0, 1, 0, 1]), 5),
+        (frame("paint", 5, stroke=1, region=[0, 1]), 5),
+        (frame("ask", 5, light="0", asked={}), 5),
+        (SHORT, None),
+    ],
+)
+def test_junk_is_answered_and_the_session_alive(
+    served: Served, junk: bytes, seq: int | None
+) -> None:
+    with served.socket() as socket:
+        greet(socket)
+        socket.send_bytes(junk)
+        answer = heard(socket)
+        assert answer["kind"] == "failed"
+        assert answer.get("reply") == seq
+        socket.send_text("text")
+        assert heard(socket)["kind"] == "failed"
+        socket.send_bytes(paint(6))
+        assert heard(socket)["kind"] == "answer"
+    assert len(served.session.heard) == 1
+
+
+def test_a_page_of_another_version_is_told(served: Served) -> None:
+    with served.socket() as socket:
+        socket.send_bytes(frame("hello", 1, version=VERSION + 1, novelty=True))
+        answer = heard(socket)
+        assert (answer["kind"], answer["reason"], answer["reply"]) == ("closed", "version", 1)
+        assert greet(socket)["kind"] == "state"
+
+
+def test_nothing_is_done_before_hello(served: Served) -> None:
+    with served.socket() as socket:
+        socket.send_bytes(paint(1))
+        assert heard(socket)["kind"] == "closed"
+    assert served.session.heard == []
+
+
+def test_live_paint_that_newer_covers_is_answered_and_not_done(served: Served) -> None:
+    busy, free = threading.Event(), threading.Event()
+    served.session.before_paint = lambda: (busy.set(), free.wait(30))
+    with served.socket() as socket:
+        greet(socket)
+        socket.send_bytes(paint(1))
+        assert busy.wait(30)
+        for message in (
+            paint(2, region=(0, 2, 0, 2)),
+            paint(3, region=(0, 1, 0, 1)),  # does not cover the one before
+            paint(4, region=(0, 2, 0, 2)),
+            paint(5, region=(0, 2, 0, 2), done=True),
+            paint(6, region=(0, 2, 0, 2)),  # the one before is done
+            paint(7, stroke=2, region=(0, 2, 0, 2)),
+        ):
+            socket.send_bytes(message)
+        # All that waits has been heard when this, which nobody has to do, is answered.
+        served.browser.get("/")
+        free.set()
+        answers = [heard(socket) for _ in range(7)]
+    assert sorted(answer["reply"] for answer in answers) == [1, 2, 3, 4, 5, 6, 7]
+    strokes = [said.stroke for said in served.session.heard]
+    assert strokes[0] == 1
+    assert strokes[-1] == 2
+    assert sum(said.done for said in served.session.heard) == 1
+    assert len(strokes) <= 7
+
+
+# Who has the session
+
+
+def test_the_second_tab_is_told_and_may_take_over(served: Served) -> None:
+    with served.socket("a") as first, served.socket("b") as second:
+        assert greet(first)["kind"] == "state"
+        told = greet(second, 3)
+        assert (told["kind"], told["reason"], told["reply"]) == ("closed", "taken", 3)
+        second.send_bytes(paint(4))
+        assert heard(second)["reason"] == "taken"
+        second.send_bytes(frame("take_over", 5))
+        assert heard(second)["kind"] == "state"
+        told = heard(first)
+        assert (told["kind"], told["reason"]) == ("closed", "taken")
+        assert "reply" not in told
+        first.send_bytes(paint(6))
+        assert heard(first)["reason"] == "taken"
+        assert served.session.heard == []
+        second.send_bytes(paint(7))
+        assert heard(second)["kind"] == "answer"
+        first.send_bytes(frame("take_over", 8))
+        assert heard(first)["kind"] == "state"
+
+
+def test_the_session_is_free_when_its_tab_has_gone(served: Served) -> None:
+    with served.socket() as first:
+        greet(first)
+    with served.socket() as second:
+        assert greet(second)["kind"] == "state"
+
+
+def test_a_page_that_is_back_after_a_dropped_connection_has_its_session(served: Served) -> None:
+    with served.socket("same") as first, served.socket("same") as again:
+        greet(first)
+        assert greet(again)["kind"] == "state"
+        with pytest.raises(WebSocketDisconnect):  # and is not told that another has it
+            first.receive_bytes()
+
+
+def test_too_many_tabs_are_sent_away(served: Served) -> None:
+    with ExitStack() as stack:
+        for _ in range(16):
+            greet(stack.enter_context(served.socket()))
+        with served.socket() as one_more, pytest.raises(WebSocketDisconnect) as refusal:
+            one_more.receive_bytes()
+        assert refusal.value.code == 1013
+
+
+def test_all_are_told_of_the_end(stranger: Served) -> None:
+    stranger.enter()
+    with stranger.socket() as socket:
+        greet(socket)
+        assert stranger.browser.portal is not None
+        stranger.browser.portal.call(stranger.line.end)
+        assert heard(socket)["reason"] == "ended"
+    assert stranger.session.on_message is None
+
+
+# Pages that are slow
+
+
+class Deaf:
+    """A socket whose other end does not listen."""
+
+    def __init__(self) -> None:
+        self.sent: list[dict[str, Any]] = []
+
+    async def receive(self) -> Any:
+        raise AssertionError
+
+    async def send_bytes(self, data: bytes) -> None:
+        self.sent.append(of_frame(data)[0])
+
+    async def close(self, code: int = 1000) -> None:
+        self.sent.append({"kind": "close", "code": code})
+
+
+def test_of_what_nobody_asked_for_a_slow_page_gets_the_newest() -> None:
+    page = client.Client(Deaf())
+    for k in range(1000):
+        page.send(Message("answer", {"version": k}))
+        page.send(Message("progress", {"what": "render", "done": k}))
+        page.send(Message("progress", {"what": "denoise", "done": k}))
+        page.send(Message("renewed", {"resources": {f"plane/{k % 3}": k}}))
+    unsent = [message for message, _ in page._unsent]
+    assert [m.fields.get("version") for m in unsent if m.kind == "answer"] == [999]
+    assert [m.fields["done"] for m in unsent if m.kind == "progress"] == [999, 999]
+    [renewed] = [m for m in unsent if m.kind == "renewed"]
+    assert renewed.fields["resources"] == {"plane/0": 999, "plane/1": 997, "plane/2": 998}
+
+
+def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_away() -> None:
+    page = client.Client(Deaf())
+    for k in range(client.MOST_UNSENT):
+        page.send(Message("answer", {}), k)
+    assert len(page._unsent) == client.MOST_UNSENT
+    page.send(Message("answer", {}), 0)
+    assert page._unsent == []
+    page.send(Message("answer", {}), 1)
+    assert page._unsent == []
+
+
+# The place
+
+
+def test_a_taken_port_is_told_and_the_usual_one_given_up() -> None:
+    with listening("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(PaintError, match=f"cannot listen at 127.0.0.1:{port}: .*port="):
+            listening("127.0.0.1", port)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(server, "PORT", port)
+            with listening("127.0.0.1", None) as other:
+                assert other.getsockname()[1] not in (0, port)
+    with pytest.raises(PaintError, match="cannot listen"):
+        listening("127.0.0.1", 70000)
+    with pytest.raises(PaintError, match="cannot listen"):
+        listening("256.0.0.1", 0)
+
+
+def test_by_itself_it_listens_to_the_machine_only() -> None:
+    made = Server(FakeSession(), port=0)
+    assert made._socket.getsockname()[0] == "127.0.0.1"
+    assert made.url.startswith(f"http://127.0.0.1:{made.port}/?token=")
+    assert made.url_once() != made.url
+    made.close()
+
+
+def test_without_its_libraries_the_line_to_run_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "find_spec", lambda name: None if name == "uvicorn" else name)
+    with pytest.raises(PaintError, match=r"needs uvicorn: pip install 'lightpaint\[paint\]'"):
+        server.check_installed()
+
+
+def test_names_from_files_are_text() -> None:
+    name = "</script><b>\u202e\ud800"
+    text = to_frame({"kind": "say", "text": name}, [])
+    assert json.loads(text[4:].rstrip(b"\0"))["text"].startswith("</script><b>")
+
+
+class FullDisk:
+    """What a server sees of a store that cannot write at first."""
+
+    identity = None
+
+    def __init__(self) -> None:
+        self.unsaved: str | None = None
+        self.tries = 0
+
+    def flush(self) -> str | None:
+        self.tries += 1
+        self.unsaved = None if self.tries > 2 else self.unsaved
+        return self.unsaved
+
+
+def test_a_full_disk_is_said_and_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line, "TRY_S", 0.01)
+    served, store = Served(tmp_path / "page"), FullDisk()
+    served.line.store = store  # type: ignore[assignment]
+    with served.browser:
+        served.enter()
+        with served.socket() as socket:
+            greet(socket)
+            store.unsaved = "the disk is full"
+            socket.send_bytes(paint(1))
+            assert heard(socket)["reply"] == 1
+            told = heard(socket)
+            assert (told["kind"], told["text"], told["tone"]) == ("say", "the disk is full", "warn")
+            told = heard(socket)
+            assert (told["kind"], told["tone"]) == ("say", "info")
+    assert store.tries == 3
+    assert served.said == ["the disk is full", "all that was painted is kept again"]

@@ -1,0 +1,213 @@
+"""Whatever is done in a session, and in whichever order, equals what is built from scratch."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import lightpaint as lp
+from lightpaint.basis.basis import BasisLight, Origin
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint import protocol
+from lightpaint.paint.session import Session
+from lightpaint.paint.steps import Identity
+from lightpaint.paint.store import MemoryStore
+from lightpaint.settings import Settings
+
+SIZE = (18, 32)
+
+
+def made_of(images: Any) -> lp.Basis:
+    """A basis without noise."""
+    images = np.asarray(images, np.float32)
+    names = [f"lamp {k}" for k in range(len(images))]
+    return lp.Basis(
+        tuple(BasisLight(name, "point", "intensity", "W/sr", (0.5, 0.5, 0.5)) for name in names),
+        images,
+        np.zeros_like(images),
+        np.zeros(images.shape[1:3], bool),
+        Origin("made", "made", "camera", 0, "separate", (0, 0), (0, 0)),
+    )
+
+
+def overlapping() -> lp.Basis:
+    """Three soft lights of different colours."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    colors = np.random.default_rng(5).uniform(0.3, 1, (3, 3))
+    places = zip((0.2, 0.6, 0.4), (0.3, 0.8, 1.4), colors, strict=True)
+    return made_of(
+        [
+            np.exp(-((y - cy) ** 2 + (x - cx) ** 2) / 0.3)[..., None] * color + 0.02
+            for cy, cx, color in places
+        ]
+    )
+
+
+@pytest.fixture
+def basis() -> lp.Basis:
+    """Three soft lights of different colours."""
+    return overlapping()
+
+
+def session_of(basis: lp.Basis, store: MemoryStore | None = None, **how: Any) -> Session:
+    """A session as the command line makes it."""
+    return Session(
+        basis,
+        basis.present_look,
+        store or MemoryStore(Identity.of(basis)),
+        settings=Settings(**how),
+        transform=lp.ViewTransform(),
+    )
+
+
+def paint(
+    stroke: int, region: tuple[int, int, int, int], light: float, *, done: bool = True
+) -> tuple[protocol.Paint, dict[str, Any]]:
+    """A message as the page sends it."""
+    top, bottom, left, right = region
+    shape = bottom - top, right - left
+    image = np.full((*shape, 3), light, np.float32)
+    return protocol.Paint(stroke, region, done), {
+        "image": image,
+        "importance": np.ones(shape, np.float32),
+    }
+
+
+def test_an_answer_is_that_of_solve(basis: lp.Basis):
+    session = session_of(basis)
+    session.said(*paint(1, (2, 9, 3, 12), 0.9))
+    session.said(protocol.Ask(2, {"lock": "80%"}), {})
+    moment = session.moment()
+    solution = moment.solution()
+    assert solution is not None
+    assert moment.target is not None
+    asked = Constraints.of({basis.names[2]: {"lock": "80%"}})
+    expected = lp.solve(basis, moment.target, constraints=asked)
+    np.testing.assert_array_equal(solution.weights, expected.weights)
+    assert solution.space == "display"
+    assert solution.problem.fit.hold == 1.0
+    message = session.settled(moment, solution)
+    assert message is not None
+    assert message.fields["exact"]
+    np.testing.assert_array_equal(message.arrays["weights"], expected.weights)
+
+
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any):
+    session = session_of(basis, space=space)
+    answer = None
+    for k in range(6):
+        [answer] = session.said(*paint(1, (2, 9, 3, 4 + 2 * k), 0.7, done=k == 5))
+    assert answer is not None
+    assert not answer.fields["exact"]
+    solution = session.moment().solution()
+    assert solution is not None
+    size = np.sqrt(basis.power) * solution.weights
+    apart = np.sqrt(basis.power) * np.abs(answer.arrays["weights"] - solution.weights)
+    # In linear light the sums are those of the exact answer; a film of few pixels and two rounds
+    # are as near as their averages.
+    assert apart.max() < (1e-6 if space == "linear" else 2e-2) * size.max()
+
+
+def test_nothing_painted_leaves_lights_as_they_are(basis: lp.Basis):
+    session = session_of(basis)
+    np.testing.assert_allclose(session.weights, basis.present_weights)
+    [answer] = session.said(protocol.Ask(0, {"lock": 2.0}), {})
+    weights = answer.arrays["weights"]
+    np.testing.assert_allclose(weights[0], [2.0, 2.0, 2.0])
+    np.testing.assert_allclose(weights[1:], basis.present_weights[1:])
+
+
+REGION = st.tuples(
+    st.integers(0, SIZE[0]),
+    st.integers(0, SIZE[0]),
+    st.integers(0, SIZE[1]),
+    st.integers(0, SIZE[1]),
+).map(lambda r: (min(r[:2]), max(r[:2]), min(r[2:]), max(r[2:])))
+DONE = st.one_of(
+    st.tuples(st.just("paint"), REGION, st.floats(0, 2, width=16), st.booleans()),
+    st.tuples(
+        st.just("ask"), st.integers(0, 2), st.sampled_from([{}, {"lock": True}, {"off": True}])
+    ),
+    st.tuples(st.just("slide"), st.integers(0, 2), st.floats(0, 2, width=16)),
+    st.tuples(st.just("set"), st.sampled_from(["free", "white", None])),
+    st.tuples(st.sampled_from(["undo", "redo", "drop"])),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(actions=st.lists(DONE, max_size=14))
+def test_any_sequence_equals_a_rebuild(actions: list[Any]):
+    basis = overlapping()
+    store = MemoryStore(Identity.of(basis))
+    session, stroke = session_of(basis, store), 0
+    for what, *its in actions:
+        try:
+            match what:
+                case "paint":
+                    stroke += 1
+                    message, arrays = paint(stroke, its[0], its[1], done=its[2])
+                    session.said(message, arrays)
+                case "ask":
+                    session.said(protocol.Ask(its[0], its[1]), {})
+                case "slide":
+                    session.said(protocol.Ask(its[0], {"lock": its[1]}, done=False), {})
+                    session.said(protocol.Ask(its[0], {"lock": its[1]}), {})
+                case "set":
+                    session.said(protocol.Set({"colors": its[0]}), {})
+                case "undo":
+                    session.said(protocol.Undo(), {})
+                case "redo":
+                    session.said(protocol.Redo(), {})
+                case "drop":
+                    session.said(protocol.Drop(stroke), {})
+        except lp.LightpaintError:
+            pass
+    session.said(protocol.Drop(stroke), {})
+    again = session_of(basis, store)
+    np.testing.assert_array_equal(session.image, again.image)
+    np.testing.assert_array_equal(session.importance, again.importance)
+    assert session.wishes == again.wishes
+    assert (
+        session.image[session.importance == 0] == basis.present_look[session.importance == 0]
+    ).all()
+    assert session.moment().constraints == again.moment().constraints
+    assert session.moment().settings == again.moment().settings
+    assert session.is_painted == again.is_painted
+    # All the way back is the beginning.
+    while store.position:
+        session.said(protocol.Undo(), {})
+    np.testing.assert_array_equal(session.image, basis.present_look)
+    assert not session.importance.any()
+    np.testing.assert_allclose(session.weights, basis.present_weights, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("message", "arrays", "said"),
+    [
+        (paint(1, (0, 99, 0, 4), 1)[0], paint(1, (0, 9, 0, 4), 1)[1], "the picture is 32x18"),
+        (paint(1, (0, 9, 0, 4), 1)[0], {}, "without its image"),
+        (paint(1, (0, 9, 0, 4), 1)[0], paint(1, (0, 9, 0, 5), 1)[1], "paint of"),
+        (*paint(1, (0, 9, 0, 4), -1), "light beyond"),
+        (*paint(1, (0, 9, 0, 4), float("nan")), "NaN"),
+        (protocol.Ask(7, {}), {}, "no light 7"),
+        (protocol.Ask(0, {"lok": True}), {}, "lok"),
+        (protocol.Ask(0, {"limits": {"min": 3, "max": 1}}), {}, "above its max"),
+        (protocol.Tie((("lamp 0", "nobody"),)), {}, "nobody"),
+        (protocol.Set({"hold": "much"}), {}, "hold"),
+        (protocol.Set({"fast": True}), {}, "fast"),
+        (protocol.Undo(), {}, "nothing to undo"),
+    ],
+)
+def test_what_cannot_be_is_said_and_changes_nothing(
+    basis: lp.Basis, message: Any, arrays: Any, said: str
+):
+    session = session_of(basis)
+    before = session.image.copy(), session.wishes, session.version
+    with pytest.raises(lp.LightpaintError, match=said):
+        session.said(message, arrays)
+    np.testing.assert_array_equal(session.image, before[0])
+    assert (session.wishes, session.version) == before[1:]
+    session.said(*paint(1, (2, 9, 3, 12), 0.9))

@@ -1,0 +1,414 @@
+"""The session file: what was done is there again, whatever ended the process that did it."""
+
+import os
+import random
+import shutil
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, told
+
+from lightpaint.errors import OutputError, PaintError
+from lightpaint.paint import database
+from lightpaint.paint.database import set_aside
+from lightpaint.paint.packed import packed, unpacked
+from lightpaint.paint.steps import Identity, KeptLook, Patch, Step, painted_by
+from lightpaint.paint.store import MemoryStore, Store
+
+ACTIONS = st.lists(
+    st.tuples(st.just("append"), st.integers(0, 10**6))
+    | st.tuples(st.sampled_from(["undo", "redo", "reopen"]), st.just(0))
+    | st.tuples(st.sampled_from(["put", "drop", "rename", "copy"]), st.integers(0, 3)),
+    max_size=25,
+)
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever ends the process here is not the current."""
+    monkeypatch.setattr(database, "SYNCHRONOUS", "OFF")
+
+
+@pytest.mark.usefixtures("hasty")
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(ACTIONS)
+def test_any_sequence_is_there_again(
+    tmp_path_factory: pytest.TempPathFactory, actions: list[tuple[str, int]]
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "session.db"
+    steps: list[Step] = []
+    position, looks = 0, dict[int, KeptLook]()
+    store, memory = Store.open(path, IDENTITY), MemoryStore(IDENTITY)
+    for k, (action, value) in enumerate(actions):
+        if action == "append":
+            steps = [*steps[:position], step(value)]
+            position += 1
+            for one in (store, memory):
+                one.append(step(value))
+        elif action in ("undo", "redo"):
+            position = min(max(position + (1 if action == "redo" else -1), 0), len(steps))
+            for one in (store, memory):
+                one.move_to(position)
+        elif action == "reopen":
+            store.close()
+            store = Store.open(path, IDENTITY)
+        elif action == "put":
+            looks[value] = look(value, k)
+            for one in (store, memory):
+                one.put_look(look(value, k))
+        elif action == "drop" and value in looks:
+            del looks[value]
+            for one in (store, memory):
+                one.drop_look(value)
+        elif action in ("rename", "copy") and value in looks:
+            number = value if action == "rename" else value + 10
+            looks[number] = replace(looks[value], id=number, fields={"name": f"other {k}"})
+            for one in (store, memory):
+                [kept] = [x for x in one.looks() if x.id == value]
+                one.put_look(replace(kept, id=number, fields={"name": f"other {k}"}))
+    expected = Plain(steps, position, looks)
+    assert content(store)[:2] == content(memory)[:2] == content(expected)[:2]
+    for one in (store, memory):
+        assert sorted(content(one)[2]) == sorted(content(expected)[2])
+    was = content(store)
+    store.close()
+    store = Store.open(path, IDENTITY)
+    assert content(store)[:2] == was[:2]
+    assert content(store)[2] == sorted(was[2])
+    store.close()
+    memory.close()
+
+
+@given(st.lists(st.integers(0, 10**6), max_size=30))
+def test_the_canvas_is_every_patch_put_down_in_order(seeds: list[int]) -> None:
+    steps = [step(seed) for seed in seeds]
+    rng = np.random.default_rng(0)
+    start = rng.random((*SIZE, 3)).astype(np.float32), np.zeros(SIZE, np.float32)
+    image, importance = (x.copy() for x in start)
+    for one in steps:
+        if one.patch is not None:
+            top, bottom, left, right = one.patch.region
+            image[top:bottom, left:right], importance[top:bottom, left:right] = one.patch.after
+    got = painted_by(steps, start)
+    np.testing.assert_array_equal(got[0], image)
+    np.testing.assert_array_equal(got[1], importance)
+
+
+def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
+    odd = np.array([np.nan, -0.0, np.inf, 1e-45, 3.4e38, 1], np.float32).reshape(1, 2, 3)
+    amount = np.array([[0, 1e-45]], np.float32)
+    with Store.open(tmp_path / "session.db", IDENTITY) as store:
+        store.append(Step("stroke", "odd", {}, Patch((0, 1, 0, 2), (odd, amount), (-odd, amount))))
+        [kept] = store.steps
+        assert kept.patch is not None
+        assert told(kept.patch.before) == told((odd, amount))
+        assert told(kept.patch.after) == told((-odd, amount))
+        assert not kept.patch.after[0].flags.writeable
+
+
+def test_what_is_unpacked_is_no_longer_than_it_says() -> None:
+    for damaged in (packed(np.zeros(10**6)), packed(np.zeros(3)), b"", b"junk"):
+        with pytest.raises(PaintError, match="a damaged picture"):
+            unpacked(damaged, "float64", (4,))
+
+
+# Other processes
+
+PLACES = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+
+WRITER = """
+import sys
+from pathlib import Path
+from sessions import IDENTITY, look, step
+from lightpaint.paint.store import Store
+store = Store.open(Path(sys.argv[1]), IDENTITY)
+print("open", len(store.steps), flush=True)
+for number in range(len(store.steps), 10**6):
+    store.append(step(number))
+    print("step", number, flush=True)
+    if number % 5 == 0:
+        store.put_look(look(number % 7, number))
+        print("look", number, flush=True)
+"""
+
+
+def writing(path: Path) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(path)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=PLACES,
+    )
+
+
+def test_killed_at_any_moment_all_that_was_acknowledged_is_there(tmp_path: Path) -> None:
+    path, chance = tmp_path / "session.db", random.Random(0)
+    steps = 0
+    for _ in range(5):
+        with writing(path) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == f"open {steps}\n"
+            time.sleep(chance.uniform(0, 0.15))
+            process.kill()
+            said = [line.split() for line in process.stdout.read().splitlines()]
+        acknowledged = [int(words[1]) for words in said if words[0] == "step"]
+        looks = {int(words[1]) % 7: int(words[1]) for words in said if words[0] == "look"}
+        with Store.open(path, IDENTITY) as store:
+            # One more may have been written, and not been told of yet.
+            there = len(store.steps)
+            least = steps + len(acknowledged)
+            assert there in (least, least + 1)
+            assert store.position == there
+            assert content(store)[1] == content(Plain([step(k) for k in range(there)], 0, {}))[1]
+            kept = {one.id: one for one in store.looks()}
+            for number, of in looks.items():
+                latest = int(kept[number].fields["name"].split()[1])
+                assert latest >= of
+                assert told(kept[number].arrays.values()) == told(
+                    look(number, latest).arrays.values()
+                )
+        steps = there
+    assert steps > 6
+
+
+def test_the_second_process_is_told_and_the_lock_dies_with_the_first(tmp_path: Path) -> None:
+    path = tmp_path / "session.db"
+    with writing(path) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        for opening in (lambda: Store.open(path, IDENTITY), lambda: set_aside(path)):
+            with pytest.raises(PaintError, match=r"is in use: another .* \(folder=\.\.\.\)$"):
+                opening()
+        process.kill()
+        process.stdout.read()
+    Store.open(path, IDENTITY).close()
+
+
+def test_a_second_store_of_the_same_process_is_told_too(tmp_path: Path) -> None:
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY), pytest.raises(PaintError, match="is in use"):
+        Store.open(path, IDENTITY)
+
+
+# Full disks
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A small file system of its own."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=512k", "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("the right to mount")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_loses_nothing_and_is_written_when_there_is_room(disk: Path) -> None:
+    path, number = disk / "session.db", 0
+    store = Store.open(path, IDENTITY)
+    while store.unsaved is None:
+        store.append(big(number))
+        number += 1
+        assert number < 1000
+    assert f"since {path} cannot be written (database or disk is full)" in store.unsaved
+    written = number - 1
+    # Life goes on in memory: paint, undo, looks.
+    store.append(big(number))
+    store.put_look(look(1, 1))
+    store.move_to(number)
+    assert store.flush() is not None
+    was = content(store)
+    assert len(was[1]) == number + 1
+    copy = disk.parent / "copy.db"
+    for ending in ("", "-wal"):
+        shutil.copy(f"{path}{ending}", f"{copy}{ending}")
+    with Store.open(copy, IDENTITY) as left:  # as if it were killed now
+        assert content(left)[1] == was[1][:written]
+        assert left.looks() == []
+    subprocess.run(["mount", "-o", "remount,size=8m", str(disk)], check=True)
+    assert store.flush() is None
+    assert store.unsaved is None
+    store.append(big(0))
+    was = content(store)
+    store.close()
+    with Store.open(path, IDENTITY) as again:
+        assert content(again) == was
+
+
+def test_what_cannot_be_written_at_the_end_is_said(disk: Path) -> None:
+    store = Store.open(disk / "session.db", IDENTITY)
+    while store.unsaved is None:
+        store.append(big(0))
+    with pytest.raises(OutputError, match=r"the last steps are lost: .* is full"):
+        store.close()
+    with Store.open(disk / "session.db", IDENTITY) as left:
+        assert len(left.steps) > 0
+
+
+LIMITED = """
+import resource, sys
+from pathlib import Path
+from sessions import IDENTITY, big, content
+from lightpaint.paint.store import Store
+store, number = Store.open(Path(sys.argv[1]), IDENTITY), 0
+before = resource.getrlimit(resource.RLIMIT_FSIZE)
+resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, before[1]))
+while store.unsaved is None:
+    store.append(big(number))
+    number += 1
+    assert number < 100
+store.append(big(number))
+store.move_to(number)
+assert store.flush() is not None
+resource.setrlimit(resource.RLIMIT_FSIZE, before)
+assert store.flush() is None
+was = content(store)
+store.close()
+with Store.open(Path(sys.argv[1]), IDENTITY) as again:
+    assert content(again) == was
+    assert (again.position, len(again.steps)) == (number, number + 1)
+"""
+
+
+def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(tmp_path / "session.db")],
+        env=PLACES,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+# What is no session of this picture
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (replace(IDENTITY, size=(12, 20)), "of 10x12 pixels, and room.xml has 20x12"),
+        (replace(IDENTITY, sensor="side"), "through camera, and this is through side"),
+        (replace(IDENTITY, lights=("panel", "sun")), "lights panel, bulb, and room.xml has"),
+    ],
+)
+def test_a_session_of_something_else_is_refused_and_can_be_put_aside(
+    tmp_path: Path, other: Identity, said: str
+) -> None:
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        store.append(step(1))
+    with pytest.raises(PaintError, match=said) as refusal:
+        Store.open(path, other)
+    assert "(folder=...)" in str(refusal.value)
+    assert "(new=True)" in str(refusal.value)
+    assert set_aside(path) == tmp_path / "session-1.db"
+    with Store.open(path, other) as store:
+        assert store.steps == []
+    assert set_aside(path) == tmp_path / "session-2.db"
+    assert set_aside(path) is None
+    with Store.open(tmp_path / "session-1.db", IDENTITY) as store:
+        assert [one.label for one in store.steps] == ["stroke 1"]
+
+
+def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
+    with Store.open(tmp_path / "session.db", IDENTITY) as store:
+        store.append(step(1))
+    with Store.open(tmp_path / "session.db", replace(IDENTITY, basis="other")) as store:
+        assert len(store.steps) == 1
+
+
+def _done(path: Path, statement: str) -> None:
+    other = sqlite3.connect(path)
+    other.execute(statement)
+    other.commit()
+    other.close()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: path.write_bytes(b"junk" * 1000),
+        lambda path: path.write_bytes(path.read_bytes()[:40_000]),
+        lambda path: _done(path, "DROP TABLE step"),
+        lambda path: _done(path, "PRAGMA user_version=9"),
+        lambda path: _done(path, "PRAGMA application_id=9"),
+        lambda path: _done(path, "UPDATE step SET fields='{'"),
+        lambda path: _done(path, "UPDATE step SET region='[1]'"),
+        lambda path: _done(path, "UPDATE about SET value='x'"),
+    ],
+)
+def test_a_damaged_file_is_said_in_one_line_and_can_be_put_aside(
+    tmp_path: Path, damage: Any
+) -> None:
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        for number in range(4):
+            store.append(step(number))
+    damage(path)
+    with (
+        pytest.raises(PaintError, match=r"new=True") as refusal,
+        Store.open(path, IDENTITY) as store,
+    ):
+        content(store)
+    assert "\n" not in str(refusal.value)
+    assert set_aside(path) is not None
+    Store.open(path, IDENTITY).close()
+
+
+def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine", "utf-8")
+    with pytest.raises(OutputError, match="cannot write"):
+        Store.open(tmp_path / "file" / "session.db", IDENTITY)
+    (tmp_path / "session.db").mkdir()
+    with pytest.raises(OutputError, match="cannot write"):
+        Store.open(tmp_path / "session.db", IDENTITY)
+
+
+@pytest.mark.usefixtures("hasty")
+def test_room_of_what_was_cut_off_is_used_again(tmp_path: Path) -> None:
+    """So that a day of trying and undoing costs no more than what is there in the end."""
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        for number in range(20):
+            store.append(big(number))
+    most = path.stat().st_size
+    for _ in range(3):
+        with Store.open(path, IDENTITY) as store:
+            store.move_to(0)
+            for number in range(20):
+                store.append(big(number))
+    assert path.stat().st_size < 1.2 * most
+    with Store.open(path, IDENTITY) as store:
+        store.move_to(0)
+        store.append(step(3))
+    Store.open(path, IDENTITY).close()
+    assert path.stat().st_size < 0.3 * most
+
+
+def test_what_nobody_should_keep_is_refused_before_anything_changes() -> None:
+    with MemoryStore(IDENTITY) as store:
+        for wrong in (
+            Step("asked", "", {"x": float("nan")}),
+            Step("asked", "", {"x": object()}),
+            Step("stroke", "", {}, replace(patch(np.random.default_rng(0)), region=(0, 1, 0, 1))),
+        ):
+            with pytest.raises(PaintError):
+                store.append(wrong)
+        with pytest.raises(PaintError):
+            store.move_to(1)
+        with pytest.raises(PaintError):
+            store.drop_look(1)
+        assert content(store) == (0, [], [])

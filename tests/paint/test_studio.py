@@ -1,0 +1,195 @@
+"""A studio answers at once, says later what takes longer, and exports what `solve` finds."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.paint import protocol
+from lightpaint.paint.protocol import Message
+from lightpaint.paint.store import Store
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+
+SIZE = (18, 32)
+
+
+class Heard:
+    """A studio of a saved basis, and all that it says."""
+
+    def __init__(self, basis: lp.Basis, folder: Path) -> None:
+        subject = Subject("room.basis.exr", folder, basis=basis)
+        self.messages: list[Message] = []
+        self.studio = Studio(subject, lambda its: Store.open(folder / "session.db", its))
+        self.studio.on_message = self.messages.append
+        self.studio.start()
+        self.wait(lambda m: m.kind == "state")
+
+    def wait(self, is_it: Callable[[Message], Any], seconds: float = 30) -> Message:
+        """The first message, from now or from before, that is it."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            for message in list(self.messages):
+                if is_it(message):
+                    return message
+            time.sleep(0.01)
+        raise AssertionError([m.kind for m in self.messages])
+
+    def exact(self) -> Message:
+        """The exact answer to what was done last."""
+        version = self.studio.session.version
+        return self.wait(
+            lambda m: (
+                m.kind == "answer" and "headline" in m.fields and m.fields["version"] == version
+            )
+        )
+
+    def paint(self, stroke: int, light: float, region: Any = (3, 12, 4, 15)) -> Message:
+        """A stroke, whole."""
+        shape = region[1] - region[0], region[3] - region[2]
+        arrays = {
+            "image": np.full((*shape, 3), light, np.float32),
+            "importance": np.ones(shape, np.float32),
+        }
+        [answer] = self.studio.said(protocol.Paint(stroke, region, True), arrays)
+        return answer
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> lp.Basis:
+    """Soft lights with a little noise."""
+    rng = np.random.default_rng(2)
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    images = np.array(
+        [
+            (np.exp(-((y - a) ** 2 + (x - b) ** 2) / 0.3) + 0.02)[..., None]
+            * rng.uniform(0.3, 1, 3)
+            for a, b in ((0.2, 0.3), (0.6, 0.8), (0.4, 1.4))
+        ]
+    )
+    noise = 0.01 * images * rng.standard_normal(images.shape)
+    return make_basis(  # type: ignore[no-any-return]
+        images=images + noise, half_differences=noise, emission=[[0.5, 0.5, 0.5]] * 3
+    )
+
+
+@pytest.fixture
+def heard(basis: lp.Basis, tmp_path: Path) -> Iterator[Heard]:
+    """A studio that is open."""
+    made = Heard(basis, tmp_path)
+    yield made
+    made.studio.close()
+
+
+def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_path: Path):
+    heard.paint(1, 0.8)
+    heard.studio.said(protocol.Ask(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
+    heard.studio.said(protocol.Set({"colors": "free"}), {})
+    exact = heard.exact()
+    heard.studio.said(protocol.Export(("target", "lighting")), {})
+    exported = heard.wait(lambda m: m.kind == "exported")
+    assert set(exported.fields["files"]) == {
+        str(tmp_path / "painting.exr"),
+        str(tmp_path / "lighting.json"),
+    }
+    words = exported.fields["command"]
+    assert "--limit" in words
+    assert "--colors free" in words
+    asked = lp.Constraints.of({basis.names[1]: {"limits": {"min": 0.1, "max": 0.45}}})
+    look = lp.paint_with_light(
+        None,
+        tmp_path / "painting.exr",
+        tmp_path / "again",
+        basis=basis,
+        constraints=asked,
+        colors="free",
+    )
+    np.testing.assert_allclose(look.solution.weights, exact.arrays["weights"], rtol=1e-12)
+    emission = lp.read_lighting(tmp_path / "lighting.json").emission
+    np.testing.assert_allclose(
+        [emission[name] for name in basis.names], exact.arrays["weights"], rtol=1e-12
+    )
+
+
+def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
+    heard.paint(1, 0.8)
+    fields = heard.exact().fields
+    assert fields["exact"]
+    assert fields["delta_e"] >= 0
+    assert sum(light["share"] for light in fields["lights"]) == pytest.approx(1)
+    assert [len(light["emission"]) for light in fields["lights"]] == [3, 3, 3]
+    assert any(light["error"] for light in fields["lights"])
+
+
+def test_clean_planes_come_later_and_keep_the_light(heard: Heard, basis: lp.Basis):
+    heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+    state = heard.studio.state().fields
+    for k, light in enumerate(state["lights"]):
+        raw, clean = (
+            heard.studio.resource(f"{kind}/{k}").astype(np.float64) * light["scale"]
+            for kind in ("plane", "clean")
+        )
+        # Half floats have 11 bits; a denoiser may move light, and not make any.
+        np.testing.assert_allclose(raw, basis.images[k], rtol=2**-11, atol=1e-7)
+        assert clean.mean() == pytest.approx(raw.mean(), rel=0.1)
+    np.testing.assert_allclose(heard.studio.resource("painting"), heard.studio.session.image)
+
+
+def test_a_look_is_gone_back_to_and_undone(heard: Heard):
+    heard.paint(1, 0.8)
+    [looks] = heard.studio.said(protocol.SaveLook("  bright \n day "), {})
+    [look] = looks.fields["looks"]
+    assert look["name"] == "bright day"
+    first = heard.studio.session.image.copy()
+    heard.paint(2, 0.1)
+    second = heard.studio.session.image.copy()
+    heard.studio.said(protocol.LoadLook(look["id"]), {})
+    np.testing.assert_array_equal(heard.studio.session.image, first)
+    heard.studio.said(protocol.Undo(), {})
+    np.testing.assert_array_equal(heard.studio.session.image, second)
+    heard.studio.said(protocol.CopyLook(look["id"]), {})
+    heard.studio.said(protocol.RenameLook(look["id"], "noon"), {})
+    [message] = heard.studio.said(protocol.DropLook(look["id"]), {})
+    assert [x["name"] for x in message.fields["looks"]] == ["bright day copy"]
+    with pytest.raises(lp.LightpaintError, match="no look"):
+        heard.studio.said(protocol.LoadLook(99), {})
+
+
+def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: Path):
+    heard.paint(1, 0.8)
+    heard.paint(2, 0.3, (0, 6, 10, 30))
+    heard.studio.said(protocol.Ask(0, {"lock": True}), {})
+    heard.studio.said(protocol.SaveLook("a"), {})
+    session = heard.studio.session
+    heard.studio.close()
+    again = Heard(basis, tmp_path)
+    np.testing.assert_array_equal(again.studio.session.image, session.image)
+    assert again.studio.session.wishes == session.wishes
+    state = again.studio.state().fields
+    assert len(state["history"]["undo"]) == 3
+    assert [look["name"] for look in state["looks"]] == ["a"]
+    again.studio.said(protocol.Undo(), {})
+    again.studio.said(protocol.Undo(), {})
+    assert again.studio.session.importance[2, 20] == 0
+    again.studio.close()
+
+
+def test_why_it_is_not_closer(heard: Heard):
+    heard.paint(1, 8.0)
+    heard.studio.said(protocol.Explain(), {})
+    message = heard.wait(lambda m: m.kind == "explained")
+    assert message.fields["sentences"]
+    beyond = heard.studio.resource("beyond")
+    assert beyond[4:11, 5:14].max() == 0 or beyond.max() <= 255
+    assert not beyond[heard.studio.session.importance == 0].any()
+
+
+def test_without_a_scene_there_is_nothing_to_render(heard: Heard):
+    with pytest.raises(lp.LightpaintError, match="no scene to render"):
+        heard.studio.said(protocol.Verify(), {})
+    with pytest.raises(lp.LightpaintError, match="no picture"):
+        heard.studio.resource("../secret")

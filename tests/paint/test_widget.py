@@ -1,0 +1,283 @@
+"""The painter of a notebook, over a comm that only notes: what it hears, what it says."""
+
+import importlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.browser import BundleError, bundled, source
+from lightpaint.paint import bundle, protocol
+
+pytest.importorskip("anywidget", reason="anywidget")
+comm = pytest.importorskip("comm", reason="comm")
+
+SIZE = (12, 20)
+PAGE, OTHER = 7, 9
+
+
+class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
+    """A line to a page that there is none of."""
+
+    def publish_msg(self, msg_type: str, **said: Any) -> None:
+        data, buffers = said.get("data") or {}, said.get("buffers") or []
+        if data.get("method") == "custom":
+            self.messages.append((data["content"], [bytes(x) for x in buffers]))
+        elif data.get("method") == "update":
+            self.synced |= data["state"]
+
+
+@pytest.fixture(autouse=True)
+def line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Widgets have such a line, also where no kernel runs."""
+    noted = type("Line", (Noted,), {"messages": [], "synced": {}})
+    monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> lp.Basis:
+    """Three lights whose colours are free."""
+    return make_basis(3, SIZE, names=("key", "fill", "back"))
+
+
+@pytest.fixture
+def open_(basis: lp.Basis, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+    """Painters that are closed at the end."""
+    made = []
+
+    def make(**how: Any) -> Any:
+        made.append(lp.Painter(basis, folder=tmp_path, colors="free", hold=0.0, **how))
+        made[-1].comm.messages = []
+        return made[-1]
+
+    yield make
+    for painter in made:
+        painter.close()
+
+
+class Page:
+    """What a page does."""
+
+    def __init__(self, painter: Any, page: int = PAGE) -> None:
+        self.painter, self.page, self.seq = painter, page, page * 2**32
+
+    def say(self, kind: str, arrays: Any = None, **fields: Any) -> dict[str, Any]:
+        """Say something; the answer, with its arrays."""
+        self.seq += 1
+        arrays = arrays or {}
+        told = [{"name": k, "dtype": x.dtype.name, "shape": x.shape} for k, x in arrays.items()]
+        about = [{**one, "shape": list(one["shape"])} for one in told]
+        content = {"kind": kind, "seq": self.seq, **fields, "buffers": about}
+        data = {"method": "custom", "content": content}
+        buffers = [memoryview(x.tobytes()) for x in arrays.values()]
+        self.painter.comm.handle_msg({"content": {"data": data}, "buffers": buffers})
+        [(answer, buffers)] = [x for x in self.heard() if x[0].get("reply") == self.seq]
+        return answer | {"arrays": _arrays(answer, buffers)}
+
+    def heard(self) -> list[Any]:
+        """What this page was told."""
+        return [x for x in self.painter.comm.messages if x[0].get("page") == self.page]
+
+    def paint(self, image: Any, stroke: int = 0) -> dict[str, Any]:
+        """Over everything."""
+        arrays = {"image": np.float32(image), "importance": np.ones(SIZE, np.float32)}
+        region = [0, SIZE[0], 0, SIZE[1]]
+        return self.say("paint", arrays, stroke=stroke, region=region, done=True)
+
+
+def _arrays(content: Any, buffers: Any) -> dict[str, Any]:
+    return {
+        about["name"]: np.frombuffer(buffer, about["dtype"]).reshape(about["shape"])
+        for about, buffer in zip(content["buffers"], buffers, strict=True)
+    }
+
+
+def wait_for(what: Callable[[], Any]) -> Any:
+    """What it gives, once it does."""
+    end_s = time.monotonic() + 30
+    while not (found := what()):
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+    return found
+
+
+def test_a_page_opens_fetches_and_paints(basis: lp.Basis, open_: Any) -> None:
+    painter = open_()
+    page = Page(painter)
+    state = page.say("hello", version=protocol.VERSION)
+    assert state["kind"] == "state"
+    assert [x["name"] for x in state["lights"]] == list(basis.names)
+    plane = page.say("fetch", name="plane/1")["arrays"]["data"]
+    unit = plane.astype(np.float32) * state["lights"][1]["scale"]
+    np.testing.assert_allclose(unit, basis.images[1], rtol=2**-10, atol=1e-6)  # halves
+    told: list[Any] = []
+    painter.observe(lambda change: told.append(change.new), "lighting")
+    weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0, 0.2, 0.9]])
+    answer = page.paint(basis.mix(weights))
+    assert answer["kind"] == "answer"
+    np.testing.assert_allclose(answer["arrays"]["weights"], weights, atol=1e-5)
+    exact = wait_for(lambda: [x for x, _ in page.heard() if x.get("exact")])
+    assert "reply" not in exact[0]
+    wait_for(lambda: told)
+    np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
+    assert told[-1] is painter.lighting
+    np.testing.assert_array_equal(painter.target.image, np.float32(basis.mix(weights)))
+    np.testing.assert_allclose(painter.solution.weights, weights, atol=1e-5)
+
+
+def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
+    painter = open_()
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0.4, 0.2, 0.9]])
+    image = basis.mix(weights).astype(np.float32)
+    told: list[str] = []
+    painter.observe(lambda change: told.append(change.name))
+    painter.target = lp.Target("cell", image, np.ones(SIZE, np.float32), everything=True)
+    assert sorted(set(told)) == ["lighting", "target"]
+    patch, buffers = next(x for x in page.heard() if x[0]["kind"] == "patch")
+    np.testing.assert_array_equal(_arrays(patch, buffers)["image"], image)
+    assert patch["history"]["undo"] == ["painting from a cell"]
+    np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
+    painter.constraints = lp.Constraints.of({"k*": {"off": True}})
+    assert painter.constraints == lp.Constraints.of({"key": {"off": True}})
+    assert painter.lighting.emission["key"] == (0, 0, 0)
+    page.say("undo")
+    wait_for(lambda: not painter.constraints)
+    held = lp.Lighting.of_weights(basis, np.full((3, 3), 0.25))
+    painter.lighting = held
+    assert painter.lighting.emission == held.emission
+    assert painter.solution.lighting.emission == held.emission
+    state = page.say("hello", version=protocol.VERSION)
+    assert state["asked"]["fill"] == {"lock": [0.25, 0.25, 0.25]}
+    painter.save(tmp_path / "evening.json")
+    assert lp.read_lighting(tmp_path / "evening.json").emission == held.emission
+    painter.save(tmp_path / "evening.exr")
+    np.testing.assert_array_equal(lp.read_target(tmp_path / "evening.exr").image, image)
+    painter.target = None
+    assert painter.target is None
+    assert painter.solution is None
+
+
+def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_: Any) -> None:
+    painter = open_()
+    before = painter.lighting
+    small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
+    with pytest.raises(lp.LightpaintError, match="3x3"):
+        painter.target = small
+    with pytest.raises(lp.LightpaintError, match=r"painter.lighting is a lp.Lighting"):
+        painter.lighting = {"key": 1}
+    with pytest.raises(lp.LightpaintError, match="no light 'lamp'"):
+        painter.constraints = lp.Constraints.of({"lamp": {"off": True}})
+    with pytest.raises(lp.LightpaintError, match="nothing is painted"):
+        painter.save("a.exr")
+    with pytest.raises(lp.LightpaintError, match=r"expected \.exr"):
+        painter.save("a.png")
+    assert painter.lighting == before
+    assert painter.target is None
+    with pytest.raises(lp.LightpaintError, match="not int"):
+        lp.Painter(3)
+
+
+def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any) -> None:
+    painter = open_()
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    painter.observe(lambda _: 1 / 0, "target")
+    assert page.paint(basis.images[0])["kind"] == "answer"
+    said = wait_for(lambda: [x["text"] for x, _ in page.heard() if x["kind"] == "say"])
+    assert "callback of painter.target failed: ZeroDivisionError" in said[0]
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    # And it goes on.
+    assert page.paint(basis.images[1], 1)["kind"] == "answer"
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_junk_is_answered(basis: lp.Basis, open_: Any, monkeypatch: Any, capsys: Any) -> None:
+    painter = open_()
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    assert page.say("nothing")["kind"] == "failed"
+    assert page.say("fetch", name="../secret")["kind"] == "failed"
+    bad = {"image": np.full((*SIZE, 3), np.nan, np.float32)}
+    assert "NaN" in page.say("paint", bad, stroke=0, region=[0, 12, 0, 20])["text"]
+    monkeypatch.setattr(painter._studio, "said", lambda *_: 1 / 0)
+    assert "failed inside lightpaint: ZeroDivisionError" in page.say("undo")["text"]
+    assert "Traceback" in capsys.readouterr().err
+    monkeypatch.undo()
+    other = page.say("hello", version=protocol.VERSION + 1)
+    assert (other["kind"], other["reason"]) == ("closed", "version")
+
+
+def test_who_is_shown_last_has_it(basis: lp.Basis, open_: Any) -> None:
+    painter = open_()
+    first, second = Page(painter), Page(painter, OTHER)
+    first.say("hello", version=protocol.VERSION)
+    second.say("hello", version=protocol.VERSION)
+    assert first.heard()[-1][0]["reason"] == "taken"
+    assert first.paint(basis.images[0])["reason"] == "taken"
+    assert second.paint(basis.images[0])["kind"] == "answer"
+    assert first.say("take_over")["kind"] == "state"
+    assert second.heard()[-1][0]["reason"] == "taken"
+
+
+def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
+    painter = open_(store=tmp_path / "evening.db")
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    page.paint(basis.images[2])
+    painter.close()
+    again = open_(store=tmp_path / "evening.db")
+    np.testing.assert_array_equal(again.target.image, basis.images[2])
+
+
+def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    importlib.import_module("lightpaint.paint.widget")
+    monkeypatch.delitem(sys.modules, "lightpaint.paint.widget")
+    monkeypatch.delitem(vars(lp), "Painter", raising=False)
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    with pytest.raises(lp.LightpaintError) as raised:
+        _ = lp.Painter
+    assert str(raised.value) == "lp.Painter needs anywidget: pip install 'lightpaint[notebook]'"
+
+
+def test_the_script_is_one_module() -> None:
+    text = bundle.widget_script()
+    assert text.endswith(".default\n")
+    assert text.count("\nexport ") == 1
+    assert "\nimport " not in text
+    assert "http:" not in text.replace("http://www.w3.org", "")
+    assert ".lightpaint" in bundle.widget_style()
+    # Of what others wrote, who wrote it and under which licence.
+    assert "MIT" in text
+    assert text == bundled.__wrapped__("widget.js")
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        ({"a.js": "export default 3\n"}, "what is `export default 3`"),
+        ({"a.js": "export let x = 3\n"}, "what is `export let x = 3`"),
+        ({"a.js": "import { x } from 'x'\n"}, "a path that begins with a dot"),
+        (
+            {"a.js": "import { x } from './b.js'\n", "b.js": "import './a.js'\n"},
+            "a.js > b.js > a.js",
+        ),
+        ({"a.js": "const here = import.meta.url\n"}, "import.meta"),
+        ({"a.js": "import x from './b.js'\n", "b.js": "\n"}, "imports 'x'"),
+    ],
+)
+def test_what_is_not_understood_is_refused(files: Any, said: str, monkeypatch: Any) -> None:
+    monkeypatch.setattr("lightpaint.browser.source", lambda path: files[path])
+    monkeypatch.setattr("lightpaint.browser._code", lambda path: files[path])
+    with pytest.raises(BundleError, match=said):
+        bundled.__wrapped__("a.js")
+
+
+def test_sources_are_read_below_the_page_only() -> None:
+    assert source("widget.js").startswith("/**")
