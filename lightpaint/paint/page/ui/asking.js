@@ -1,8 +1,8 @@
 /** What the solve may do with one light: all that can be asked of it, in words of the trade. */
 
-import { html, useState } from '../vendor/preact.js'
-import { luminance, toHex, toKelvin } from './colours.js'
-import { Button, Choice, Number_, Select } from './controls.js'
+import { html, useState } from '../vendor/preact.js';
+import { luminance, toHex, toKelvin } from './colours.js';
+import { Button, Choice, Number_, Select } from './controls.js';
 
 /** @typedef {import("./model.js").Asked} Asked */
 /** @typedef {import("./engine.js").RGB} RGB */
@@ -12,22 +12,22 @@ const MANNERS = [
   { value: 'held', label: 'Held', tip: 'It stays at a level' },
   { value: 'present', label: 'As now', tip: 'It stays as the scene has it' },
   { value: 'off', label: 'Off', tip: 'It is off in every answer' },
-]
+];
 const COLOURS = [
   { value: 'any', label: 'Any colour' },
   { value: 'color', label: 'One colour' },
   { value: 'kelvin', label: 'White, from – to' },
   { value: 'primaries', label: 'Mix of LEDs' },
-]
+];
 
 /** @param {import("./light.js").Props} props */
 export function Asking(props) {
-  const { k, light, hands, asked = {}, rgb, readonly } = props
-  const { session } = hands
+  const { k, light, hands, asked = {}, rgb, readonly } = props;
+  const { session } = hands;
   if (readonly || light.is_fixed) {
     return html`<p class="asking-light faint">${
       light.is_fixed ? 'This light is not adjusted.' : ''
-    }</p>`
+    }</p>`;
   }
   const manner = asked.off
     ? 'off'
@@ -35,13 +35,13 @@ export function Asking(props) {
       ? 'present'
       : asked.lock !== undefined
         ? 'held'
-        : 'free'
+        : 'free';
   const change = (/** @type {string} */ to) => {
-    if (to === 'free') session.release(k)
-    if (to === 'held') session.hold(k, rgb, true)
-    if (to === 'present') session.ask(k, { lock: true })
-    if (to === 'off') session.turn(k, true)
-  }
+    if (to === 'free') session.release(k);
+    if (to === 'held') session.hold(k, rgb, true);
+    if (to === 'present') session.ask(k, { lock: true });
+    if (to === 'off') session.turn(k, true);
+  };
   return html`<div class="asking-light" role="group" aria-label=${`What the solve may do with ${
     light.label
   }`}>
@@ -54,41 +54,41 @@ export function Asking(props) {
       ${!light.is_scalar && html`<${Colours} ...${props} />`}`
     }
     <${Ties} ...${props} />
-  </div>`
+  </div>`;
 }
 
 /** @param {import("./light.js").Props} props */
 function Held({ k, light, hands, rgb }) {
-  const level = luminance(rgb)
+  const level = luminance(rgb);
   const to = (/** @type {number} */ value) => {
-    const factor = level > 0 ? value / level : value
-    const base = level > 0 ? rgb : /** @type {RGB} */ ([1, 1, 1])
-    hands.session.hold(k, /** @type {RGB} */ (base.map((x) => x * factor)), true)
-  }
+    const factor = level > 0 ? value / level : value;
+    const base = level > 0 ? rgb : /** @type {RGB} */ ([1, 1, 1]);
+    hands.session.hold(k, /** @type {RGB} */ (base.map((x) => x * factor)), true);
+  };
   return html`<${Number_} label="Held at" value=${level} least=${0} digits=${4} unit=${light.unit}
-    step=${0.1} change=${to} />`
+    step=${0.1} change=${to} />`;
 }
 
 /** @param {import("./light.js").Props} props */
 function Limits({ k, light, hands, asked = {} }) {
-  const limits = asked.limits ?? {}
-  const given = limits.max ?? limits.min
-  const canShare = luminance(light.present) > 0
-  const [chosen, setUnit] = useState(typeof given === 'number' || !canShare ? 'value' : 'share')
-  const unit = given === undefined ? chosen : typeof given === 'number' ? 'value' : 'share'
+  const limits = asked.limits ?? {};
+  const given = limits.max ?? limits.min;
+  const canShare = luminance(light.present) > 0;
+  const [chosen, setUnit] = useState(typeof given === 'number' || !canShare ? 'value' : 'share');
+  const unit = given === undefined ? chosen : typeof given === 'number' ? 'value' : 'share';
   const set = (/** @type {"min" | "max"} */ key, /** @type {number | null} */ value) => {
     const made = {
       ...limits,
       [key]: value === null ? null : unit === 'share' ? `${value}%` : value,
-    }
-    const kept = Object.fromEntries(Object.entries(made).filter(([, x]) => x !== null))
-    const { limits: _, ...rest } = asked
-    hands.session.ask(k, Object.keys(kept).length ? { ...rest, limits: kept } : rest)
-  }
+    };
+    const kept = Object.fromEntries(Object.entries(made).filter(([, x]) => x !== null));
+    const { limits: _, ...rest } = asked;
+    hands.session.ask(k, Object.keys(kept).length ? { ...rest, limits: kept } : rest);
+  };
   const into = (/** @type {string} */ to) => {
-    setUnit(to)
-    if (given === undefined || to === unit) return
-    const now = luminance(light.present)
+    setUnit(to);
+    if (given === undefined || to === unit) return;
+    const now = luminance(light.present);
     const turned = Object.fromEntries(
       Object.entries(limits).map(([key, x]) => [
         key,
@@ -96,13 +96,13 @@ function Limits({ k, light, hands, asked = {} }) {
           ? `${Number(((100 * amount(x)) / now).toPrecision(4))}%`
           : Number(((amount(x) / 100) * now).toPrecision(4)),
       ]),
-    )
-    hands.session.ask(k, { ...asked, limits: turned })
-  }
+    );
+    hands.session.ask(k, { ...asked, limits: turned });
+  };
   const units = [
     { value: 'share', label: '% of now' },
     { value: 'value', label: light.unit || 'value' },
-  ]
+  ];
   return html`<div class="ask-row">
     <${Number_} label="At least" value=${amount(limits.min)} least=${0} empty="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} digits=${4} />
@@ -113,29 +113,29 @@ function Limits({ k, light, hands, asked = {} }) {
       html`<${Select} label="Limits in" hidden value=${unit} choices=${units}
       change=${into} />`
     }
-  </div>`
+  </div>`;
 }
 
 /** @param {any} level @returns {any} a number, or null */
 function amount(level) {
-  if (level === undefined || level === null) return null
-  return Array.isArray(level) ? luminance(level) : parseFloat(level)
+  if (level === undefined || level === null) return null;
+  return Array.isArray(level) ? luminance(level) : parseFloat(level);
 }
 
 /** @param {import("./light.js").Props} props */
 function Colours(props) {
-  const { k, hands, asked = {}, rgb } = props
-  const kind = ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any'
-  const { color, kelvin, duv, primaries, ...rest } = asked
+  const { k, hands, asked = {}, rgb } = props;
+  const kind = ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any';
+  const { color, kelvin, duv, primaries, ...rest } = asked;
   const change = (/** @type {string} */ to) => {
     const made = {
       any: {},
       color: { color: hexOf(rgb) },
       kelvin: { kelvin: [2700, 6500] },
       primaries: { primaries: ['#ff0000', '#00ff00', '#0000ff'] },
-    }[to]
-    hands.session.ask(k, { ...rest, ...made })
-  }
+    }[to];
+    hands.session.ask(k, { ...rest, ...made });
+  };
   return html`<div class="ask-row">
       <${Select} label="Colour" value=${kind} choices=${COLOURS} change=${change} /></div>
     ${kind === 'color' && html`<${One} ...${props} rest=${rest} />`}
@@ -145,13 +145,13 @@ function Colours(props) {
       html`<${Words} label="LEDs" value=${[...primaries].join(', ')}
       take=${(/** @type {string} */ text) =>
         hands.session.ask(k, { ...rest, primaries: text.split(/[\s,]+/).filter(Boolean) })} />`
-    }`
+    }`;
 }
 
 /** @param {any} props */
 function One({ k, hands, asked, rest, rgb }) {
-  const text = Array.isArray(asked.color) ? hexOf(asked.color) : String(asked.color)
-  const found = toKelvin(rgb)
+  const text = Array.isArray(asked.color) ? hexOf(asked.color) : String(asked.color);
+  const found = toKelvin(rgb);
   return html`<div class="ask-row">
     <${Words} label="Hex or kelvin" value=${text}
       take=${(/** @type {string} */ color) => hands.session.ask(k, { ...rest, color })} />
@@ -161,20 +161,20 @@ function One({ k, hands, asked, rest, rgb }) {
       tip="The white that it is nearest to in the answer" act=${() =>
         hands.session.ask(k, { ...rest, color: `${Math.round(found.kelvin / 50) * 50}K` })} />`
     }
-  </div>`
+  </div>`;
 }
 
 /** @param {any} props */
 function Whites({ k, hands, asked, rest }) {
-  const ends = [asked.kelvin].flat()
-  const [low, high] = [ends[0], ends.at(-1)]
+  const ends = [asked.kelvin].flat();
+  const [low, high] = [ends[0], ends.at(-1)];
   const set = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
     hands.session.ask(k, {
       ...rest,
       kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
       ...(duv ? { duv } : {}),
-    })
-  const duv = asked.duv ?? 0
+    });
+  const duv = asked.duv ?? 0;
   return html`<div class="ask-row">
     <${Number_} label="From" value=${low} least=${1000} most=${25000} step=${100} digits=${0}
       unit="K" change=${(/** @type {number} */ to) => set(to, high, duv)} />
@@ -182,20 +182,20 @@ function Whites({ k, hands, asked, rest }) {
       unit="K" change=${(/** @type {number} */ to) => set(low, to, duv)} />
     <${Number_} label="Green" value=${1000 * duv} least=${-20} most=${20} digits=${1}
       change=${(/** @type {number} */ to) => set(low, high, to / 1000)} />
-  </div>`
+  </div>`;
 }
 
 /** @param {import("./light.js").Props} props */
 function Ties({ light, hands, tied, others = [] }) {
   const free = others.filter(
     (one) => !one.is_fixed && one.name !== light.name && !tied?.includes(one.name),
-  )
+  );
   const label = (/** @type {string} */ name) =>
-    others.find((one) => one.name === name)?.label ?? name
+    others.find((one) => one.name === name)?.label ?? name;
   const choices = [
     { value: '', label: 'no other' },
     ...free.map((one) => ({ value: one.name, label: one.label })),
-  ]
+  ];
   return html`<div class="ask-row">
     ${
       tied &&
@@ -206,24 +206,24 @@ function Ties({ light, hands, tied, others = [] }) {
     }
     <${Select} label=${tied ? 'And with' : 'On one dimmer with'} value="" choices=${choices}
       change=${(/** @type {string} */ name) => name && hands.session.tie(light.name, name)} />
-  </div>`
+  </div>`;
 }
 
 /** @param {{label: string, value: string, take: (text: string) => void}} props */
 function Words({ label, value, take }) {
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null))
+  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
   const done = () => {
-    if (typed !== null && typed.trim() && typed !== value) take(typed.trim())
-    setTyped(null)
-  }
+    if (typed !== null && typed.trim() && typed !== value) take(typed.trim());
+    setTyped(null);
+  };
   return html`<label class="field words"><span class="name">${label}</span>
     <input type="text" value=${typed ?? value} spellcheck="false" autocomplete="off"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)} onBlur=${done}
-      onKeyDown=${(/** @type {any} */ event) => event.key === 'Enter' && done()} /></label>`
+      onKeyDown=${(/** @type {any} */ event) => event.key === 'Enter' && done()} /></label>`;
 }
 
 /** @param {RGB} rgb */
 function hexOf(rgb) {
-  const top = Math.max(...rgb) || 1
-  return toHex(rgb.map((x) => x / top))
+  const top = Math.max(...rgb) || 1;
+  return toHex(rgb.map((x) => x / top));
 }

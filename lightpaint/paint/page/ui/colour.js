@@ -1,14 +1,14 @@
 /** The colour of the paint: as white and green, as HSV, as RGB, as hex; how bright; swatches. */
 
-import { html, useState } from '../vendor/preact.js'
-import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './colours.js'
-import { Choice, Slider } from './controls.js'
+import { html, useState } from '../vendor/preact.js';
+import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './colours.js';
+import { Choice, Slider } from './controls.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").RGB} RGB */
 /** @typedef {import("./keys.js").Hands} Hands */
 
-const WHITES = [1900, 2700, 3200, 4300, 5600, 6500, 9000]
+const WHITES = [1900, 2700, 3200, 4300, 5600, 6500, 9000];
 const GELS = [
   ['Red', '#ff2a1a'],
   ['Amber', '#ff9a1f'],
@@ -17,18 +17,18 @@ const GELS = [
   ['Blue', '#2a55ff'],
   ['Magenta', '#e02fd0'],
   ['Black: no light', '#000000'],
-]
+];
 const MIXERS = [
   { value: 'white', label: 'White' },
   { value: 'hsv', label: 'HSV' },
   { value: 'rgb', label: 'RGB' },
-]
+];
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ColourPanel({ ui, hands }) {
-  const { store } = hands
-  const set = (/** @type {RGB} */ colour) => store.set({ colour })
-  const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer]
+  const { store } = hands;
+  const set = (/** @type {RGB} */ colour) => store.set({ colour });
+  const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
     <div class="colour-row">
       <span class="patch" style=${{ background: toHex(ui.colour) }}></span>
@@ -41,81 +41,81 @@ export function ColourPanel({ ui, hands }) {
       unit="st" rest=${0} tip="Stops over display white. Light may be brighter than white."
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
     <${Swatches} ui=${ui} hands=${hands} />
-  </div>`
+  </div>`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Hex({ colour, set }) {
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null))
+  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
   const take = (/** @type {string} */ text) => {
-    const made = ofHex(text)
-    setTyped(null)
-    if (made) set(made)
-  }
+    const made = ofHex(text);
+    setTyped(null);
+    if (made) set(made);
+  };
   return html`<label class="field hex"><span class="only-read">Hex</span>
     <input type="text" value=${typed ?? toHex(colour)} spellcheck="false" autocomplete="off"
       maxlength="7"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)}
       onKeyDown=${(/** @type {any} */ event) =>
-        event.key === 'Enter' && take(event.currentTarget.value)} /></label>`
+        event.key === 'Enter' && take(event.currentTarget.value)} /></label>`;
 }
 
 /** @param {RGB[]} colours */
-const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(', ')})`
+const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(', ')})`;
 
 /** By the mired, in which equal steps look equal; warm is left. */
 const MIRED = {
   to: (/** @type {number} */ k) => -1e6 / k,
   of: (/** @type {number} */ t) => Math.round(-1e6 / t / 50) * 50,
-}
+};
 const KELVIN_TRACK = gradient(
   Array.from({ length: 12 }, (_, i) => ofKelvin(MIRED.of(-667 + (i / 11) * (667 - 66.7)))),
-)
+);
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function White({ colour, set }) {
   // Of what is no white, the last one stays on the dials; black keeps them, too.
-  const [last, setLast] = useState({ kelvin: 3200, green: 0 })
-  const found = toKelvin(colour)
-  const dials = same(ofKelvin(last.kelvin, last.green), colour) ? last : (found ?? last)
-  const level = Math.max(...colour) || 1
+  const [last, setLast] = useState({ kelvin: 3200, green: 0 });
+  const found = toKelvin(colour);
+  const dials = same(ofKelvin(last.kelvin, last.green), colour) ? last : (found ?? last);
+  const level = Math.max(...colour) || 1;
   const dial = (/** @type {{kelvin?: number, green?: number}} */ changed) => {
-    const made = { ...dials, ...changed }
-    setLast(made)
-    const rgb = ofKelvin(made.kelvin, made.green)
-    set(/** @type {RGB} */ (rgb.map((x) => x * level)))
-  }
-  const kelvin = Math.min(15000, Math.max(1500, dials.kelvin))
-  const green = Math.min(20, Math.max(-20, dials.green))
+    const made = { ...dials, ...changed };
+    setLast(made);
+    const rgb = ofKelvin(made.kelvin, made.green);
+    set(/** @type {RGB} */ (rgb.map((x) => x * level)));
+  };
+  const kelvin = Math.min(15000, Math.max(1500, dials.kelvin));
+  const green = Math.min(20, Math.max(-20, dials.green));
   return html`<${Slider} label="Kelvin" value=${kelvin} least=${1500} most=${15000} step=${100}
       unit="K" curve=${MIRED} track=${KELVIN_TRACK}
       change=${(/** @type {number} */ made) => dial({ kelvin: made })} />
     <${Slider} label="Green" value=${green} least=${-20} most=${20} step=${1} digits=${0} rest=${0}
       track=${gradient([-20, 0, 20].map((by) => ofKelvin(kelvin, by)))}
       tip="Towards green, or to the left towards magenta: thousandths of (u, v)"
-      change=${(/** @type {number} */ made) => dial({ green: made })} />`
+      change=${(/** @type {number} */ made) => dial({ green: made })} />`;
 }
 
 /** Up to how bright they are. @param {RGB} a @param {RGB} b */
 function same(a, b) {
-  const [m, n] = [Math.max(...a), Math.max(...b)]
-  return n > 0 && a.every((x, c) => Math.abs(x / m - b[c] / n) < 1e-4)
+  const [m, n] = [Math.max(...a), Math.max(...b)];
+  return n > 0 && a.every((x, c) => Math.abs(x / m - b[c] / n) < 1e-4);
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Hsv({ colour, set }) {
-  const now = toHsv(colour)
-  const [kept, keep] = useState(now)
+  const now = toHsv(colour);
+  const [kept, keep] = useState(now);
   // Grey has no hue, and black no saturation: those on the sliders stay.
-  const hue = now[1] > 0.004 && now[2] > 0 ? now[0] : kept[0]
-  const hsv = /** @type {RGB} */ ([hue, now[2] > 0 ? now[1] : kept[1], now[2]])
+  const hue = now[1] > 0.004 && now[2] > 0 ? now[0] : kept[0];
+  const hsv = /** @type {RGB} */ ([hue, now[2] > 0 ? now[1] : kept[1], now[2]]);
   const to = (/** @type {number} */ at, /** @type {number} */ value) => {
-    const made = /** @type {RGB} */ (hsv.map((x, c) => (c === at ? value : x)))
-    keep(made)
-    set(ofHsv(made))
-  }
-  const hues = Array.from({ length: 7 }, (_, i) => ofHsv([i * 60, 1, 1]))
+    const made = /** @type {RGB} */ (hsv.map((x, c) => (c === at ? value : x)));
+    keep(made);
+    set(ofHsv(made));
+  };
+  const hues = Array.from({ length: 7 }, (_, i) => ofHsv([i * 60, 1, 1]));
   return html`<${Slider} label="Hue" value=${hsv[0]} least=${0} most=${360} unit="°"
       track=${gradient(hues)} change=${(/** @type {number} */ x) => to(0, x)} />
     <${Slider} label="Saturation" value=${100 * hsv[1]} least=${0} most=${100} unit="%"
@@ -123,28 +123,28 @@ function Hsv({ colour, set }) {
       change=${(/** @type {number} */ x) => to(1, x / 100)} />
     <${Slider} label="Value" value=${100 * hsv[2]} least=${0} most=${100} unit="%"
       track=${gradient([[0, 0, 0], ofHsv([hsv[0], hsv[1], 1])])}
-      change=${(/** @type {number} */ x) => to(2, x / 100)} />`
+      change=${(/** @type {number} */ x) => to(2, x / 100)} />`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Rgb({ colour, set }) {
   const to = (/** @type {number} */ at, /** @type {number} */ value) =>
-    /** @type {RGB} */ (colour.map((x, c) => (c === at ? decode(value / 255) : x)))
+    /** @type {RGB} */ (colour.map((x, c) => (c === at ? decode(value / 255) : x)));
   return html`${['Red', 'Green', 'Blue'].map(
     (label, c) => html`<${Slider} key=${label}
     label=${label} value=${255 * encode(colour[c])} least=${0} most=${255}
     track=${gradient([to(c, 0), to(c, 255)])}
     change=${(/** @type {number} */ value) => set(to(c, value))} />`,
-  )}`
+  )}`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 function Swatches({ ui, hands }) {
-  const { store } = hands
+  const { store } = hands;
   const swatch = (/** @type {RGB} */ rgb, /** @type {string} */ tip, /** @type {number} */ stops) =>
     html`<button type="button" class="swatch" key=${tip} aria-label=${tip} data-tip=${tip}
-      style=${{ background: toHex(rgb) }} onClick=${() => store.set({ colour: rgb, stops })}></button>`
-  const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (ofHex(hex)) }))
+      style=${{ background: toHex(rgb) }} onClick=${() => store.set({ colour: rgb, stops })}></button>`;
+  const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (ofHex(hex)) }));
   return html`<div class="swatches" role="group" aria-label="Swatches">
     ${WHITES.map((kelvin) => swatch(ofKelvin(kelvin), `${kelvin} K`, ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
@@ -156,5 +156,5 @@ function Swatches({ ui, hands }) {
       swatch(colour, `Used lately ${k + 1}: ${toHex(colour)}`, stops),
     )}
   </div>`
-  }`
+  }`;
 }

@@ -1,14 +1,14 @@
 /** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
 
-import { html, useEffect, useRef, useState } from '../vendor/preact.js'
-import { Icon } from './icons.js'
+import { html, useEffect, useRef, useState } from '../vendor/preact.js';
+import { Icon } from './icons.js';
 
-let counter = 0
+let counter = 0;
 
 /** @returns {string} an id that no other element of the page has */
 export function useId() {
-  const [id] = useState(() => `lp-${(counter += 1)}`)
-  return id
+  const [id] = useState(() => `lp-${(counter += 1)}`);
+  return id;
 }
 
 /**
@@ -19,13 +19,13 @@ export function useId() {
 export function Button({ icon, label, tip, keys, on, disabled, primary, act, class: name }) {
   const kind = ['button', icon && !label && 'is-icon', on && 'is-on', primary && 'is-primary', name]
     .filter(Boolean)
-    .join(' ')
-  const hint = tip ?? (keys ? label : undefined)
+    .join(' ');
+  const hint = tip ?? (keys ? label : undefined);
   return html`<button type="button" class=${kind} disabled=${disabled} onClick=${act}
     aria-label=${label && label.length > 1 ? undefined : tip} aria-pressed=${on === undefined ? undefined : String(on)}
     aria-keyshortcuts=${keys} data-tip=${hint} data-keys=${keys}>
     ${icon && html`<${Icon} name=${icon} />`}${label && html`<span>${label}</span>`}
-  </button>`
+  </button>`;
 }
 
 /**
@@ -42,7 +42,7 @@ export function Choice({ label, value, choices, change, icons }) {
       keys=${one.keys} on=${one.value === value} disabled=${one.disabled}
       act=${() => change(one.value)} />`,
     )}
-  </div>`
+  </div>`;
 }
 
 /**
@@ -60,7 +60,7 @@ export function Select({ label, value, choices, change, hidden, tip }) {
         selected=${one.value === value}>${one.label}</option>`,
       )}
     </select>
-  </label>`
+  </label>`;
 }
 
 /** @param {{label: string, on: boolean, change: (on: boolean) => void, tip?: string,
@@ -70,7 +70,7 @@ export function Check({ label, on, change, tip, disabled }) {
     <input type="checkbox" checked=${on} disabled=${disabled}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.checked)} />
     <span>${label}</span>
-  </label>`
+  </label>`;
 }
 
 /**
@@ -80,31 +80,31 @@ export function Check({ label, on, change, tip, disabled }) {
  *   hidden?: boolean, empty?: string, disabled?: boolean}} props
  */
 export function Number_(props) {
-  const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props
-  const { least = -Infinity, most = Infinity } = props
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null))
-  const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))))
-  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, x))
+  const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
+  const { least = -Infinity, most = Infinity } = props;
+  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
+  const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))));
+  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, x));
   const take = (/** @type {string} */ text) => {
-    setTyped(null)
+    setTyped(null);
     const plain = text
       .trim()
       .replace(/^\u2212/, '-')
-      .replace(',', '.')
-    const made = Number(plain)
-    if (!plain && empty !== undefined) change(null)
-    else if (plain && Number.isFinite(made)) change(within(made))
-  }
+      .replace(',', '.');
+    const made = Number(plain);
+    if (!plain && empty !== undefined) change(null);
+    else if (plain && Number.isFinite(made)) change(within(made));
+  };
   const press = (/** @type {any} */ event) => {
-    const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)]
-    if (event.key === 'Enter') take(event.currentTarget.value)
+    const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
+    if (event.key === 'Enter') take(event.currentTarget.value);
     if (way) {
-      event.preventDefault()
-      setTyped(null)
-      const by = way * step * (event.shiftKey ? 10 : 1)
-      change(within(Number(((Number(shown) || 0) + by).toFixed(6))))
+      event.preventDefault();
+      setTyped(null);
+      const by = way * step * (event.shiftKey ? 10 : 1);
+      change(within(Number(((Number(shown) || 0) + by).toFixed(6))));
     }
-  }
+  };
   return html`<label class="field number">
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
@@ -112,7 +112,7 @@ export function Number_(props) {
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)} />
     ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}
-  </label>`
+  </label>`;
 }
 
 /**
@@ -124,14 +124,14 @@ export function Number_(props) {
  *   disabled?: boolean, keys?: string, tip?: string}} props
  */
 export function Slider(props) {
-  const { label, value, least, most, step = 1, unit, digits = 0, change, track, rest } = props
-  const { curve, text, plain, disabled, keys, tip } = props
-  const to = curve?.to ?? ((/** @type {number} */ x) => x)
-  const of = curve?.of ?? ((/** @type {number} */ x) => x)
+  const { label, value, least, most, step = 1, unit, digits = 0, change, track, rest } = props;
+  const { curve, text, plain, disabled, keys, tip } = props;
+  const to = curve?.to ?? ((/** @type {number} */ x) => x);
+  const of = curve?.of ?? ((/** @type {number} */ x) => x);
   const moved = (/** @type {any} */ event, /** @type {boolean} */ done) =>
-    change(of(Number(event.currentTarget.value)), done)
-  const [low, high] = [to(least), to(most)]
-  const at = Math.min(1, Math.max(0, (to(value) - low) / (high - low)))
+    change(of(Number(event.currentTarget.value)), done);
+  const [low, high] = [to(least), to(most)];
+  const at = Math.min(1, Math.max(0, (to(value) - low) / (high - low)));
   return html`<div class="slider" data-tip=${tip} data-keys=${keys}>
     ${!plain && html`<span class="name" aria-hidden="true">${label}</span>`}
     <input type="range" aria-label=${label} min=${low} max=${high}
@@ -148,7 +148,7 @@ export function Slider(props) {
       step=${step} digits=${digits} unit=${unit ?? ''} disabled=${disabled}
       change=${(/** @type {number} */ made) => change(made, true)} />`
     }
-  </div>`
+  </div>`;
 }
 
 /**
@@ -157,7 +157,7 @@ export function Slider(props) {
  *   class?: string}} props
  */
 export function Fold({ title, open, toggle, children, extra, class: name }) {
-  const id = useId()
+  const id = useId();
   return html`<section class=${`fold ${name ?? ''} ${open ? 'is-open' : ''}`} aria-label=${title}>
     <div class="fold-head">
       <h2><button type="button" aria-expanded=${String(open)} aria-controls=${id} onClick=${toggle}>
@@ -165,7 +165,7 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
       ${extra}
     </div>
     <div class="fold-body" id=${id} hidden=${!open}>${open && children}</div>
-  </section>`
+  </section>`;
 }
 
 /**
@@ -173,16 +173,16 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
  * @param {{title: string, close: () => void, children?: any, class?: string}} props
  */
 export function Dialog({ title, close, children, class: name }) {
-  const ref = useRef(/** @type {HTMLDialogElement | null} */ (null))
-  const id = useId()
+  const ref = useRef(/** @type {HTMLDialogElement | null} */ (null));
+  const id = useId();
   useEffect(() => {
-    const element = ref.current
+    const element = ref.current;
     const before = /** @type {HTMLElement | null} */ (
       /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement
-    )
-    if (element && !element.open) element.showModal()
-    return () => before?.focus?.()
-  }, [])
+    );
+    if (element && !element.open) element.showModal();
+    return () => before?.focus?.();
+  }, []);
   return html`<dialog class=${`dialog ${name ?? ''}`} ref=${ref} aria-labelledby=${id}
     onClose=${close} onClick=${(/** @type {any} */ event) => event.target === ref.current && close()}>
     <div class="dialog-head">
@@ -190,5 +190,5 @@ export function Dialog({ title, close, children, class: name }) {
       <${Button} icon="close" tip="Close" act=${close} />
     </div>
     <div class="dialog-body">${children}</div>
-  </dialog>`
+  </dialog>`;
 }

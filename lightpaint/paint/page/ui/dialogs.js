@@ -1,29 +1,29 @@
 /** Windows over the painter: all keys, files to write, how a painting is answered. */
 
-import { html, useState } from '../vendor/preact.js'
-import { Button, Check, Choice, Dialog, Number_ } from './controls.js'
-import { number } from './format.js'
-import { KEYS } from './keys.js'
+import { html, useState } from '../vendor/preact.js';
+import { Button, Check, Choice, Dialog, Number_ } from './controls.js';
+import { number } from './format.js';
+import { KEYS } from './keys.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Dialogs({ ui, hands }) {
-  const close = () => hands.store.set({ dialog: null })
-  if (ui.dialog === 'keys') return html`<${KeysDialog} close=${close} />`
+  const close = () => hands.store.set({ dialog: null });
+  if (ui.dialog === 'keys') return html`<${KeysDialog} close=${close} />`;
   if (ui.dialog === 'export')
-    return html`<${ExportDialog} ui=${ui} hands=${hands} close=${close} />`
+    return html`<${ExportDialog} ui=${ui} hands=${hands} close=${close} />`;
   if (ui.dialog === 'settings') {
-    return html`<${SettingsDialog} ui=${ui} hands=${hands} close=${close} />`
+    return html`<${SettingsDialog} ui=${ui} hands=${hands} close=${close} />`;
   }
-  return null
+  return null;
 }
 
 /** @param {{close: () => void}} props */
 function KeysDialog({ close }) {
-  const isMac = /mac/i.test(navigator.platform)
-  const spoken = (/** @type {string} */ key) => (isMac && key === 'Ctrl' ? '⌘' : key)
+  const isMac = /mac/i.test(navigator.platform);
+  const spoken = (/** @type {string} */ key) => (isMac && key === 'Ctrl' ? '⌘' : key);
   return html`<${Dialog} title="Keys" close=${close} class="keys">
     ${KEYS.map(
       ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
@@ -35,7 +35,7 @@ function KeysDialog({ close }) {
     </dl></section>`,
     )}
     <p class="faint">On a tablet one finger paints, two move and zoom. A pen paints with its pressure.</p>
-  </${Dialog}>`
+  </${Dialog}>`;
 }
 
 const FILES = [
@@ -43,18 +43,18 @@ const FILES = [
   { key: 'lighting', label: 'Lighting', about: 'lighting.json: every light, in numbers' },
   { key: 'relit', label: 'Scene', about: 'relit.xml: the scene with this lighting' },
   { key: 'report', label: 'Report', about: 'report.html: what was painted, what came of it' },
-]
+];
 
 /** @param {{ui: Ui, hands: Hands, close: () => void}} props */
 function ExportDialog({ ui, hands, close }) {
-  const can = FILES.filter(({ key }) => key !== 'relit' || ui.state?.can_render)
-  const [what, setWhat] = useState(can.map(({ key }) => key))
-  const isBusy = ui.isWriting
+  const can = FILES.filter(({ key }) => key !== 'relit' || ui.state?.can_render);
+  const [what, setWhat] = useState(can.map(({ key }) => key));
+  const isBusy = ui.isWriting;
   const write = () => {
-    hands.store.set({ isWriting: true, exported: null })
-    hands.session.send('export', { what })
-  }
-  const { exported } = ui
+    hands.store.set({ isWriting: true, exported: null });
+    hands.session.send('export', { what });
+  };
+  const { exported } = ui;
   return html`<${Dialog} title="Write files" close=${close} class="export">
     ${can.map(
       ({ key, label, about }) => html`<div class="export-row" key=${key}>
@@ -77,27 +77,27 @@ function ExportDialog({ ui, hands, close }) {
       }
     </div>`
     }
-  </${Dialog}>`
+  </${Dialog}>`;
 }
 
 /** @param {{text: string}} props */
 function Copied({ text }) {
-  const [isDone, setDone] = useState(false)
+  const [isDone, setDone] = useState(false);
   const copy = () =>
     navigator.clipboard?.writeText(text).then(
       () => setDone(true),
       () => undefined,
-    )
+    );
   return html`<div class="command"><code tabindex="0">${text}</code>
     <${Button} label=${isDone ? 'Copied' : 'Copy'} icon=${isDone ? 'check' : 'copy'} act=${copy} />
-  </div>`
+  </div>`;
 }
 
 const SPACES = [
   { value: null, label: 'Automatic' },
   { value: 'display', label: 'As it looks', tip: 'Differences count as the display shows them' },
   { value: 'linear', label: 'As light', tip: 'Differences count as light: bright places more' },
-]
+];
 const COLOURS = [
   { value: null, label: 'Automatic' },
   { value: 'free', label: 'Free', tip: 'Any colour that fits' },
@@ -107,20 +107,20 @@ const COLOURS = [
     tip: 'Their own colour, unless the painting asks for another',
   },
   { value: 'white', label: 'Whites', tip: 'From 2200 K to 9000 K' },
-]
+];
 
 /** @param {{ui: Ui, hands: Hands, close: () => void}} props */
 function SettingsDialog({ ui, hands, close }) {
-  const { settings, meant } = ui
+  const { settings, meant } = ui;
   const set = (/** @type {string} */ key) => (/** @type {any} */ value) =>
-    hands.session.setting(key, value)
-  const hold = settings.hold ?? null
-  const manner = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold'
+    hands.session.setting(key, value);
+  const hold = settings.hold ?? null;
+  const manner = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold';
   const holds = [
     { value: 'auto', label: 'Automatic' },
     { value: 'hold', label: 'Keep', tip: 'What is not painted stays near the present look' },
     { value: 'go', label: 'Let go', tip: 'What is not painted may become anything' },
-  ]
+  ];
   return html`<${Dialog} title="How the painting is answered" close=${close} class="settings">
     <${Row} title="What is not painted" is=${kept(meant.hold)}>
       <${Choice} label="What is not painted" value=${manner} choices=${holds}
@@ -153,18 +153,18 @@ function SettingsDialog({ ui, hands, close }) {
         most=${10} step=${0.01} digits=${3} change=${set('prefer_current')} />
       <${Number_} label="Use at most" value=${settings.sparse ?? null} least=${1} digits=${0}
         most=${ui.lights.length || 1} empty="all" unit="lights" change=${set('sparse')} /></${Row}>
-  </${Dialog}>`
+  </${Dialog}>`;
 }
 
 /** @param {number | null | undefined} hold */
 function kept(hold) {
-  if (hold === undefined || hold === null) return ''
-  const much = hold === 1 ? '' : `, ${number(hold)} times as firmly as usual`
-  return hold ? `is kept near the present look${much}` : 'is let go'
+  if (hold === undefined || hold === null) return '';
+  const much = hold === 1 ? '' : `, ${number(hold)} times as firmly as usual`;
+  return hold ? `is kept near the present look${much}` : 'is let go';
 }
 
 /** @param {{title: string, is: string, children?: any}} props */
 function Row({ title, is, children }) {
   return html`<section class="setting"><h3>${title}${is && html`<span class="faint">${is}</span>`}</h3>
-    <div class="row">${children}</div></section>`
+    <div class="row">${children}</div></section>`;
 }

@@ -1,6 +1,6 @@
 /** Icons, drawn as strokes on a grid of 24; a word beside them or a label says the same. */
 
-import { html } from '../vendor/preact.js'
+import { html } from '../vendor/preact.js';
 
 /** @type {Record<string, string>} */
 const PATHS = {
@@ -37,11 +37,11 @@ const PATHS = {
   warn: 'M12 4 2.800 19.500h18.400zM12 10v5M12 17.300v.1',
   check: 'M5 12.500 10 17.500 19.500 7',
   camera: 'M4 8h3.500L9 5.500h6L16.500 8H20v11H4zM12 10.300a3.200 3.200 0 1 0 .1 0',
-}
+};
 
 /** @param {{name: string}} props */
 export function Icon({ name }) {
   return html`<svg class="icon" viewBox="0 0 24 24" aria-hidden="true" focusable="false">
     <path d=${PATHS[name]} />
-  </svg>`
+  </svg>`;
 }

@@ -1,6 +1,6 @@
 /** All keys: one table, for the keyboard and for the overlay that shows them. */
 
-import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from './tools.js'
+import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from './tools.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./session.js").Session} Session */
@@ -11,16 +11,16 @@ import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } fr
 const zoomBy =
   (/** @type {number} */ factor) =>
   (/** @type {Hands} */ { store, engine }) => {
-    const { width, height } = engine.element.getBoundingClientRect()
-    const pane = engine.panes()[0] ?? { x: 0, y: 0, width, height }
-    look(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor))
-  }
+    const { width, height } = engine.element.getBoundingClientRect();
+    const pane = engine.panes()[0] ?? { x: 0, y: 0, width, height };
+    look(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
+  };
 
 /** @param {number} by */
 const expose =
   (by) =>
   (/** @type {Hands} */ { store }) =>
-    look(store, { stops: Math.min(10, Math.max(-10, store.value.show.stops + by)) })
+    look(store, { stops: Math.min(10, Math.max(-10, store.value.show.stops + by)) });
 
 /** Named by what they do; `keys` as the browser says them, Shift and Mod (Ctrl or ⌘) in front. */
 /** @type {{title: string, keys: Key[]}[]} */
@@ -76,8 +76,8 @@ export const KEYS = [
         shown: ['Esc'],
         does: 'leave the stroke',
         act: ({ engine, store }) => {
-          engine.cancel()
-          store.set({ asking: null, hovered: null })
+          engine.cancel();
+          store.set({ asking: null, hovered: null });
         },
       },
       {
@@ -139,30 +139,30 @@ export const KEYS = [
       },
     ],
   },
-]
+];
 
 const BY_KEY = new Map(
   KEYS.flatMap(({ keys }) => keys)
     .filter((one) => one.act)
     .map((one) => [one.keys, one]),
-)
+);
 
 /** @param {KeyboardEvent} event @returns {string} */
 function named(event) {
-  const key = event.key.toLowerCase()
+  const key = event.key.toLowerCase();
   // Some keyboards have [ and ] behind AltGr, which is Ctrl and Alt on some systems.
-  const isMod = (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph')
-  if (isMod) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`
-  return key === '=' ? '+' : key
+  const isMod = (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
+  if (isMod) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
+  return key === '=' ? '+' : key;
 }
 
 /** @param {KeyboardEvent} event @returns {boolean} whether it belongs to what is typed in */
 function isTyping(event) {
-  const element = /** @type {HTMLElement} */ (event.composedPath()[0])
-  const { tagName } = element
+  const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
+  const { tagName } = element;
   if (tagName === 'INPUT')
-    return !['range', 'checkbox', 'radio'].includes(/** @type {HTMLInputElement} */ (element).type)
-  return ['TEXTAREA', 'SELECT'].includes(tagName) || element.isContentEditable
+    return !['range', 'checkbox', 'radio'].includes(/** @type {HTMLInputElement} */ (element).type);
+  return ['TEXTAREA', 'SELECT'].includes(tagName) || element.isContentEditable;
 }
 
 /**
@@ -170,14 +170,14 @@ function isTyping(event) {
  * @param {KeyboardEvent} event @param {Hands} hands
  */
 export function press(event, hands) {
-  const isAlt = event.altKey && !event.getModifierState('AltGraph')
-  if (event.defaultPrevented || isAlt || isTyping(event)) return
-  if (hands.store.value.dialog || hands.store.value.readonly) return
-  const name = named(event)
-  const digit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey
-  const found = BY_KEY.get(name)
-  if (digit) hands.store.set({ flow: (Number(event.key) || 10) / 10 })
-  else if (found) /** @type {any} */ (found).act(hands)
-  else return
-  if (name !== 'escape') event.preventDefault()
+  const isAlt = event.altKey && !event.getModifierState('AltGraph');
+  if (event.defaultPrevented || isAlt || isTyping(event)) return;
+  if (hands.store.value.dialog || hands.store.value.readonly) return;
+  const name = named(event);
+  const digit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey;
+  const found = BY_KEY.get(name);
+  if (digit) hands.store.set({ flow: (Number(event.key) || 10) / 10 });
+  else if (found) /** @type {any} */ (found).act(hands);
+  else return;
+  if (name !== 'escape') event.preventDefault();
 }

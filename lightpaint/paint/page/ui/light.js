@@ -1,12 +1,12 @@
 /** One light: what it is in the answer, whether it is shown, and its dimmer. */
 
-import { Component, html } from '../vendor/preact.js'
-import { luminance, toHex, toKelvin } from './colours.js'
-import { Asking } from './asking.js'
-import { Button, Slider } from './controls.js'
-import { kelvinText, number, percent, stopsText } from './format.js'
-import { Icon } from './icons.js'
-import { Thumb } from './thumb.js'
+import { Component, html } from '../vendor/preact.js';
+import { luminance, toHex, toKelvin } from './colours.js';
+import { Asking } from './asking.js';
+import { Button, Slider } from './controls.js';
+import { kelvinText, number, percent, stopsText } from './format.js';
+import { Icon } from './icons.js';
+import { Thumb } from './thumb.js';
 
 /** @typedef {import("./model.js").Light} Light */
 /** @typedef {import("./model.js").Lit} Lit */
@@ -20,23 +20,23 @@ import { Thumb } from './thumb.js'
  */
 
 /** Ends of the dimmer, in stops from the present. */
-const [DARKEST, BRIGHTEST] = [-8, 6]
+const [DARKEST, BRIGHTEST] = [-8, 6];
 
 /** @extends {Component<Props>} */
 export class LightRow extends Component {
   /** A pointer that moves over the picture changes few of many rows. @param {Props} next */
   shouldComponentUpdate(next) {
-    const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }))
+    const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
     return keys.some((key) =>
       key === 'here' ? heard(this.props.here) !== heard(next.here) : next[key] !== this.props[key],
-    )
+    );
   }
 
   render() {
-    const { k, light, hands, isOpen, readonly, hasSlider, here, isMute, asked } = this.props
-    const { store } = hands
-    const dim = isMute || asked?.off ? 'is-dim' : ''
-    const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered })
+    const { k, light, hands, isOpen, readonly, hasSlider, here, isMute, asked } = this.props;
+    const { store } = hands;
+    const dim = isMute || asked?.off ? 'is-dim' : '';
+    const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
     return html`<div class=${`light ${dim} ${isOpen ? 'is-open' : ''}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
       <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
@@ -58,17 +58,17 @@ export class LightRow extends Component {
         ${hasSlider && !readonly && !light.is_fixed && this.dimmer()}
       </div>
       ${isOpen && html`<${Asking} ...${this.props} />`}
-    </div>`
+    </div>`;
   }
 
   /** Shown or not; then, apart, what is asked of the solve. */
   marks() {
-    const { k, light, hands, isSolo, isMute, asked = {}, readonly } = this.props
-    const { store, session } = hands
+    const { k, light, hands, isSolo, isMute, asked = {}, readonly } = this.props;
+    const { store, session } = hands;
     const turn = (/** @type {"solo" | "mute"} */ key, /** @type {boolean} */ on) =>
-      store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }))
-    const isHeld = asked.lock !== undefined || Boolean(asked.off)
-    const lock = () => (isHeld ? session.release(k) : session.hold(k, this.props.rgb, true))
+      store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }));
+    const isHeld = asked.lock !== undefined || Boolean(asked.off);
+    const lock = () => (isHeld ? session.release(k) : session.hold(k, this.props.rgb, true));
     return html`<span class="marks" role="group" aria-label="Shown">
       <${Button} label="S" class="letter" on=${isSolo} act=${() => turn('solo', isSolo)}
         tip=${`Solo: show ${light.label} alone. The answer stays.`} />
@@ -86,19 +86,19 @@ export class LightRow extends Component {
           : `Hold ${light.label} as it is in the answer`
       } />
     </span>`
-    }`
+    }`;
   }
 
   numbers() {
-    const { light, rgb, lit, isLive, asked, tied } = this.props
-    const level = luminance(rgb)
-    const said = notes({ light, lit, asked, tied })
-    const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin
-    const hue = white ? kelvinText(white) : (lit?.hue ?? '')
+    const { light, rgb, lit, isLive, asked, tied } = this.props;
+    const level = luminance(rgb);
+    const said = notes({ light, lit, asked, tied });
+    const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
+    const hue = white ? kelvinText(white) : (lit?.hue ?? '');
     const parts = [
       hue,
       [number(level), !isLive && lit?.error, light.unit].filter(Boolean).join(' '),
-    ].filter(Boolean)
+    ].filter(Boolean);
     return html`<div class="light-numbers">
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
         style=${{ background: level > 0 ? toHex(scaled(rgb)) : 'none' }}></span>
@@ -110,41 +110,41 @@ export class LightRow extends Component {
       html`<div class="badges">${said.map(
         (note) => html`<span class="badge" key=${note}>${note}</span>`,
       )}</div>`
-    }`
+    }`;
   }
 
   dimmer() {
-    const { k, light, rgb, hands, asked } = this.props
-    const stops = stopsOf(rgb, light) ?? DARKEST
+    const { k, light, rgb, hands, asked } = this.props;
+    const stops = stopsOf(rgb, light) ?? DARKEST;
     const move = (/** @type {number} */ to, /** @type {boolean} */ done) =>
-      hands.session.hold(k, moved(rgb, light, to), done)
-    const text = luminance(rgb) > 0 ? stopsText(stops) : 'off'
+      hands.session.hold(k, moved(rgb, light, to), done);
+    const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
     return html`<div class=${`dimmer ${asked?.lock !== undefined ? 'is-held' : ''}`}>
       <${Slider} plain label=${`${light.label}, stops from now`} value=${clamp(stops)}
         least=${DARKEST} most=${BRIGHTEST} step=${0.05} rest=${0} text=${text}
         disabled=${Boolean(asked?.off)} change=${move} />
       <span class="stops" data-tip="Stops from the present">${text}</span>
-    </div>`
+    </div>`;
   }
 }
 
 /** @param {number | undefined} share */
-const heard = (share) => (share === undefined ? '' : percent(share))
+const heard = (share) => (share === undefined ? '' : percent(share));
 
 /** @param {{share: number, here?: number}} props */
 function Share({ share, here }) {
-  const isHere = here !== undefined
-  const value = isHere ? here : share
+  const isHere = here !== undefined;
+  const value = isHere ? here : share;
   return html`<span class=${`share ${isHere ? 'is-here' : ''}`}
     data-tip=${isHere ? 'Share of the light here' : "Share of the picture's light"}>
-    <i style=${{ '--share': String(value) }}></i><span>${percent(value)}</span></span>`
+    <i style=${{ '--share': String(value) }}></i><span>${percent(value)}</span></span>`;
 }
 
 /** @param {import("./model.js").UiStore} store @param {number} k */
 function unfold(store, k) {
   store.set(({ unfolded }) => ({
     unfolded: unfolded.includes(k) ? unfolded.filter((one) => one !== k) : [...unfolded, k],
-  }))
+  }));
 }
 
 /** What is worth a word. @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} about
@@ -161,31 +161,31 @@ function notes({ light, lit, asked = {}, tied }) {
     lit?.held && 'at its limit',
   ]
     .filter(Boolean)
-    .map(String)
+    .map(String);
 }
 
 /** @param {RGB} rgb @returns {RGB} */
 function scaled(rgb) {
-  const top = Math.max(...rgb) || 1
-  return /** @type {RGB} */ (rgb.map((x) => x / top))
+  const top = Math.max(...rgb) || 1;
+  return /** @type {RGB} */ (rgb.map((x) => x / top));
 }
 
 /** Stops from the present; of a light that is off now, from one unit. @param {RGB} rgb
  * @param {Light} light @returns {number | null} */
 function stopsOf(rgb, light) {
-  const level = luminance(rgb)
-  return level > 0 ? Math.log2(level / (luminance(light.present) || 1)) : null
+  const level = luminance(rgb);
+  return level > 0 ? Math.log2(level / (luminance(light.present) || 1)) : null;
 }
 
 /** @param {number} stops */
-const clamp = (stops) => Math.min(BRIGHTEST, Math.max(DARKEST, stops))
+const clamp = (stops) => Math.min(BRIGHTEST, Math.max(DARKEST, stops));
 
 /** The same colour, so many stops from the present; at the left end it is off.
  * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */
 function moved(rgb, light, stops) {
-  if (stops <= DARKEST) return [0, 0, 0]
-  const base = luminance(rgb) > 0 ? rgb : luminance(light.present) > 0 ? light.present : [1, 1, 1]
-  const level = (luminance(light.present) || 1) * 2 ** stops
-  const factor = level / luminance(base)
-  return /** @type {RGB} */ (base.map((x) => x * factor))
+  if (stops <= DARKEST) return [0, 0, 0];
+  const base = luminance(rgb) > 0 ? rgb : luminance(light.present) > 0 ? light.present : [1, 1, 1];
+  const level = (luminance(light.present) || 1) * 2 ** stops;
+  const factor = level / luminance(base);
+  return /** @type {RGB} */ (base.map((x) => x * factor));
 }

@@ -1,11 +1,11 @@
 /** The list of lights: search, sort, groups that fold, a row for each light. */
 
-import { html } from '../vendor/preact.js'
-import { luminance } from './colours.js'
-import { Button, Select } from './controls.js'
-import { counted, percent } from './format.js'
-import { Icon } from './icons.js'
-import { LightRow } from './light.js'
+import { html } from '../vendor/preact.js';
+import { luminance } from './colours.js';
+import { Button, Select } from './controls.js';
+import { counted, percent } from './format.js';
+import { Icon } from './icons.js';
+import { LightRow } from './light.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").UiStore} UiStore */
@@ -16,18 +16,18 @@ const SORTS = [
   { value: 'name', label: 'Name' },
   { value: 'share', label: 'Share of the picture' },
   { value: 'change', label: 'Change' },
-]
+];
 
 /** With more lights than these, only rows that are unfolded have their slider. */
-const MANY = 16
+const MANY = 16;
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function LightsPanel({ ui, hands }) {
-  const { store } = hands
-  const found = sorted(ui, matching(ui))
-  const groups = grouped(ui, found)
-  const isMuted = ui.solo.length + ui.mute.length > 0
-  const isMany = ui.lights.length > MANY
+  const { store } = hands;
+  const found = sorted(ui, matching(ui));
+  const groups = grouped(ui, found);
+  const isMuted = ui.solo.length + ui.mute.length > 0;
+  const isMany = ui.lights.length > MANY;
   return html`<div class="lights">
     ${
       ui.lights.length > 5 &&
@@ -52,29 +52,29 @@ export function LightsPanel({ ui, hands }) {
         : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} hands=${hands}
           members=${members} isMany=${isMany} />`,
     )}
-  </div>`
+  </div>`;
 }
 
 /** @param {Ui} ui @param {Hands} hands @param {number} k @param {boolean} isMany */
 function row(ui, hands, k, isMany) {
-  const light = ui.lights[k]
-  const isOpen = ui.unfolded.includes(k)
-  const tied = ui.ties.find((tie) => tie.includes(light.name))
+  const light = ui.lights[k];
+  const isOpen = ui.unfolded.includes(k);
+  const tied = ui.ties.find((tie) => tie.includes(light.name));
   return html`<${LightRow} key=${light.name} k=${k} light=${light} hands=${hands}
     rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${ui.asked[light.name]} tied=${tied}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} readonly=${ui.readonly} hasSlider=${isOpen || !isMany}
-    thumb=${ui.resources[`thumb/${k}`]} others=${isOpen ? ui.lights : undefined} />`
+    thumb=${ui.resources[`thumb/${k}`]} others=${isOpen ? ui.lights : undefined} />`;
 }
 
 /** @param {{name: string, ui: Ui, hands: Hands, members: number[], isMany: boolean}} props */
 function Group({ name, ui, hands, members, isMany }) {
-  const { store } = hands
-  const key = `group ${name}`
-  const open = ui.open[key] ?? true
-  const share = members.reduce((sum, k) => sum + (ui.lit[k]?.share ?? 0), 0)
-  const isSolo = members.every((k) => ui.solo.includes(k))
-  const solo = ui.solo.filter((k) => !members.includes(k))
+  const { store } = hands;
+  const key = `group ${name}`;
+  const open = ui.open[key] ?? true;
+  const share = members.reduce((sum, k) => sum + (ui.lit[k]?.share ?? 0), 0);
+  const isSolo = members.every((k) => ui.solo.includes(k));
+  const solo = ui.solo.filter((k) => !members.includes(k));
   return html`<div class="light-group" role="group" aria-label=${name}>
     <div class="group-head">
       <button type="button" class="group-name" aria-expanded=${String(open)}
@@ -85,53 +85,53 @@ function Group({ name, ui, hands, members, isMany }) {
         act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />
     </div>
     ${open && members.map((k) => row(ui, hands, k, isMany))}
-  </div>`
+  </div>`;
 }
 
 /** @param {Ui} ui @returns {number[]} */
 function matching(ui) {
-  const words = ui.search.toLowerCase().split(/\s+/).filter(Boolean)
+  const words = ui.search.toLowerCase().split(/\s+/).filter(Boolean);
   return ui.lights
     .map((_, k) => k)
     .filter((k) => {
-      const { name, label, group, members } = ui.lights[k]
-      const text = [name, label, group, ...members].join(' ').toLowerCase()
-      return words.every((word) => text.includes(word))
-    })
+      const { name, label, group, members } = ui.lights[k];
+      const text = [name, label, group, ...members].join(' ').toLowerCase();
+      return words.every((word) => text.includes(word));
+    });
 }
 
 /** @param {Ui} ui @param {number[]} found @returns {number[]} */
 function sorted(ui, found) {
-  const name = (/** @type {number} */ k) => ui.lights[k].label
-  const share = (/** @type {number} */ k) => ui.lit[k]?.share ?? 0
+  const name = (/** @type {number} */ k) => ui.lights[k].label;
+  const share = (/** @type {number} */ k) => ui.lit[k]?.share ?? 0;
   const change = (/** @type {number} */ k) => {
     const [a, b] = [
       luminance(ui.lit[k]?.emission ?? ui.lights[k].present),
       luminance(ui.lights[k].present),
-    ]
-    return Math.abs(Math.log2((a + 1e-9) / (b + 1e-9)))
-  }
-  const made = [...found]
+    ];
+    return Math.abs(Math.log2((a + 1e-9) / (b + 1e-9)));
+  };
+  const made = [...found];
   if (ui.sort === 'name') {
-    made.sort((a, b) => name(a).localeCompare(name(b), undefined, { numeric: true }))
+    made.sort((a, b) => name(a).localeCompare(name(b), undefined, { numeric: true }));
   }
-  if (ui.sort === 'share') made.sort((a, b) => share(b) - share(a))
-  if (ui.sort === 'change') made.sort((a, b) => change(b) - change(a))
-  return made
+  if (ui.sort === 'share') made.sort((a, b) => share(b) - share(a));
+  if (ui.sort === 'change') made.sort((a, b) => change(b) - change(a));
+  return made;
 }
 
 /** Lights with a group come under its name, at the place of the first of them.
  * @param {Ui} ui @param {number[]} found @returns {{name: string | null, members: number[]}[]} */
 function grouped(ui, found) {
   /** @type {{name: string | null, members: number[]}[]} */
-  const made = []
+  const made = [];
   for (const k of found) {
-    const group = ui.lights[k].group ?? null
-    const isMany = ui.lights.filter((one) => one.group === group).length > 1
-    const name = isMany ? group : null
-    const same = name === null ? undefined : made.find((one) => one.name === name)
-    if (same) same.members.push(k)
-    else made.push({ name, members: [k] })
+    const group = ui.lights[k].group ?? null;
+    const isMany = ui.lights.filter((one) => one.group === group).length > 1;
+    const name = isMany ? group : null;
+    const same = name === null ? undefined : made.find((one) => one.name === name);
+    if (same) same.members.push(k);
+    else made.push({ name, members: [k] });
   }
-  return made
+  return made;
 }

@@ -91,7 +91,7 @@ const SHOW = {
   gains: null,
   instead: null,
   other: null,
-}
+};
 
 /** @returns {Ui} */
 export function first() {
@@ -150,7 +150,7 @@ export function first() {
     search: '',
     sort: 'scene',
     unfolded: [],
-  }
+  };
 }
 
 /**
@@ -158,48 +158,48 @@ export function first() {
  * @param {Ui} ui @returns {Show}
  */
 export function shown(ui) {
-  const show = { ...ui.show }
-  const isAlone = ui.solo.length > 0
+  const show = { ...ui.show };
+  const isAlone = ui.solo.length > 0;
   if (isAlone || ui.mute.length) {
-    show.gains = ui.lights.map((_, k) => (isAlone ? ui.solo.includes(k) : !ui.mute.includes(k)))
+    show.gains = ui.lights.map((_, k) => (isAlone ? ui.solo.includes(k) : !ui.mute.includes(k)));
   }
-  const mixed = ui.mix && mixOf(ui, ui.mix)
-  if (mixed) show.other = mixed
+  const mixed = ui.mix && mixOf(ui, ui.mix);
+  if (mixed) show.other = mixed;
   if (ui.hovered !== null) {
-    const k = ui.hovered
-    const gain = gainOf(ui, k)
-    const rgb = alone(ui.weights[k], ui.lights[k]).map((x) => x * gain)
-    show.other = ui.weights.map((_, i) => (i === k ? /** @type {RGB} */ (rgb) : [0, 0, 0]))
-    show.right = 'other'
-    show.gains = null
+    const k = ui.hovered;
+    const gain = gainOf(ui, k);
+    const rgb = alone(ui.weights[k], ui.lights[k]).map((x) => x * gain);
+    show.other = ui.weights.map((_, i) => (i === k ? /** @type {RGB} */ (rgb) : [0, 0, 0]));
+    show.right = 'other';
+    show.gains = null;
   }
-  return show
+  return show;
 }
 
 /** By how much a light alone is shown brighter, so that one of many can be seen: whole stops.
  * @param {Ui} ui @param {number} k @returns {number} */
 export function gainOf(ui, k) {
-  const share = ui.lit[k]?.share ?? 1
-  return share > 0 ? 2 ** Math.min(10, Math.max(0, Math.round(Math.log2(0.5 / share)))) : 1
+  const share = ui.lit[k]?.share ?? 1;
+  return share > 0 ? 2 ** Math.min(10, Math.max(0, Math.round(Math.log2(0.5 / share)))) : 1;
 }
 
 /** A light that is off is shown as it is now, or else at one unit. @param {RGB} rgb
  * @param {Light} light @returns {RGB} */
 function alone(rgb, light) {
-  if (Math.max(...rgb) > 0) return rgb
-  return Math.max(...light.present) > 0 ? light.present : [1, 1, 1]
+  if (Math.max(...rgb) > 0) return rgb;
+  return Math.max(...light.present) > 0 ? light.present : [1, 1, 1];
 }
 
 /** @param {Ui} ui @param {{a: number, b: number, share: number}} mix @returns {RGB[] | null} */
 export function mixOf(ui, { a, b, share }) {
-  const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights)
-  if (!from || !to) return null
+  const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);
+  if (!from || !to) return null;
   return from
     .map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * to[k][c]))
-    .map((rgb) => /** @type {RGB} */ (rgb))
+    .map((rgb) => /** @type {RGB} */ (rgb));
 }
 
 /** Linear light of the paint in the hand. @param {Ui} ui @returns {RGB} */
 export function paintOf({ colour, stops }) {
-  return /** @type {RGB} */ (colour.map((x) => x * 2 ** stops))
+  return /** @type {RGB} */ (colour.map((x) => x * 2 ** stops));
 }

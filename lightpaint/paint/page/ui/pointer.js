@@ -3,36 +3,36 @@
  * middle button pan; Ctrl and the wheel zoom.
  */
 
-import { look, remember, take } from './tools.js'
+import { look, remember, take } from './tools.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./engine.js").Point} Point */
 /** @typedef {import("./model.js").UiStore} UiStore */
 
 /** A second finger makes no stroke of the first within this time, or before it has come so far. */
-const SECOND_FINGER = { ms: 250, px: 24 }
+const SECOND_FINGER = { ms: 250, px: 24 };
 
 export class Pointer {
   /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved */
   constructor(engine, store, moved) {
-    this.engine = engine
-    this.store = store
-    this.moved = moved
+    this.engine = engine;
+    this.store = store;
+    this.moved = moved;
     /** @type {Map<number, {x: number, y: number}>} */
-    this.fingers = new Map()
+    this.fingers = new Map();
     /** @type {null | "stroke" | "pan" | "pinch"} */
-    this.doing = null
-    this.began = 0
-    this.way = 0
+    this.doing = null;
+    this.began = 0;
+    this.way = 0;
     /** @type {Point | null} */
-    this.last = null
-    this.isSpace = false
+    this.last = null;
+    this.isSpace = false;
   }
 
   /** @param {PointerEvent} event @returns {{x: number, y: number}} in CSS pixels of the pictures */
   place(event) {
-    const { left, top } = this.engine.element.getBoundingClientRect()
-    return { x: event.clientX - left, y: event.clientY - top }
+    const { left, top } = this.engine.element.getBoundingClientRect();
+    return { x: event.clientX - left, y: event.clientY - top };
   }
 
   /**
@@ -40,148 +40,148 @@ export class Pointer {
    * @param {PointerEvent} event @returns {Point & {kind: import("./engine.js").Kind} | null}
    */
   point(event) {
-    const { x, y } = this.place(event)
-    const pane = this.pane ?? paneAt(this.engine, x, y)
-    if (!pane) return null
-    const pressure = event.pointerType === 'pen' ? event.pressure : 1
-    const [px, py] = [(x - pane.left) / pane.scale, (y - pane.top) / pane.scale]
-    return { x: px, y: py, pressure, kind: pane.kind }
+    const { x, y } = this.place(event);
+    const pane = this.pane ?? paneAt(this.engine, x, y);
+    if (!pane) return null;
+    const pressure = event.pointerType === 'pen' ? event.pressure : 1;
+    const [px, py] = [(x - pane.left) / pane.scale, (y - pane.top) / pane.scale];
+    return { x: px, y: py, pressure, kind: pane.kind };
   }
 
   /** @param {PointerEvent} event */
   down(event) {
-    if (this.store.value.closed) return
-    const place = this.place(event)
-    this.fingers.set(event.pointerId, place)
-    capture(event)
-    if (event.pointerType === 'touch' && this.fingers.size === 2) return this.pinch(event)
-    if (this.fingers.size > 1) return
+    if (this.store.value.closed) return;
+    const place = this.place(event);
+    this.fingers.set(event.pointerId, place);
+    capture(event);
+    if (event.pointerType === 'touch' && this.fingers.size === 2) return this.pinch(event);
+    if (this.fingers.size > 1) return;
     if (event.button === 1 || this.isSpace) {
-      this.doing = 'pan'
+      this.doing = 'pan';
     } else if (event.button === 0) {
-      this.pane = paneAt(this.engine, place.x, place.y)
-      this.press(event)
+      this.pane = paneAt(this.engine, place.x, place.y);
+      this.press(event);
     }
-    event.preventDefault()
-    ;/** @type {HTMLElement} */ (event.currentTarget).focus({ preventScroll: true })
+    event.preventDefault();
+    /** @type {HTMLElement} */ (event.currentTarget).focus({ preventScroll: true });
   }
 
   /** @param {PointerEvent} event */
   press(event) {
-    const point = this.point(event)
-    const { tool, readonly } = this.store.value
-    if (!point) return
+    const point = this.point(event);
+    const { tool, readonly } = this.store.value;
+    if (!point) return;
     if (event.altKey || tool === 'pick' || readonly) {
-      if (!readonly) take(this.store, this.engine.lightAt(point.kind, point.x, point.y))
-      this.pane = null
-      return
+      if (!readonly) take(this.store, this.engine.lightAt(point.kind, point.x, point.y));
+      this.pane = null;
+      return;
     }
-    remember(this.store)
-    this.store.set({ hint: false })
+    remember(this.store);
+    this.store.set({ hint: false });
     if (event.shiftKey && this.last && tool !== 'ask') {
-      this.engine.line(this.last, point)
-      this.last = point
-      return
+      this.engine.line(this.last, point);
+      this.last = point;
+      return;
     }
-    this.doing = 'stroke'
-    this.began = event.timeStamp
-    this.way = 0
-    this.engine.begin(point)
-    this.last = point
+    this.doing = 'stroke';
+    this.began = event.timeStamp;
+    this.way = 0;
+    this.engine.begin(point);
+    this.last = point;
   }
 
   /** @param {PointerEvent} event */
   move(event) {
-    const place = this.place(event)
-    const before = this.fingers.get(event.pointerId)
-    if (this.doing === 'pinch') this.spread(event.pointerId, place)
-    if (before) this.fingers.set(event.pointerId, place)
-    this.moved(place.x, place.y)
+    const place = this.place(event);
+    const before = this.fingers.get(event.pointerId);
+    if (this.doing === 'pinch') this.spread(event.pointerId, place);
+    if (before) this.fingers.set(event.pointerId, place);
+    this.moved(place.x, place.y);
     if (this.doing === 'pan' && before) {
-      this.pan(place.x - before.x, place.y - before.y)
+      this.pan(place.x - before.x, place.y - before.y);
     } else if (this.doing === 'stroke' && before) {
-      const all = event.getCoalescedEvents?.() ?? []
-      const points = (all.length ? all : [event]).map((one) => this.point(one))
-      const found = /** @type {Point[]} */ (points.filter(Boolean))
-      this.way += Math.hypot(place.x - before.x, place.y - before.y)
-      if (found.length) this.last = found[found.length - 1]
-      this.engine.move(found)
+      const all = event.getCoalescedEvents?.() ?? [];
+      const points = (all.length ? all : [event]).map((one) => this.point(one));
+      const found = /** @type {Point[]} */ (points.filter(Boolean));
+      this.way += Math.hypot(place.x - before.x, place.y - before.y);
+      if (found.length) this.last = found[found.length - 1];
+      this.engine.move(found);
     }
   }
 
   /** @param {PointerEvent} event */
   up(event) {
-    this.fingers.delete(event.pointerId)
-    if (this.doing === 'stroke' && event.type === 'pointercancel') this.engine.cancel()
-    else if (this.doing === 'stroke') this.engine.end()
+    this.fingers.delete(event.pointerId);
+    if (this.doing === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
+    else if (this.doing === 'stroke') this.engine.end();
     if (this.doing === 'stroke' || this.fingers.size === 0) {
-      this.doing = null
-      this.pane = null
-      this.store.set({ asking: null })
+      this.doing = null;
+      this.pane = null;
+      this.store.set({ asking: null });
     }
   }
 
   /** A stroke of one place, by keys. @param {number} x @param {number} y in CSS pixels */
   dab(x, y) {
-    const pane = paneAt(this.engine, x, y)
-    const { closed, readonly, tool } = this.store.value
-    if (!pane || closed || readonly) return
-    const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 }
-    if (tool === 'pick') return take(this.store, this.engine.lightAt(pane.kind, point.x, point.y))
-    remember(this.store)
-    this.store.set({ hint: false })
-    this.engine.begin(point)
-    this.engine.end()
-    this.last = point
+    const pane = paneAt(this.engine, x, y);
+    const { closed, readonly, tool } = this.store.value;
+    if (!pane || closed || readonly) return;
+    const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
+    if (tool === 'pick') return take(this.store, this.engine.lightAt(pane.kind, point.x, point.y));
+    remember(this.store);
+    this.store.set({ hint: false });
+    this.engine.begin(point);
+    this.engine.end();
+    this.last = point;
   }
 
   /** The second finger: what the first began is forgotten, or ended if it is a stroke by now.
    * @param {PointerEvent} event */
   pinch(event) {
     if (this.doing === 'stroke') {
-      const { ms, px } = SECOND_FINGER
-      if (event.timeStamp - this.began < ms || this.way < px) this.engine.cancel()
-      else this.engine.end()
+      const { ms, px } = SECOND_FINGER;
+      if (event.timeStamp - this.began < ms || this.way < px) this.engine.cancel();
+      else this.engine.end();
     }
-    this.pane = null
-    this.doing = 'pinch'
+    this.pane = null;
+    this.doing = 'pinch';
   }
 
   /** @param {number} id @param {{x: number, y: number}} place */
   spread(id, place) {
-    const own = this.fingers.get(id)
-    const other = [...this.fingers].find(([key]) => key !== id)?.[1]
-    if (!own || !other) return
+    const own = this.fingers.get(id);
+    const other = [...this.fingers].find(([key]) => key !== id)?.[1];
+    if (!own || !other) return;
     const far = (/** @type {{x: number, y: number}} */ a) =>
-      Math.hypot(a.x - other.x, a.y - other.y)
-    const factor = far(place) / Math.max(1, far(own))
-    look(this.store, this.engine.zoomAt((place.x + other.x) / 2, (place.y + other.y) / 2, factor))
-    this.pan((place.x - own.x) / 2, (place.y - own.y) / 2)
+      Math.hypot(a.x - other.x, a.y - other.y);
+    const factor = far(place) / Math.max(1, far(own));
+    look(this.store, this.engine.zoomAt((place.x + other.x) / 2, (place.y + other.y) / 2, factor));
+    this.pan((place.x - own.x) / 2, (place.y - own.y) / 2);
   }
 
   /** @param {number} x @param {number} y in CSS pixels */
   pan(x, y) {
-    const scale = this.engine.panes()[0]?.scale ?? 1
-    const [px, py] = this.store.value.show.pan
-    look(this.store, { pan: [px - x / scale, py - y / scale] })
+    const scale = this.engine.panes()[0]?.scale ?? 1;
+    const [px, py] = this.store.value.show.pan;
+    look(this.store, { pan: [px - x / scale, py - y / scale] });
   }
 
   /** @param {WheelEvent} event */
   wheel(event) {
-    const { x, y } = this.place(/** @type {any} */ (event))
-    const { zoom } = this.store.value.show
+    const { x, y } = this.place(/** @type {any} */ (event));
+    const { zoom } = this.store.value.show;
     if (event.ctrlKey || event.metaKey) {
-      look(this.store, this.engine.zoomAt(x, y, 2 ** (-event.deltaY / 240)))
+      look(this.store, this.engine.zoomAt(x, y, 2 ** (-event.deltaY / 240)));
     } else if (zoom > 1) {
-      this.pan(-(event.shiftKey ? event.deltaY : event.deltaX), event.shiftKey ? 0 : -event.deltaY)
+      this.pan(-(event.shiftKey ? event.deltaY : event.deltaX), event.shiftKey ? 0 : -event.deltaY);
     } else {
-      return
+      return;
     }
-    event.preventDefault()
+    event.preventDefault();
   }
 
   /** @type {import("./engine.js").Pane | null} */
-  pane = null
+  pane = null;
 }
 
 /** @param {Engine} engine @param {number} x @param {number} y */
@@ -192,13 +192,13 @@ export function paneAt(engine, x, y) {
       .find(
         (pane) => x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height,
       ) ?? null
-  )
+  );
 }
 
 /** @param {PointerEvent} event */
 function capture(event) {
   try {
-    ;/** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId)
+    /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId);
   } catch {
     // A pointer that has gone already has nothing to be captured.
   }

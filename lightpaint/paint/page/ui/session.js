@@ -21,22 +21,22 @@ const HEARD = [
   'explained',
   'closed',
   'connection',
-]
+];
 
 export class Session {
   /** @param {Host} host @param {import("./model.js").UiStore} store */
   constructor(host, store) {
-    this.host = host
-    this.store = store
+    this.host = host;
+    this.store = store;
     /** Replies come twice: to who asked, and to who listens. @type {WeakSet<Message>} */
-    this.done = new WeakSet()
+    this.done = new WeakSet();
     /** Lights that a hand moves, and where to. @type {Map<number, {rgb: RGB, done: boolean}>} */
-    this.hands = new Map()
-    this.isMoving = false
+    this.hands = new Map();
+    this.isMoving = false;
     /** What was asked of a light before a hand moved it. @type {Map<number, Asked>} */
-    this.before = new Map()
+    this.before = new Map();
     for (const kind of HEARD)
-      host.on(kind, (message) => this.receive({ ...message, kind }, message))
+      host.on(kind, (message) => this.receive({ ...message, kind }, message));
   }
 
   /**
@@ -45,19 +45,19 @@ export class Session {
    */
   async send(kind, fields = {}) {
     try {
-      const reply = await this.host.send(kind, fields)
-      this.receive(reply, reply)
-      return reply
+      const reply = await this.host.send(kind, fields);
+      this.receive(reply, reply);
+      return reply;
     } catch (error) {
-      this.toast(error instanceof Error ? error.message : String(error), 'warn')
-      return null
+      this.toast(error instanceof Error ? error.message : String(error), 'warn');
+      return null;
     }
   }
 
   /** @param {Message} message @param {Message} [origin] */
   receive(message, origin = message) {
-    if (this.done.has(origin)) return
-    this.done.add(origin)
+    if (this.done.has(origin)) return;
+    this.done.add(origin);
     const told = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
       state: stateOf,
       waiting: (/** @type {any} */ m) => ({ ready: false, state: null, waiting: m.text ?? '' }),
@@ -70,54 +70,54 @@ export class Session {
       say: (/** @type {any} */ m) => this.say(m.text, m.tone),
       failed: (/** @type {any} */ m) => this.failed(m.text),
       looks: (/** @type {any} */ m) => ({
-          looks: m.looks,
-          resources: { ...this.store.value.resources, ...m.resources },
-        }),
+        looks: m.looks,
+        resources: { ...this.store.value.resources, ...m.resources },
+      }),
       exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false }),
       verified: (/** @type {any} */ m) => ({ verified: m, verifying: null }),
       explained: (/** @type {any} */ m) => ({ explained: m.sentences }),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
-    })[message.kind]?.(message)
-    if (told?.weights) told.weights = told.weights.map((rgb, k) => this.hands.get(k)?.rgb ?? rgb)
-    if (told) this.store.set(told)
-    if (told?.asked) this.forget(told.asked)
+    })[message.kind]?.(message);
+    if (told?.weights) told.weights = told.weights.map((rgb, k) => this.hands.get(k)?.rgb ?? rgb);
+    if (told) this.store.set(told);
+    if (told?.asked) this.forget(told.asked);
   }
 
   /** What lights were before a hand held them, of those that are held no more: undo does that, too.
    * @param {Record<string, Asked>} asked */
   forget(asked) {
     for (const light of this.before.keys()) {
-      const now = asked[this.store.value.lights[light]?.name] ?? {}
-      if (now.lock === undefined && !now.off) this.before.delete(light)
+      const now = asked[this.store.value.lights[light]?.name] ?? {};
+      if (now.lock === undefined && !now.off) this.before.delete(light);
     }
   }
 
   /** @param {string} text */
   failed(text) {
-    this.store.set({ verifying: null, isWriting: false })
-    this.toast(text, 'warn')
+    this.store.set({ verifying: null, isWriting: false });
+    this.toast(text, 'warn');
   }
 
   /** What goes wrong beside the painting comes so, too. @param {string} text
    * @param {'info' | 'warn'} tone */
   say(text, tone) {
-    if (tone === 'warn') this.store.set({ isWriting: false })
-    this.toast(text, tone)
+    if (tone === 'warn') this.store.set({ isWriting: false });
+    this.toast(text, tone);
   }
 
   /** @param {string} text @param {'info' | 'warn'} [tone] */
   toast(text, tone = 'info') {
-    const id = Date.now() + Math.random()
-    const others = this.store.value.toasts.filter((one) => one.text !== text).slice(-2)
-    this.store.set({ toasts: [...others, { id, text, tone }] })
-    const stays = Math.min(15000, 4000 + 60 * text.length)
-    setTimeout(() => this.dismiss(id), tone === 'warn' ? 2 * stays : stays)
+    const id = Date.now() + Math.random();
+    const others = this.store.value.toasts.filter((one) => one.text !== text).slice(-2);
+    this.store.set({ toasts: [...others, { id, text, tone }] });
+    const stays = Math.min(15000, 4000 + 60 * text.length);
+    setTimeout(() => this.dismiss(id), tone === 'warn' ? 2 * stays : stays);
   }
 
   /** @param {number} id */
   dismiss(id) {
-    this.store.set((ui) => ({ toasts: ui.toasts.filter((one) => one.id !== id) }))
+    this.store.set((ui) => ({ toasts: ui.toasts.filter((one) => one.id !== id) }));
   }
 
   /**
@@ -129,9 +129,9 @@ export class Session {
       Object.entries(asked).filter(
         ([, value]) => value !== null && value !== undefined && value !== false,
       ),
-    )
-    this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }))
-    return this.send('ask', { light, asked: kept, done })
+    );
+    this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }));
+    return this.send('ask', { light, asked: kept, done });
   }
 
   /**
@@ -140,93 +140,93 @@ export class Session {
    * @param {number} light @param {RGB} emission @param {boolean} done
    */
   hold(light, emission, done) {
-    const { lights, asked, weights } = this.store.value
+    const { lights, asked, weights } = this.store.value;
     if (!this.before.has(light)) {
-      this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}))
+      this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}));
     }
-    this.hands.set(light, { rgb: emission, done })
-    this.store.set({ weights: weights.map((rgb, k) => (k === light ? emission : rgb)) })
-    void this.move()
+    this.hands.set(light, { rgb: emission, done });
+    this.store.set({ weights: weights.map((rgb, k) => (k === light ? emission : rgb)) });
+    void this.move();
   }
 
   async move() {
-    if (this.isMoving) return
-    this.isMoving = true
+    if (this.isMoving) return;
+    this.isMoving = true;
     /** @type {Map<number, object>} */
-    const sent = new Map()
-    const waiting = () => [...this.hands].find(([light, hand]) => sent.get(light) !== hand)
+    const sent = new Map();
+    const waiting = () => [...this.hands].find(([light, hand]) => sent.get(light) !== hand);
     for (let next = waiting(); next; next = waiting()) {
-      const [light, hand] = next
-      sent.set(light, hand)
-      const isScalar = this.store.value.lights[light].is_scalar
-      await this.ask(light, { lock: isScalar ? hand.rgb[0] : hand.rgb }, hand.done)
-      if (hand.done && this.hands.get(light) === hand) this.hands.delete(light)
+      const [light, hand] = next;
+      sent.set(light, hand);
+      const isScalar = this.store.value.lights[light].is_scalar;
+      await this.ask(light, { lock: isScalar ? hand.rgb[0] : hand.rgb }, hand.done);
+      if (hand.done && this.hands.get(light) === hand) this.hands.delete(light);
     }
-    this.isMoving = false
+    this.isMoving = false;
   }
 
   /** Let the solve have a light again, with what was asked of it before. @param {number} light */
   release(light) {
-    const { lights, asked } = this.store.value
-    this.hands.delete(light)
-    const before = this.before.get(light) ?? withoutLevel(asked[lights[light].name] ?? {})
-    this.before.delete(light)
-    return this.ask(light, before)
+    const { lights, asked } = this.store.value;
+    this.hands.delete(light);
+    const before = this.before.get(light) ?? withoutLevel(asked[lights[light].name] ?? {});
+    this.before.delete(light);
+    return this.ask(light, before);
   }
 
   /** @param {number} light @param {boolean} off */
   turn(light, off) {
-    if (!off) return this.release(light)
-    this.hands.delete(light)
-    const { lights, asked } = this.store.value
+    if (!off) return this.release(light);
+    this.hands.delete(light);
+    const { lights, asked } = this.store.value;
     if (!this.before.has(light)) {
-      this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}))
+      this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}));
     }
-    return this.ask(light, { off: true })
+    return this.ask(light, { off: true });
   }
 
   /** Put two lights on one dimmer. @param {string} one @param {string} other */
   tie(one, other) {
-    const { ties } = this.store.value
-    const joined = ties.filter((tie) => tie.includes(one) || tie.includes(other)).flat()
-    const rest = ties.filter((tie) => !tie.includes(one) && !tie.includes(other))
-    return this.tieAll([...rest, [...new Set([...joined, one, other])]])
+    const { ties } = this.store.value;
+    const joined = ties.filter((tie) => tie.includes(one) || tie.includes(other)).flat();
+    const rest = ties.filter((tie) => !tie.includes(one) && !tie.includes(other));
+    return this.tieAll([...rest, [...new Set([...joined, one, other])]]);
   }
 
   /** @param {string} name */
   untie(name) {
-    const left = this.store.value.ties.map((tie) => tie.filter((one) => one !== name))
-    return this.tieAll(left.filter((tie) => tie.length > 1))
+    const left = this.store.value.ties.map((tie) => tie.filter((one) => one !== name));
+    return this.tieAll(left.filter((tie) => tie.length > 1));
   }
 
   /** @param {string[][]} ties */
   tieAll(ties) {
-    this.store.set({ ties })
-    return this.send('tie', { ties })
+    this.store.set({ ties });
+    return this.send('tie', { ties });
   }
 
   /** @param {string} key @param {any} value null for what follows from the painting */
   setting(key, value) {
-    this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }))
-    return this.send('set', { values: { [key]: value } })
+    this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }));
+    return this.send('set', { values: { [key]: value } });
   }
 
   verify(run = true) {
     this.store.set({
       verifying: run ? { what: 'verify', done: 0, total: 0, unit: '' } : null,
-    })
-    return this.send('verify', { run })
+    });
+    return this.send('verify', { run });
   }
 }
 
 /** @param {Asked} asked @returns {Asked} */
 function withoutLevel({ lock, off, ...rest }) {
-  return rest
+  return rest;
 }
 
 /** @param {any} message @returns {Partial<Ui>} */
 function stateOf(message) {
-  const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message
+  const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
   return {
     ready: true,
     state: message,
@@ -247,7 +247,7 @@ function stateOf(message) {
         : null,
     ...answerFields(message.answer ?? { lights: message.lights_answer }, []),
     ...weightsOf(message),
-  }
+  };
 }
 
 /**
@@ -257,47 +257,47 @@ function stateOf(message) {
  */
 function answerFields({ headline, delta_e: deltaE, sentences, lights }, before) {
   /** @type {Partial<Ui>} */
-  const made = { isLive: false }
+  const made = { isLive: false };
   if (headline !== undefined) {
-    Object.assign(made, { headline, deltaE: deltaE ?? null, sentences: sentences ?? [] })
+    Object.assign(made, { headline, deltaE: deltaE ?? null, sentences: sentences ?? [] });
   }
   if (lights) {
     made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
       ...before[k],
       ...one,
-    }))
+    }));
   }
-  return made
+  return made;
 }
 
 /** @param {Message} message @returns {Partial<Ui>} */
 function weightsOf(message) {
-  const flat = message.arrays?.weights?.data
-  if (!flat) return {}
+  const flat = message.arrays?.weights?.data;
+  if (!flat) return {};
   /** @type {RGB[]} */
-  const weights = []
-  for (let at = 0; at < flat.length; at += 3) weights.push([flat[at], flat[at + 1], flat[at + 2]])
-  return { weights }
+  const weights = [];
+  for (let at = 0; at < flat.length; at += 3) weights.push([flat[at], flat[at + 1], flat[at + 2]]);
+  return { weights };
 }
 
 /** Of an answer, and of a patch. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 function answerOf(message, ui) {
-  const made = /** @type {Partial<Ui>} */ (weightsOf(message))
+  const made = /** @type {Partial<Ui>} */ (weightsOf(message));
   for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant'])) {
-    if (message[key]) made[key] = message[key]
+    if (message[key]) made[key] = message[key];
   }
-  if (message.lights) Object.assign(made, answerFields(message, ui.lit))
-  else if (!message.exact) made.isLive = true
-  if (ui.verified && made.weights) made.verified = { ...ui.verified, isOld: true }
+  if (message.lights) Object.assign(made, answerFields(message, ui.lit));
+  else if (!message.exact) made.isLive = true;
+  if (ui.verified && made.weights) made.verified = { ...ui.verified, isOld: true };
   // The reasons were those of the answer before.
-  if (made.isLive && ui.explained.length) made.explained = []
-  return made
+  if (made.isLive && ui.explained.length) made.explained = [];
+  return made;
 }
 
 /** @param {any} message @returns {Partial<Ui>} */
 function progressOf({ what, done, total, unit }) {
-  const made = { what, done, total, unit }
-  if (!what) return { basis: null, verifying: null }
-  if (/verif/i.test(what)) return { verifying: made }
-  return { basis: total && done >= total ? null : made }
+  const made = { what, done, total, unit };
+  if (!what) return { basis: null, verifying: null };
+  if (/verif/i.test(what)) return { verifying: made };
+  return { basis: total && done >= total ? null : made };
 }

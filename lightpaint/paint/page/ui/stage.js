@@ -1,12 +1,12 @@
 /** The pictures, and what lies over them: names, the brush, the wipe, a hint for the first stroke. */
 
-import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js'
-import { toHex } from './colours.js'
-import { counted } from './format.js'
-import { gainOf, paintOf, shown } from './model.js'
-import { paneAt, Pointer } from './pointer.js'
-import { look } from './tools.js'
-import { Bar } from './bar.js'
+import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
+import { toHex } from './colours.js';
+import { counted } from './format.js';
+import { gainOf, paintOf, shown } from './model.js';
+import { paneAt, Pointer } from './pointer.js';
+import { look } from './tools.js';
+import { Bar } from './bar.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./engine.js").Pane} Pane */
@@ -21,53 +21,53 @@ const NAMES = {
   other: 'Other look',
   verified: 'Render',
   present: 'Now',
-}
+};
 
 /** @param {Ui} ui @param {string} kind @returns {string} */
 function nameOf(ui, kind) {
   if (kind === 'other' && ui.hovered !== null) {
-    const stops = Math.round(Math.log2(gainOf(ui, ui.hovered)))
-    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, 'stop')} brighter` : ''}`
+    const stops = Math.round(Math.log2(gainOf(ui, ui.hovered)));
+    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, 'stop')} brighter` : ''}`;
   }
   if (kind === 'other' && ui.mix) {
-    const [a, b] = [ui.mix.a, ui.mix.b].map((id) => ui.looks.find((one) => one.id === id)?.name)
-    return ui.mix.share === 1 ? `${b}` : `${a} → ${b}, ${Math.round(100 * ui.mix.share)} %`
+    const [a, b] = [ui.mix.a, ui.mix.b].map((id) => ui.looks.find((one) => one.id === id)?.name);
+    return ui.mix.share === 1 ? `${b}` : `${a} → ${b}, ${Math.round(100 * ui.mix.share)} %`;
   }
   if (kind === 'solution' && ui.show.instead && ui.mix) {
-    return ui.looks.find((one) => one.id === ui.mix?.a)?.name ?? NAMES.solution
+    return ui.looks.find((one) => one.id === ui.mix?.a)?.name ?? NAMES.solution;
   }
-  if (kind === 'verified' && ui.verified?.isOld) return 'Render of an earlier answer'
-  return NAMES[kind] ?? kind
+  if (kind === 'verified' && ui.verified?.isOld) return 'Render of an earlier answer';
+  return NAMES[kind] ?? kind;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Stage({ ui, hands }) {
-  const { engine, store } = hands
-  const frame = useRef(/** @type {HTMLElement | null} */ (null))
-  const rings = useRef(/** @type {HTMLElement | null} */ (null))
-  const [, resized] = useState(0)
+  const { engine, store } = hands;
+  const frame = useRef(/** @type {HTMLElement | null} */ (null));
+  const rings = useRef(/** @type {HTMLElement | null} */ (null));
+  const [, resized] = useState(0);
   const [pointer] = useState(
     () =>
       new Pointer(engine, store, (x, y) => {
-        ring(rings.current, engine, store.value, x, y)
-        point(engine, store, x, y)
+        ring(rings.current, engine, store.value, x, y);
+        point(engine, store, x, y);
       }),
-  )
-  useLayoutEffect(() => frame.current?.prepend(engine.element), [])
+  );
+  useLayoutEffect(() => frame.current?.prepend(engine.element), []);
   useEffect(
     () =>
       watch(frame.current, (width, height) => {
-        engine.resize(width, height)
-        resized((count) => count + 1)
+        engine.resize(width, height);
+        resized((count) => count + 1);
       }),
     [],
-  )
+  );
   // At once, so that names lie where the pictures will.
   useMemo(
     () => engine.show(shown(ui)),
     [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights],
-  )
-  const hasAlbedo = ui.resources.albedo !== undefined
+  );
+  const hasAlbedo = ui.resources.albedo !== undefined;
   useEffect(
     () =>
       engine.use({
@@ -92,10 +92,10 @@ export function Stage({ ui, hands }) {
       ui.about,
       hasAlbedo,
     ],
-  )
-  useEffect(() => ring(rings.current, engine, ui), [ui.size, ui.tool, ui.hardness, ui.show])
-  useSurface(frame, pointer, hands)
-  const panes = ui.ready ? engine.panes() : []
+  );
+  useEffect(() => ring(rings.current, engine, ui), [ui.size, ui.tool, ui.hardness, ui.show]);
+  useSurface(frame, pointer, hands);
+  const panes = ui.ready ? engine.panes() : [];
   return html`<div class=${`stage is-${ui.tool}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints." aria-describedby="lp-status">
     <div class="rings" ref=${rings} hidden aria-hidden="true">
@@ -106,16 +106,16 @@ export function Stage({ ui, hands }) {
     ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} />`}
     ${ui.asking && html`<div class="asking" role="status">${asked(ui.asking)}</div>`}
     ${!ui.ready && html`<${Waiting} ui=${ui} />`}
-  </div>`
+  </div>`;
 }
 
 /** Before there is anything to see. @param {{ui: Ui}} props */
 function Waiting({ ui }) {
-  const { basis } = ui
-  const text = ui.waiting || (basis ? 'Rendering the first picture …' : 'Opening the scene …')
+  const { basis } = ui;
+  const text = ui.waiting || (basis ? 'Rendering the first picture …' : 'Opening the scene …');
   return html`<div class="waiting" role="status"><span>${text}</span>
     ${!ui.waiting && html`<${Bar} progress=${basis ?? { done: 0, total: 0 }} label=${text} />`}
-  </div>`
+  </div>`;
 }
 
 /** @param {{stops: number, mired: number}} asking */
@@ -123,33 +123,33 @@ function asked({ stops, mired }) {
   const bright =
     Math.abs(stops) < 0.05
       ? 'as bright'
-      : `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`
+      : `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
   const warm =
     Math.abs(mired) < 3
       ? ''
-      : `, ${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`
-  return bright + warm
+      : `, ${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
+  return bright + warm;
 }
 
 /** @param {{ui: Ui, pane: Pane, panes: Pane[]}} props */
 function Tag({ ui, pane, panes }) {
-  const isRight = ui.show.layout === 'wipe' && pane === panes[0] && panes.length > 1
-  const size = /** @type {[number, number]} */ ([...ui.state.size].reverse())
-  if (pane.width < 90) return null
-  const [w] = size
-  const right = Math.min(pane.x + pane.width, pane.left + w * pane.scale)
+  const isRight = ui.show.layout === 'wipe' && pane === panes[0] && panes.length > 1;
+  const size = /** @type {[number, number]} */ ([...ui.state.size].reverse());
+  if (pane.width < 90) return null;
+  const [w] = size;
+  const right = Math.min(pane.x + pane.width, pane.left + w * pane.scale);
   const style = {
     top: `${Math.min(Math.max(pane.y, pane.top), pane.y + pane.height - 30) + 8}px`,
     left: `${(isRight ? right : Math.max(pane.x, pane.left)) + (isRight ? -8 : 8)}px`,
     transform: isRight ? 'translateX(-100%)' : '',
-  }
-  return html`<span class="tag" style=${style}>${nameOf(ui, pane.kind)}</span>`
+  };
+  return html`<span class="tag" style=${style}>${nameOf(ui, pane.kind)}</span>`;
 }
 
 /** @param {{panes: Pane[]}} props */
 function Hint({ panes }) {
-  const pane = panes.find((one) => one.kind === 'painting')
-  if (!pane) return null
+  const pane = panes.find((one) => one.kind === 'painting');
+  if (!pane) return null;
   return html`<div class="hint" style=${{
     left: `${pane.x + pane.width / 2}px`,
     top: `${pane.y + pane.height / 2}px`,
@@ -157,43 +157,43 @@ function Hint({ panes }) {
   }}>
     <strong>Paint how it should look</strong>
     <span>Choose a colour, drag over this picture. The lights follow on the other one.</span>
-  </div>`
+  </div>`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 function Wipe({ ui, hands }) {
-  const { store, engine } = hands
-  const ref = useRef(/** @type {HTMLElement | null} */ (null))
-  const to = (/** @type {number} */ wipe) => look(store, { wipe: Math.min(1, Math.max(0, wipe)) })
+  const { store, engine } = hands;
+  const ref = useRef(/** @type {HTMLElement | null} */ (null));
+  const to = (/** @type {number} */ wipe) => look(store, { wipe: Math.min(1, Math.max(0, wipe)) });
   const drag = (/** @type {PointerEvent} */ event) => {
-    if (!event.buttons) return
-    event.stopPropagation()
-    const { left, width } = engine.element.getBoundingClientRect()
-    to((event.clientX - left) / width)
-  }
+    if (!event.buttons) return;
+    event.stopPropagation();
+    const { left, width } = engine.element.getBoundingClientRect();
+    to((event.clientX - left) / width);
+  };
   const grab = (/** @type {PointerEvent} */ event) => {
-    event.stopPropagation()
-    ref.current?.setPointerCapture(event.pointerId)
-  }
+    event.stopPropagation();
+    ref.current?.setPointerCapture(event.pointerId);
+  };
   const press = (/** @type {KeyboardEvent} */ event) => {
-    const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key]
-    if (!way) return
-    event.preventDefault()
-    event.stopPropagation()
-    to(ui.show.wipe + way * 0.02)
-  }
+    const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    event.stopPropagation();
+    to(ui.show.wipe + way * 0.02);
+  };
   return html`<div class="wipe" ref=${ref} role="slider" tabindex="0" aria-label="Wipe"
     aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(100 * ui.show.wipe)}
     style=${{ left: `${100 * ui.show.wipe}%` }} onPointerDown=${grab} onPointerMove=${drag}
-    onKeyDown=${press}><i></i></div>`
+    onKeyDown=${press}><i></i></div>`;
 }
 
 /** @param {HTMLElement | null} element @param {(width: number, height: number) => void} tell */
 function watch(element, tell) {
-  if (!element) return undefined
-  const observer = new ResizeObserver(() => tell(element.clientWidth, element.clientHeight))
-  observer.observe(element)
-  return () => observer.disconnect()
+  if (!element) return undefined;
+  const observer = new ResizeObserver(() => tell(element.clientWidth, element.clientHeight));
+  observer.observe(element);
+  return () => observer.disconnect();
 }
 
 /**
@@ -203,88 +203,89 @@ function watch(element, tell) {
  * @param {number} [x] @param {number} [y]
  */
 function ring(rings, engine, ui, x = Number(rings?.dataset.x), y = Number(rings?.dataset.y)) {
-  if (!rings || !Number.isFinite(x)) return
-  rings.dataset.x = String(x)
-  rings.dataset.y = String(y)
-  const pane = paneAt(engine, x, y)
-  const others = engine.panes().filter((one) => one !== pane && ui.show.layout === 'side')
-  const [own, twin] = /** @type {HTMLElement[]} */ ([...rings.children])
-  rings.hidden = !pane
-  if (!pane) return
-  const isPoint = ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'ask' && ui.about === 'object')
-  const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale)
-  place(own, x, y, size, ui.hardness)
-  twin.hidden = !others.length
+  if (!rings || !Number.isFinite(x)) return;
+  rings.dataset.x = String(x);
+  rings.dataset.y = String(y);
+  const pane = paneAt(engine, x, y);
+  const others = engine.panes().filter((one) => one !== pane && ui.show.layout === 'side');
+  const [own, twin] = /** @type {HTMLElement[]} */ ([...rings.children]);
+  rings.hidden = !pane;
+  if (!pane) return;
+  const isPoint =
+    ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'ask' && ui.about === 'object');
+  const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale);
+  place(own, x, y, size, ui.hardness);
+  twin.hidden = !others.length;
   if (others.length)
-    place(twin, x - pane.left + others[0].left, y - pane.top + others[0].top, size, 1)
+    place(twin, x - pane.left + others[0].left, y - pane.top + others[0].top, size, 1);
 }
 
 /** @param {HTMLElement} element @param {number} x @param {number} y @param {number} size
  * @param {number} hardness */
 function place(element, x, y, size, hardness) {
-  element.style.width = element.style.height = `${size}px`
-  element.style.transform = `translate(${x - size / 2}px, ${y - size / 2}px)`
-  element.style.setProperty('--hard', String(hardness))
+  element.style.width = element.style.height = `${size}px`;
+  element.style.transform = `translate(${x - size / 2}px, ${y - size / 2}px)`;
+  element.style.setProperty('--hard', String(hardness));
 }
 
 /** @type {WeakMap<UiStore, number>} */
-const waiting = new WeakMap()
+const waiting = new WeakMap();
 
 /** Say what is under the pointer, once a frame. @param {Engine} engine @param {UiStore} store
  * @param {number} x @param {number} y */
 function point(engine, store, x, y) {
-  if (waiting.has(store)) return
+  if (waiting.has(store)) return;
   waiting.set(
     store,
     requestAnimationFrame(() => {
-      waiting.delete(store)
-      const pane = paneAt(engine, x, y)
+      waiting.delete(store);
+      const pane = paneAt(engine, x, y);
       const found =
-        pane && engine.pointed((x - pane.left) / pane.scale, (y - pane.top) / pane.scale)
-      if (found || store.value.pointed) store.set({ pointed: found })
+        pane && engine.pointed((x - pane.left) / pane.scale, (y - pane.top) / pane.scale);
+      if (found || store.value.pointed) store.set({ pointed: found });
     }),
-  )
+  );
 }
 
 /** @param {import("../vendor/preact.js").Ref<HTMLElement | null>} frame @param {Pointer} pointer
  * @param {Hands} hands */
 function useSurface(frame, pointer, hands) {
   useEffect(() => {
-    const element = frame.current
-    if (!element) return undefined
-    const { store, engine } = hands
-    const ends = new AbortController()
+    const element = frame.current;
+    if (!element) return undefined;
+    const { store, engine } = hands;
+    const ends = new AbortController();
     const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
-      element.addEventListener(name, hear, { signal: ends.signal, passive: false })
+      element.addEventListener(name, hear, { signal: ends.signal, passive: false });
     // Whoever came by a pointer sees where they are; the outline is for the keyboard.
     on('pointerdown', (event) => {
-      element.dataset.by = 'pointer'
-      pointer.down(event)
-    })
-    on('blur', () => delete element.dataset.by)
-    on('pointermove', (event) => pointer.move(event))
-    on('pointerup', (event) => pointer.up(event))
-    on('pointercancel', (event) => pointer.up(event))
-    on('wheel', (event) => pointer.wheel(event))
-    on('contextmenu', (event) => event.preventDefault())
+      element.dataset.by = 'pointer';
+      pointer.down(event);
+    });
+    on('blur', () => delete element.dataset.by);
+    on('pointermove', (event) => pointer.move(event));
+    on('pointerup', (event) => pointer.up(event));
+    on('pointercancel', (event) => pointer.up(event));
+    on('wheel', (event) => pointer.wheel(event));
+    on('contextmenu', (event) => event.preventDefault());
     on('pointerleave', () => {
-      store.set({ pointed: null })
-      const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'))
-      if (rings && !pointer.doing) rings.hidden = true
-    })
-    on('keydown', (event) => byKeys(event, pointer, engine, store))
+      store.set({ pointed: null });
+      const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'));
+      if (rings && !pointer.doing) rings.hidden = true;
+    });
+    on('keydown', (event) => byKeys(event, pointer, engine, store));
     const over = (/** @type {KeyboardEvent} */ event) => {
-      const inner = /** @type {HTMLElement} */ (event.composedPath()[0])
-      if (event.code !== 'Space' || inner.matches?.('input[type=text], textarea')) return
-      const isHere = element.matches(':hover') || inner === element
-      pointer.isSpace = event.type === 'keydown' && isHere
-      element.classList.toggle('is-panning', pointer.isSpace)
-      if (isHere) event.preventDefault()
-    }
-    window.addEventListener('keydown', over, { signal: ends.signal })
-    window.addEventListener('keyup', over, { signal: ends.signal })
-    return () => ends.abort()
-  }, [])
+      const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
+      if (event.code !== 'Space' || inner.matches?.('input[type=text], textarea')) return;
+      const isHere = element.matches(':hover') || inner === element;
+      pointer.isSpace = event.type === 'keydown' && isHere;
+      element.classList.toggle('is-panning', pointer.isSpace);
+      if (isHere) event.preventDefault();
+    };
+    window.addEventListener('keydown', over, { signal: ends.signal });
+    window.addEventListener('keyup', over, { signal: ends.signal });
+    return () => ends.abort();
+  }, []);
 }
 
 /** The brush by keys: arrows move it, Enter paints a dab. @param {KeyboardEvent} event
@@ -295,15 +296,15 @@ function byKeys(event, pointer, engine, store) {
     ArrowRight: [1, 0],
     ArrowUp: [0, -1],
     ArrowDown: [0, 1],
-  })[event.key]
-  if ((!way && event.key !== 'Enter') || event.target !== event.currentTarget) return
-  event.preventDefault()
-  const element = /** @type {HTMLElement} */ (event.currentTarget)
-  const rings = /** @type {HTMLElement} */ (element.querySelector('.rings'))
-  const pane = engine.panes()[0]
-  const step = event.shiftKey ? 1 : 12
-  const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0)
-  const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0)
-  pointer.moved(x, y)
-  if (event.key === 'Enter') pointer.dab(x, y)
+  })[event.key];
+  if ((!way && event.key !== 'Enter') || event.target !== event.currentTarget) return;
+  event.preventDefault();
+  const element = /** @type {HTMLElement} */ (event.currentTarget);
+  const rings = /** @type {HTMLElement} */ (element.querySelector('.rings'));
+  const pane = engine.panes()[0];
+  const step = event.shiftKey ? 1 : 12;
+  const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
+  const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
+  pointer.moved(x, y);
+  if (event.key === 'Enter') pointer.dab(x, y);
 }

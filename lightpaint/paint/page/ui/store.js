@@ -6,10 +6,10 @@
 export class Store {
   /** @param {T} value */
   constructor(value) {
-    this.value = value
+    this.value = value;
     /** @type {Set<() => void>} */
-    this.listeners = new Set()
-    this.waiting = false
+    this.listeners = new Set();
+    this.waiting = false;
   }
 
   /**
@@ -18,14 +18,14 @@ export class Store {
    * @param {Partial<T> | ((value: T) => Partial<T>)} changes
    */
   set(changes) {
-    const made = typeof changes === 'function' ? changes(this.value) : changes
-    this.value = { ...this.value, ...made }
+    const made = typeof changes === 'function' ? changes(this.value) : changes;
+    this.value = { ...this.value, ...made };
     if (!this.waiting) {
-      this.waiting = true
+      this.waiting = true;
       queueMicrotask(() => {
-        this.waiting = false
-        for (const listener of this.listeners) listener()
-      })
+        this.waiting = false;
+        for (const listener of this.listeners) listener();
+      });
     }
   }
 
@@ -34,7 +34,7 @@ export class Store {
    * @returns {() => void} what ends it
    */
   listen(listener) {
-    this.listeners.add(listener)
-    return () => this.listeners.delete(listener)
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
   }
 }

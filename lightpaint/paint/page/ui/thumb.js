@@ -1,6 +1,6 @@
 /** A small picture of the session on a canvas of its own. */
 
-import { html, useEffect, useRef } from '../vendor/preact.js'
+import { html, useEffect, useRef } from '../vendor/preact.js';
 
 /** @typedef {import("./keys.js").Hands} Hands */
 
@@ -9,30 +9,30 @@ import { html, useEffect, useRef } from '../vendor/preact.js'
  *   undefined while there is no such picture
  */
 export function Thumb({ name, generation, hands, label }) {
-  const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null))
+  const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {
-    if (generation === undefined) return undefined
-    let isGone = false
+    if (generation === undefined) return undefined;
+    let isGone = false;
     hands.session.host.fetch(name).then(
       (picture) => !isGone && ref.current && put(ref.current, picture),
       () => undefined, // A thumbnail is not worth an error.
-    )
+    );
     return () => {
-      isGone = true
-    }
-  }, [name, generation])
+      isGone = true;
+    };
+  }, [name, generation]);
   return html`<canvas class="thumb" ref=${ref} width="1" height="1" role=${label ? 'img' : undefined}
-    aria-label=${label} aria-hidden=${label ? undefined : 'true'}></canvas>`
+    aria-label=${label} aria-hidden=${label ? undefined : 'true'}></canvas>`;
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./engine.js").Picture} picture (h, w, 3) */
 function put(canvas, { data, shape: [height, width] }) {
-  canvas.width = width
-  canvas.height = height
-  const pixels = new ImageData(width, height)
+  canvas.width = width;
+  canvas.height = height;
+  const pixels = new ImageData(width, height);
   for (let at = 0; at < width * height; at += 1) {
-    for (let c = 0; c < 3; c += 1) pixels.data[4 * at + c] = data[3 * at + c]
-    pixels.data[4 * at + 3] = 255
+    for (let c = 0; c < 3; c += 1) pixels.data[4 * at + c] = data[3 * at + c];
+    pixels.data[4 * at + 3] = 255;
   }
-  canvas.getContext('2d')?.putImageData(pixels, 0, 0)
+  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
 }

@@ -1,9 +1,9 @@
 /** The tools at the side, and above the pictures what the one in the hand can be set to. */
 
-import { html, useState } from '../vendor/preact.js'
-import { toHex } from './colours.js'
-import { Button, Choice, Number_, Select, Slider } from './controls.js'
-import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from './tools.js'
+import { html, useState } from '../vendor/preact.js';
+import { toHex } from './colours.js';
+import { Button, Choice, Number_, Select, Slider } from './controls.js';
+import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -12,21 +12,21 @@ import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from './tools.js'
 const RATIO = {
   to: (/** @type {number} */ x) => Math.log2(x),
   of: (/** @type {number} */ t) => Math.round(2 ** t),
-}
+};
 
 const ABOUT = [
   { value: 'spot', label: 'Spot', tip: 'A soft spot where the drag begins' },
   { value: 'object', label: 'Object', tip: 'The whole object under the pointer' },
-]
+];
 const PAINT_AS = [
   { value: 'light', label: 'Light', tip: 'Paint light: what the surface is made of stays visible' },
   { value: 'look', label: 'Look', tip: 'Paint the look: the colour itself, as it is to appear' },
-]
+];
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ToolBar({ ui, hands }) {
-  const { store } = hands
-  const style = { '--first': toHex(ui.colour), '--second': toHex(ui.second.colour) }
+  const { store } = hands;
+  const style = { '--first': toHex(ui.colour), '--second': toHex(ui.second.colour) };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
@@ -37,15 +37,15 @@ export function ToolBar({ ui, hands }) {
     <button type="button" class="two-colours" style=${style} data-tip="Other colour" data-keys="X"
       aria-keyshortcuts="X" aria-label=${`Swap colours: ${toHex(ui.colour)} in the hand`}
       onClick=${() => swap(store)}><i></i><i></i></button>
-  </nav>`
+  </nav>`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ToolOptions({ ui, hands }) {
-  const { store } = hands
-  const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? ''
-  const strokes = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool)
-  const paints = ['brush', 'fill', 'line'].includes(ui.tool)
+  const { store } = hands;
+  const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? '';
+  const strokes = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
+  const paints = ['brush', 'fill', 'line'].includes(ui.tool);
   return html`<div class="options" role="group" aria-label=${`${label} settings`}>
     <strong>${label}</strong>
     ${
@@ -85,26 +85,26 @@ export function ToolOptions({ ui, hands }) {
       least=${1} most=${100} unit="%" keys="1 … 0" tip="Flow: how much paint each touch leaves"
       change=${(/** @type {number} */ flow) => store.set({ flow: flow / 100 })} />`
     }
-  </div>`
+  </div>`;
 }
 
 /** The ask of a drag in numbers, for one object or for the whole picture. Also a panel's content.
  * @param {{ui: Ui, hands: Hands}} props */
 export function Ask({ ui, hands }) {
-  const [stops, setStops] = useState(0.5)
-  const [mired, setMired] = useState(0)
-  const [object, setObject] = useState('all')
-  const objects = /** @type {string[]} */ (ui.state?.objects ?? [])
+  const [stops, setStops] = useState(0.5);
+  const [mired, setMired] = useState(0);
+  const [object, setObject] = useState('all');
+  const objects = /** @type {string[]} */ (ui.state?.objects ?? []);
   const choices = [
     { value: 'all', label: 'Whole picture' },
     ...objects
       .map((name, k) => ({ value: String(k), label: name }))
       .sort((a, b) => a.label.localeCompare(b.label)),
-  ]
+  ];
   const ask = () => {
-    hands.store.set({ hint: false })
-    hands.engine.ask({ stops, mired, object: object === 'all' ? null : Number(object) })
-  }
+    hands.store.set({ hint: false });
+    hands.engine.ask({ stops, mired, object: object === 'all' ? null : Number(object) });
+  };
   return html`<div class="ask">
     <${Select} label="Where" value=${object} choices=${choices} change=${setObject} />
     <${Number_} label="Brighter" value=${stops} least=${-8} most=${8} step=${0.1} unit="st"
@@ -113,5 +113,5 @@ export function Ask({ ui, hands }) {
       unit="mired" change=${setMired} />
     <${Button} label="Ask for it" disabled=${!stops && !mired} act=${ask}
       tip="As one stroke, which undo takes back" />
-  </div>`
+  </div>`;
 }

@@ -1,9 +1,9 @@
 /** Above the pictures: what is open, undo, how the pictures are looked at. */
 
-import { html } from '../vendor/preact.js'
-import { Button, Check, Choice, Select, Slider } from './controls.js'
-import { signed } from './format.js'
-import { look } from './tools.js'
+import { html } from '../vendor/preact.js';
+import { Button, Check, Choice, Select, Slider } from './controls.js';
+import { signed } from './format.js';
+import { look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -12,15 +12,15 @@ const LAYOUTS = [
   { value: 'side', label: 'Side by side', icon: 'side', keys: 'V' },
   { value: 'wipe', label: 'Wipe', icon: 'wipe', keys: 'V' },
   { value: 'blink', label: 'Blink', icon: 'blink', keys: 'V' },
-]
+];
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function TopBar({ ui, hands }) {
-  const { store, session } = hands
-  const { show, history } = ui
-  const undo = history.undo.at(-1)
-  const redo = history.redo.at(-1)
-  const [scene, name] = [ui.state?.scene ?? '', ui.state?.session ?? '']
+  const { store, session } = hands;
+  const { show, history } = ui;
+  const undo = history.undo.at(-1);
+  const redo = history.redo.at(-1);
+  const [scene, name] = [ui.state?.scene ?? '', ui.state?.session ?? ''];
   return html`<header class="top">
     <div class="title"><strong>${scene || 'lightpaint'}</strong>${
       name && name !== scene && html`<span>${name}</span>`
@@ -63,19 +63,19 @@ export function TopBar({ ui, hands }) {
       <${Button} icon="panel" tip="Panels" keys="P" on=${ui.side}
         act=${() => store.set({ side: !ui.side })} />
     </div>
-  </header>`
+  </header>`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 function ViewChoice({ ui, hands }) {
-  const { show } = ui
-  const names = (ui.state?.transforms ?? []).map((/** @type {any} */ one) => one.name ?? one)
+  const { show } = ui;
+  const names = (ui.state?.transforms ?? []).map((/** @type {any} */ one) => one.name ?? one);
   return html`<${Select} label="View" hidden value=${show.transform}
     tip="View transform: how light becomes what the display shows"
     choices=${names.map((/** @type {string} */ name) => ({ value: name, label: spoken(name) }))}
     change=${(/** @type {string} */ transform) => look(hands.store, { transform })} />
   <${Check} label="Clean" on=${show.clean} tip="Without noise (C): for the eye only"
-    change=${(/** @type {boolean} */ clean) => look(hands.store, { clean })} />`
+    change=${(/** @type {boolean} */ clean) => look(hands.store, { clean })} />`;
 }
 
 /** @param {string} name */
@@ -85,27 +85,27 @@ function spoken(name) {
     linear: 'Linear',
     filmic: 'Filmic',
     agx: 'AgX',
-  })
-  return known[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ')
+  });
+  return known[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
 }
 
 /** Which two pictures are compared. @param {{ui: Ui, hands: Hands}} props */
 function Compare({ ui, hands }) {
-  const { store } = hands
-  const { show } = ui
-  const value = ui.mix ? 'looks' : `${show.left} ${show.right}`
+  const { store } = hands;
+  const { show } = ui;
+  const value = ui.mix ? 'looks' : `${show.left} ${show.right}`;
   const choices = [
     { value: 'painting solution', label: 'Painting | Answer' },
     { value: 'present solution', label: 'Now | Answer' },
     { value: 'present painting', label: 'Now | Painting' },
     ...(ui.verified ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
     ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
-  ]
+  ];
   return html`<${Select} label="Compare" hidden value=${value} choices=${choices}
     tip="Which two pictures" change=${(/** @type {string} */ pair) => {
-      if (pair === 'looks') return
-      const [left, right] = /** @type {any} */ (pair.split(' '))
-      store.set({ mix: null })
-      look(store, { left, right, instead: null, other: null })
-    }} />`
+      if (pair === 'looks') return;
+      const [left, right] = /** @type {any} */ (pair.split(' '));
+      store.set({ mix: null });
+      look(store, { left, right, instead: null, other: null });
+    }} />`;
 }

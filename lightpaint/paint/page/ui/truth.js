@@ -1,11 +1,11 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
-import { html } from '../vendor/preact.js'
-import { Bar } from './bar.js'
-import { Button, Choice } from './controls.js'
-import { number } from './format.js'
-import { Icon } from './icons.js'
-import { HINTS, look } from './tools.js'
+import { html } from '../vendor/preact.js';
+import { Bar } from './bar.js';
+import { Button, Choice } from './controls.js';
+import { number } from './format.js';
+import { Icon } from './icons.js';
+import { HINTS, look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -16,7 +16,7 @@ const OVERLAYS = [
   { value: 'beyond', label: 'Out of reach', tip: 'What no setting of these lights can do' },
   { value: 'falsecolor', label: 'False colour', tip: 'How bright, in stops' },
   { value: 'importance', label: 'Painted', tip: 'What counts, and how much' },
-]
+];
 
 /** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
 const LEGENDS = {
@@ -24,18 +24,18 @@ const LEGENDS = {
   beyond: ['in reach', 'out of reach'],
   falsecolor: ['−6 stops', 'grey', '+6'],
   importance: ['free', 'counts'],
-}
+};
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function TruthPanel({ ui, hands }) {
-  const { session, store } = hands
-  const { overlay } = ui.show
-  const legend = overlay && LEGENDS[overlay]
+  const { session, store } = hands;
+  const { overlay } = ui.show;
+  const legend = overlay && LEGENDS[overlay];
   const choose = (/** @type {any} */ value) => {
-    look(store, { overlay: value })
-    if (value === 'beyond' && ui.resources.beyond === undefined) session.send('explain')
-  }
-  const sentences = ui.explained.length ? ui.explained : ui.sentences
+    look(store, { overlay: value });
+    if (value === 'beyond' && ui.resources.beyond === undefined) session.send('explain');
+  };
+  const sentences = ui.explained.length ? ui.explained : ui.sentences;
   return html`<div class="truth">
     <${Choice} label="Over the pictures" value=${overlay} choices=${OVERLAYS} change=${choose} />
     ${
@@ -53,48 +53,48 @@ export function TruthPanel({ ui, hands }) {
     </div>`
     }
     ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
-  </div>`
+  </div>`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 function Verify({ ui, hands }) {
-  const { session } = hands
+  const { session } = hands;
   if (!ui.verifying) {
     return html`<${Button} label="Verify" icon="camera" act=${() => session.verify()}
-      tip="Render the scene with this lighting, and compare" />`
+      tip="Render the scene with this lighting, and compare" />`;
   }
   return html`<${Button} label="Stop the render" icon="close" act=${() => session.verify(false)} />
-    <${Bar} progress=${ui.verifying} label="Verifying" />`
+    <${Bar} progress=${ui.verifying} label="Verifying" />`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
 function Verified({ ui, hands }) {
-  const { verified, show } = ui
-  if (!verified) return null
-  const isShown = show.left === 'solution' && show.right === 'verified'
+  const { verified, show } = ui;
+  if (!verified) return null;
+  const isShown = show.left === 'solution' && show.right === 'verified';
   const compare = () => {
-    hands.store.set({ mix: null })
+    hands.store.set({ mix: null });
     look(
       hands.store,
       isShown
         ? { left: 'painting', right: 'solution', layout: 'side' }
         : { left: 'solution', right: 'verified', layout: 'wipe', instead: null },
-    )
-  }
+    );
+  };
   return html`<div class=${`verified ${verified.agrees ? 'is-good' : 'is-bad'}`}>
     <p><${Icon} name=${verified.agrees ? 'check' : 'warn'} /><span>${verified.text}${
       verified.isOld ? ' (of an earlier answer)' : ''
     }</span></p>
     <${Button} label="Answer | Render" icon="wipe" on=${isShown} act=${compare} />
-  </div>`
+  </div>`;
 }
 
 /** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
-  const { store, session } = hands
-  const first = ui.state?.first && !ui.history.undo.length
-  const text = first ? 'Nothing is painted yet: the answer is the present lighting.' : ui.headline
+  const { store, session } = hands;
+  const first = ui.state?.first && !ui.history.undo.length;
+  const text = first ? 'Nothing is painted yet: the answer is the present lighting.' : ui.headline;
   return html`<div class="answer">
     <p class="headline" role="status">
       ${
@@ -120,25 +120,25 @@ export function AnswerLine({ ui, hands }) {
       html`<${Button} label="How true?" act=${() =>
         store.set({ side: true, open: { ...ui.open, truth: true } })} />`
     }
-  </div>`
+  </div>`;
 }
 
 /** Which lights make up what is under the pointer; else what the tool does. @param {{ui: Ui}}
  * props */
 export function Here({ ui }) {
   if (!ui.pointed) {
-    const text = ui.readonly ? '' : HINTS[ui.tool]
-    return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`
+    const text = ui.readonly ? '' : HINTS[ui.tool];
+    return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
   }
-  const { object, shares } = ui.pointed
+  const { object, shares } = ui.pointed;
   const most = shares
     .map((share, k) => ({ share, k }))
     .filter(({ share }) => share >= 0.01)
     .sort((a, b) => b.share - a.share)
-    .slice(0, 5)
+    .slice(0, 5);
   return html`<p class="here" id="lp-status">${object && html`<span class="object">${object}</span>`}
     ${most.map(
       ({ share, k }) => html`<span key=${k}>${ui.lights[k]?.label}
       <b>${Math.round(100 * share)} %</b></span>`,
-    )}</p>`
+    )}</p>`;
 }

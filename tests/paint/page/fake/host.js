@@ -2,23 +2,23 @@
 
 const flat = (weights) => ({
   weights: { data: Float64Array.from(weights.flat()), shape: [weights.length, 3] },
-})
+});
 
 /** As halves: sign, five bits of exponent, ten of mantissa; rounded down. */
 function halves(floats) {
-  const bits = new Uint32Array(Float32Array.from(floats).buffer)
+  const bits = new Uint32Array(Float32Array.from(floats).buffer);
   return Uint16Array.from(bits, (x) => {
-    const exponent = ((x >>> 23) & 255) - 112
-    return exponent <= 0 ? 0 : (Math.min(30, exponent) << 10) | ((x >>> 13) & 1023)
-  })
+    const exponent = ((x >>> 23) & 255) - 112;
+    return exponent <= 0 ? 0 : (Math.min(30, exponent) << 10) | ((x >>> 13) & 1023);
+  });
 }
 
 export class FakeHost {
   constructor(room, { isFirst }) {
-    Object.assign(this, { room, isFirst, said: [], hearers: {}, looks: [], ids: 0, stroke: 0 })
-    this.weights = room.lights.map(({ present }) => [...present])
-    this.asked = {}
-    this.ties = []
+    Object.assign(this, { room, isFirst, said: [], hearers: {}, looks: [], ids: 0, stroke: 0 });
+    this.weights = room.lights.map(({ present }) => [...present]);
+    this.asked = {};
+    this.ties = [];
     this.settings = {
       hold: null,
       space: null,
@@ -26,46 +26,52 @@ export class FakeHost {
       literal: false,
       prefer_current: 0,
       sparse: null,
-    }
-    this.steps = []
-    this.undone = []
-    this.resources = Object.fromEntries(room.lights.map((_, k) => [`thumb/${k}`, 1]))
-    Object.assign(this.resources, { albedo: 1, objects: 1, present: 1, painting: 1, importance: 1 })
+    };
+    this.steps = [];
+    this.undone = [];
+    this.resources = Object.fromEntries(room.lights.map((_, k) => [`thumb/${k}`, 1]));
+    Object.assign(this.resources, {
+      albedo: 1,
+      objects: 1,
+      present: 1,
+      painting: 1,
+      importance: 1,
+    });
     room.lights.forEach((_, k) => {
-      this.resources[`plane/${k}`] = 1
-    })
-    this.original = this.mixed()
+      this.resources[`plane/${k}`] = 1;
+    });
+    this.original = this.mixed();
   }
 
   on(kind, hear) {
-    ;(this.hearers[kind] ??= []).push(hear)
+    (this.hearers[kind] ??= []).push(hear);
   }
   tell(message) {
-    for (const hear of this.hearers[message.kind] ?? []) hear(message)
+    for (const hear of this.hearers[message.kind] ?? []) hear(message);
   }
   open() {
-    this.tell(this.state())
+    this.tell(this.state());
   }
   close() {}
 
   /** Every message is answered, a little later; tests may have it fail, or wait. */
   async send(kind, fields = {}, arrays = {}) {
-    this.said.push({ kind, ...fields })
-    this.busy = (this.busy ?? 0) + 1
-    await new Promise((done) => setTimeout(done, 1))
-    const failed = (text) => ({ kind: 'failed', text })
+    this.said.push({ kind, ...fields });
+    this.busy = (this.busy ?? 0) + 1;
+    await new Promise((done) => setTimeout(done, 1));
+    const failed = (text) => ({ kind: 'failed', text });
     const made = this.fails
       ? failed(this.fails)
-      : (this[kind]?.(fields, arrays) ?? failed(`no ${kind}`))
-    this.fails = null
-    const reply = { arrays: {}, ...made, reply: this.said.length }
-    this.tell(reply)
-    this.busy -= 1
-    return reply
+      : (this[kind]?.(fields, arrays) ?? failed(`no ${kind}`));
+    this.fails = null;
+    const reply = { arrays: {}, ...made, reply: this.said.length };
+    this.tell(reply);
+    this.busy -= 1;
+    return reply;
   }
 
   state() {
-    const { room } = this
+    const { room } = this;
     return {
       kind: 'state',
       version: 1,
@@ -103,7 +109,7 @@ export class FakeHost {
       answer: this.exact(),
       ...this.asks(),
       arrays: flat(this.weights),
-    }
+    };
   }
 
   asks() {
@@ -116,12 +122,12 @@ export class FakeHost {
         undo: this.steps.map(({ label }) => label),
         redo: this.undone.map(({ label }) => label),
       },
-    }
+    };
   }
 
   exact() {
-    const level = (rgb) => 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
-    const total = this.weights.reduce((sum, rgb) => sum + level(rgb), 1e-9)
+    const level = (rgb) => 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    const total = this.weights.reduce((sum, rgb) => sum + level(rgb), 1e-9);
     return {
       headline: this.steps.length
         ? 'Close to what was painted; the floor stays too dark.'
@@ -139,7 +145,7 @@ export class FakeHost {
         held: false,
         unreached: k === 11,
       })),
-    }
+    };
   }
 
   answer(isExact = true) {
@@ -151,7 +157,7 @@ export class FakeHost {
       version: (this.version = (this.version ?? 0) + 1),
       ...(isExact ? { ...this.exact(), ...this.asks() } : {}),
       arrays: flat(this.weights),
-    }
+    };
   }
 
   patch() {
@@ -161,77 +167,77 @@ export class FakeHost {
       ...this.exact(),
       ...this.asks(),
       arrays: flat(this.weights),
-    }
+    };
   }
   step(label, undo) {
-    this.steps.push({ label, undo })
-    this.undone = []
+    this.steps.push({ label, undo });
+    this.undone = [];
   }
 
   /** A step towards the paint: each light by how far it looks like what was painted since. */
   paint({ stroke, region: [top, , left], done, label }, { image }) {
-    this.stroke = stroke
-    const { w, planes, lights } = this.room
-    const [rows, columns] = image.shape
-    const mixed = this.mixed()
+    this.stroke = stroke;
+    const { w, planes, lights } = this.room;
+    const [rows, columns] = image.shape;
+    const mixed = this.mixed();
     this.weights = this.weights.map((rgb, k) =>
       rgb.map((x, c) => {
-        if (this.asked[lights[k].name]?.lock) return x
-        let [up, own] = [0, 1e-9]
+        if (this.asked[lights[k].name]?.lock) return x;
+        let [up, own] = [0, 1e-9];
         for (let i = 0; i < rows * columns; i += 5) {
-          const at = 3 * ((top + Math.floor(i / columns)) * w + left + (i % columns)) + c
+          const at = 3 * ((top + Math.floor(i / columns)) * w + left + (i % columns)) + c;
           if (Math.abs(image.data[3 * i + c] - this.original[at]) > 1e-3)
-            up += (image.data[3 * i + c] - mixed[at]) * planes[k][at]
-          own += planes[k][at] ** 2
+            up += (image.data[3 * i + c] - mixed[at]) * planes[k][at];
+          own += planes[k][at] ** 2;
         }
-        return Math.max(0, x + (0.3 * up) / own)
+        return Math.max(0, x + (0.3 * up) / own);
       }),
-    )
-    if (done) this.step(label)
-    return this.answer(Boolean(done))
+    );
+    if (done) this.step(label);
+    return this.answer(Boolean(done));
   }
 
   mixed() {
-    const made = new Float32Array(this.room.w * this.room.h * 3)
+    const made = new Float32Array(this.room.w * this.room.h * 3);
     this.room.planes.forEach((plane, k) => {
-      for (let i = 0; i < made.length; i += 1) made[i] += plane[i] * this.weights[k][i % 3]
-    })
-    return made
+      for (let i = 0; i < made.length; i += 1) made[i] += plane[i] * this.weights[k][i % 3];
+    });
+    return made;
   }
 
   drop() {
-    return this.patch()
+    return this.patch();
   }
   undo() {
-    const step = this.steps.pop()
-    if (step) this.undone.push(step)
-    return this.patch()
+    const step = this.steps.pop();
+    if (step) this.undone.push(step);
+    return this.patch();
   }
   redo() {
-    const step = this.undone.pop()
-    if (step) this.steps.push(step)
-    return this.patch()
+    const step = this.undone.pop();
+    if (step) this.steps.push(step);
+    return this.patch();
   }
   ask({ light, asked, done }) {
-    this.asked = { ...this.asked, [this.room.lights[light].name]: asked }
-    if (Array.isArray(asked.lock)) this.weights[light] = [...asked.lock]
-    if (asked.off) this.weights[light] = [0, 0, 0]
-    if (done) this.step('ask')
-    return this.answer(done)
+    this.asked = { ...this.asked, [this.room.lights[light].name]: asked };
+    if (Array.isArray(asked.lock)) this.weights[light] = [...asked.lock];
+    if (asked.off) this.weights[light] = [0, 0, 0];
+    if (done) this.step('ask');
+    return this.answer(done);
   }
   tie({ ties }) {
-    this.ties = ties
-    return this.answer()
+    this.ties = ties;
+    return this.answer();
   }
   set({ values }) {
-    this.settings = { ...this.settings, ...values }
-    return this.answer()
+    this.settings = { ...this.settings, ...values };
+    return this.answer();
   }
   kept() {
-    return { kind: 'looks', looks: [...this.looks] }
+    return { kind: 'looks', looks: [...this.looks] };
   }
   save_look({ name }) {
-    const id = (this.ids += 1)
+    const id = (this.ids += 1);
     this.looks.push({
       id,
       name,
@@ -239,81 +245,81 @@ export class FakeHost {
       delta_e: 2.3,
       stamp: '',
       thumbnail: `look/${id}`,
-    })
-    return this.kept()
+    });
+    return this.kept();
   }
   load_look({ look }) {
-    this.weights = this.looks.find(({ id }) => id === look).weights.map((rgb) => [...rgb])
-    this.step('look')
-    return this.patch()
+    this.weights = this.looks.find(({ id }) => id === look).weights.map((rgb) => [...rgb]);
+    this.step('look');
+    return this.patch();
   }
   rename_look({ look, name }) {
-    this.looks = this.looks.map((one) => (one.id === look ? { ...one, name } : one))
-    return this.kept()
+    this.looks = this.looks.map((one) => (one.id === look ? { ...one, name } : one));
+    return this.kept();
   }
   copy_look({ look }) {
-    const one = this.looks.find(({ id }) => id === look)
-    this.looks.push({ ...one, id: (this.ids += 1), name: `${one.name} 2` })
-    return this.kept()
+    const one = this.looks.find(({ id }) => id === look);
+    this.looks.push({ ...one, id: (this.ids += 1), name: `${one.name} 2` });
+    return this.kept();
   }
   drop_look({ look }) {
-    this.looks = this.looks.filter(({ id }) => id !== look)
-    return this.kept()
+    this.looks = this.looks.filter(({ id }) => id !== look);
+    return this.kept();
   }
   export({ what }) {
     return {
       kind: 'exported',
       files: what.map((one) => `gallery-evening/${one}`),
       command: 'lightpaint solve gallery.xml gallery-evening/target.exr',
-    }
+    };
   }
   verify({ run }) {
     return run
       ? { kind: 'progress', what: 'verify', done: 3, total: 16, unit: 'passes' }
-      : { kind: 'say', text: 'The render was stopped.', tone: 'info' }
+      : { kind: 'say', text: 'The render was stopped.', tone: 'info' };
   }
   explain() {
     return {
       kind: 'explained',
       sentences: ['No light reaches the floor at the left.', 'The cove is at its limit.'],
-    }
+    };
   }
   take_over() {
-    return this.state()
+    return this.state();
   }
 
   async fetch(name) {
-    const [kind, at] = name.split('/')
-    const { w, h, planes, n, surfaces } = this.room
-    if (kind === 'plane') return { data: halves(planes[at]), shape: [h, w, 3] }
-    if (kind === 'present') return { data: halves(this.original), shape: [h, w, 3] }
-    if (kind === 'painting') return { data: this.original.slice(), shape: [h, w, 3] }
-    if (kind === 'importance') return { data: new Float32Array(w * h), shape: [h, w] }
+    const [kind, at] = name.split('/');
+    const { w, h, planes, n, surfaces } = this.room;
+    if (kind === 'plane') return { data: halves(planes[at]), shape: [h, w, 3] };
+    if (kind === 'present') return { data: halves(this.original), shape: [h, w, 3] };
+    if (kind === 'painting') return { data: this.original.slice(), shape: [h, w, 3] };
+    if (kind === 'importance') return { data: new Float32Array(w * h), shape: [h, w] };
     if (kind === 'albedo')
       return {
         data: halves(Float32Array.from(surfaces.flatMap(({ albedo }) => albedo))),
         shape: [h, w, 3],
-      }
+      };
     if (kind === 'objects')
-      return { data: Int16Array.from(surfaces, ({ object }) => object), shape: [h, w] }
+      return { data: Int16Array.from(surfaces, ({ object }) => object), shape: [h, w] };
     const weights =
       kind === 'thumb'
         ? this.room.lights.map((_, k) =>
             k === Number(at) ? [8 / n, 8 / n, 8 / n].map((x) => (x * n) / 8) : [0, 0, 0],
           )
-        : (this.looks.find((one) => one.thumbnail === name)?.weights ?? this.weights)
-    const small = [Math.ceil(h / 2), Math.ceil(w / 2)]
-    const data = new Uint8Array(small[0] * small[1] * 3)
+        : (this.looks.find((one) => one.thumbnail === name)?.weights ?? this.weights);
+    const small = [Math.ceil(h / 2), Math.ceil(w / 2)];
+    const data = new Uint8Array(small[0] * small[1] * 3);
     for (let y = 0; y < small[0]; y += 1)
       for (let x = 0; x < small[1]; x += 1)
         for (let c = 0; c < 3; c += 1) {
-          const from = 3 * (2 * y * w + 2 * x) + c
+          const from = 3 * (2 * y * w + 2 * x) + c;
           const light = planes.reduce(
             (sum, plane, k) => sum + (weights[k][c] ? weights[k][c] * plane[from] : 0),
             0,
-          )
-          data[3 * (y * small[1] + x) + c] = 255 * Math.min(1, light) ** (1 / 2.2)
+          );
+          data[3 * (y * small[1] + x) + c] = 255 * Math.min(1, light) ** (1 / 2.2);
         }
-    return { data, shape: [...small, 3] }
+    return { data, shape: [...small, 3] };
   }
 }
