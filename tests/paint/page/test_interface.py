@@ -417,6 +417,9 @@ def test_looks(painter: Painter) -> None:
     assert shown["instead"] == one
     between = [0.75 * a + 0.25 * b for a, b in zip(one[0], two[0], strict=True)]
     assert shown["other"][0] == pytest.approx(between)
+    painter.stroke()
+    assert painter.page.get_by_text("The painting is not shown").is_visible()
+    assert len(painter.calls("begin")) == 1  # the one before
     painter.button("Back to the painting").click()
     assert painter.ui("show")["left"] == "painting"
     painter.page.locator(".look").first.hover()

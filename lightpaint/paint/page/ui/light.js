@@ -158,7 +158,7 @@ function notes({ light, lit, asked = {}, tied }) {
     (asked.color ?? asked.kelvin ?? asked.primaries) && 'colour',
     tied && 'tied',
     lit?.unreached && 'not in the picture',
-    lit?.held && 'at its limit',
+    lit?.held && asked.lock === undefined && !asked.off && 'held back',
   ]
     .filter(Boolean)
     .map(String);

@@ -13,11 +13,13 @@ import { look, remember, take } from './tools.js';
 const SECOND_FINGER = { ms: 250, px: 24 };
 
 export class Pointer {
-  /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved */
-  constructor(engine, store, moved) {
+  /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved
+   * @param {(text: string) => void} say */
+  constructor(engine, store, moved, say) {
     this.engine = engine;
     this.store = store;
     this.moved = moved;
+    this.say = say;
     /** @type {Map<number, {x: number, y: number}>} */
     this.fingers = new Map();
     /** @type {null | "stroke" | "pan" | "pinch"} */
@@ -76,6 +78,7 @@ export class Pointer {
       this.pane = null;
       return;
     }
+    if (!this.canPaint()) return;
     remember(this.store);
     this.store.set({ hint: false });
     if (event.shiftKey && this.last && tool !== 'ask') {
@@ -121,6 +124,15 @@ export class Pointer {
     }
   }
 
+  /** Nobody paints on what they do not see. */
+  canPaint() {
+    const { left, right } = this.store.value.show;
+    const isShown = left === 'painting' || right === 'painting';
+    if (!isShown)
+      this.say('The painting is not shown: compare Painting | Answer to go on with it.');
+    return isShown;
+  }
+
   /** A stroke of one place, by keys. @param {number} x @param {number} y in CSS pixels */
   dab(x, y) {
     const pane = paneAt(this.engine, x, y);
@@ -128,6 +140,7 @@ export class Pointer {
     if (!pane || closed || readonly) return;
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
     if (tool === 'pick') return take(this.store, this.engine.lightAt(pane.kind, point.x, point.y));
+    if (!this.canPaint()) return;
     remember(this.store);
     this.store.set({ hint: false });
     this.engine.begin(point);

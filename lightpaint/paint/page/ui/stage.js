@@ -48,10 +48,15 @@ export function Stage({ ui, hands }) {
   const [, resized] = useState(0);
   const [pointer] = useState(
     () =>
-      new Pointer(engine, store, (x, y) => {
-        ring(rings.current, engine, store.value, x, y);
-        point(engine, store, x, y);
-      }),
+      new Pointer(
+        engine,
+        store,
+        (x, y) => {
+          ring(rings.current, engine, store.value, x, y);
+          point(engine, store, x, y);
+        },
+        (text) => hands.session.toast(text),
+      ),
   );
   useLayoutEffect(() => frame.current?.prepend(engine.element), []);
   useEffect(

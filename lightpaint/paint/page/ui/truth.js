@@ -102,7 +102,7 @@ export function AnswerLine({ ui, hands }) {
           ? html`<span class="live" data-tip=${'A quick answer while you paint, without what takes longer; the exact one follows'}>live</span>`
           : null
       }
-      <span>${text}</span>
+      <span class="said">${text}</span>
       ${
         !first &&
         ui.deltaE !== null &&
