@@ -34,8 +34,9 @@ from lightpaint.target.template import LIGHTS, SHOWN, Template, write_look, writ
 #: Rendering of what each light does alone, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)
 
-#: Rendering of a sheet of lights: on the film of a preview, which can go on from there.
-SHEET = Preset(16, 2**15)
+#: Rendering of a sheet of lights, and its seed: one of its own, so that no answer that goes on from
+#: what is kept depends on whether somebody has looked at the lights.
+SHEET, SHEET_SEED = Preset(16, 2**15), 2**31 - 1
 
 #: Pixels of all lights together that are rendered for it, and of each at least; bytes of a kept
 #: basis that is read for it, at most; lights that it is rendered for where each takes a render.
@@ -152,7 +153,7 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
             return why
         pixels = max(min(SHEET.pixels or 0, MANY_PIXELS // len(scene.lights)), FEW_PIXELS)
         small = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
-        basis = obtain_basis(small, spp=SHEET.spp, progress=progress)
+        basis = obtain_basis(small, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
     title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
     texts = how_denoised(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
     image = light_sheet(basis, title=title)

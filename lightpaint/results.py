@@ -11,6 +11,7 @@ from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
+from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -167,16 +168,19 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
     if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
         larger = render_features(look.relit)
     looks = Looks.clean(look.basis, look.predicted.image, verified, larger=larger)
-    sheet = comparison_image(
-        basis=look.basis,
-        target=look.target,
-        solution=look.solution,
-        predicted=look.predicted.image,
-        verified=verified,
-        seen=look.analysis.seen,
-        looks=looks,
-    )
-    write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
+
+    def comparison() -> None:
+        sheet = comparison_image(
+            basis=look.basis,
+            target=look.target,
+            solution=look.solution,
+            predicted=look.predicted.image,
+            verified=verified,
+            seen=look.analysis.seen,
+            looks=looks,
+        )
+        write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
+
     how: dict[str, Any] = {
         "basis": look.basis,
         "target": look.target,
@@ -191,8 +195,14 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         "seen": look.analysis.seen,
         "color_choices": look.analysis.color_choices,
     }
-    write_text(folder / "report.json", report_numbers(**how))
-    write_text(folder / "report.html", report_page(**how, looks=looks))
+
+    def page() -> None:
+        write_text(folder / "report.html", report_page(**how, looks=looks))
+
+    def numbers() -> None:
+        write_text(folder / "report.json", report_numbers(**how))
+
+    side_by_side(lambda write: write(), (page, comparison, numbers))
 
 
 def verify_result(

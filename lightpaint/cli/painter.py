@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lightpaint.cli import lines, terminal
 from lightpaint.cli.manner import Outcome, manner
 from lightpaint.colour.transform import TransformChoice
+from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.settings import Settings
@@ -43,8 +44,16 @@ def paint(
     from lightpaint.paint.server import check_installed
 
     check_installed()
-    how = {"settings": settings, "constraints": constraints, "choice": choice, "options": options}
-    subject = subject_of(source, folder, **how)  # type: ignore[arg-type]
+    from lightpaint.cli.spelling import solve_command
+
+    subject = subject_of(
+        source,
+        folder,
+        settings=settings,
+        constraints=constraints,
+        choice=choice,
+        command=lambda painting, wishes: solve_command(source.path, painting, options, wishes),
+    )
     if (scene := subject.scene) is not None:
         remarks = *remarks_of_scene(scene), *remarks_of_film(scene, settings)
         for remark in (*remarks, *remarks_of_memory(scene)):
@@ -53,6 +62,9 @@ def paint(
         for remark in subject.groups.remarks:
             terminal.say(remark)
     addresses = []
+
+    def told() -> dict[str, str]:
+        return {"folder": str(folder), "scene": subject.name}
 
     def opened(server: "Server") -> None:
         addresses.append(server.url)
@@ -71,7 +83,10 @@ def paint(
         if not addresses:  # it had not begun
             raise
         terminal.say(f"the painter has ended; what was painted is kept in {folder}")
-    return Outcome(lambda: {"folder": str(folder), "scene": subject.name})
+    except OutputError as error:  # also where an interrupt has ended it
+        terminal.complain("paint", str(error))
+        return Outcome(told, 2)
+    return Outcome(told)
 
 
 def _say(text: str) -> None:

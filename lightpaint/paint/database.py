@@ -1,6 +1,6 @@
 """The SQLite database of a session: opened by one process alone, errors in one line.
 
-The lock is the system's on the open file (`locking_mode=EXCLUSIVE`): it ends with its process,
+The lock is the system's on the open file (`locking_mode = EXCLUSIVE`): it ends with its process,
 however that ends, and leaves nothing behind that somebody would have to remove.
 """
 
@@ -60,12 +60,12 @@ def opened(path: Path | None, identity: Identity | None) -> sqlite3.Connection:
 
 def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity | None) -> None:
     for setting in (
-        "locking_mode=EXCLUSIVE",  # first of all: WAL then needs no shared memory, nor room for it
-        "trusted_schema=OFF",  # tables that others made may not call anything
-        "page_size=16384",
-        "auto_vacuum=INCREMENTAL",
-        "journal_mode=WAL",
-        f"synchronous={SYNCHRONOUS}",
+        "locking_mode = EXCLUSIVE",  # first of all: WAL then needs no room for shared memory
+        "trusted_schema = OFF",  # tables that others made may not call anything
+        "page_size = 16384",
+        "auto_vacuum = INCREMENTAL",
+        "journal_mode = WAL",
+        f"synchronous = {SYNCHRONOUS}",
     ):
         database.execute(f"PRAGMA {setting}").fetchall()
     with transaction(database):
@@ -75,8 +75,8 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
         if not tables:
             for statement in filter(str.strip, TABLES.split(";")):
                 database.execute(statement)
-            database.execute(f"PRAGMA application_id={APPLICATION}")
-            database.execute(f"PRAGMA user_version={VERSION}")
+            database.execute(f"PRAGMA application_id = {APPLICATION}")
+            database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
             raise PaintError(f"{path} is no session of the painter: {AFRESH}")
         elif version != VERSION:

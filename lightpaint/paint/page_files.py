@@ -5,15 +5,15 @@ from pathlib import Path
 
 #: What a browser is told of each kind of file; others are not part of the page.
 KINDS = {
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
+    ".html": "text/html;charset=utf-8",
+    ".js": "text/javascript;charset=utf-8",
+    ".css": "text/css;charset=utf-8",
     ".json": "application/json",
     ".svg": "image/svg+xml",
     ".png": "image/png",
     ".wasm": "application/wasm",
     ".woff2": "font/woff2",
-    ".txt": "text/plain; charset=utf-8",
+    ".txt": "text/plain;charset=utf-8",
 }
 
 PAGE = Path(__file__).parent / "page"

@@ -4,9 +4,11 @@ It knows nothing of light. The page is a table of files; pictures are raw bytes 
 generation; all else goes over one WebSocket. `guard.py` says who may ask.
 """
 
+import signal
 import socket
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from importlib.util import find_spec
 from math import prod
 from typing import TYPE_CHECKING, Any
@@ -20,6 +22,7 @@ from lightpaint.paint.protocol import MAX_FRAME
 from lightpaint.paint.store import Store
 
 if TYPE_CHECKING:
+    import uvicorn
     from starlette.requests import Request
     from starlette.responses import Response
     from starlette.websockets import WebSocket
@@ -167,11 +170,26 @@ class Server:
             limit_concurrency=256,
             timeout_graceful_shutdown=5,
         )
-        Ending(config).run(sockets=[self._socket])
+        with _hanging_up(server := Ending(config)):
+            server.run(sockets=[self._socket])
 
     def close(self) -> None:
         """Listen no more."""
         self._socket.close()
+
+
+@contextmanager
+def _hanging_up(server: "uvicorn.Server") -> Iterator[None]:
+    """A terminal that closes ends `server` as SIGTERM does, unless that is ignored (nohup)."""
+    before = signal.getsignal(signal.SIGHUP)
+    is_heard = threading.current_thread() is threading.main_thread() and callable(before)
+    if is_heard:
+        signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
+    try:
+        yield
+    finally:
+        if is_heard:
+            signal.signal(signal.SIGHUP, before)
 
 
 def _shown(host: str | None) -> str:

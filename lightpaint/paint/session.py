@@ -24,7 +24,6 @@ from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
-from lightpaint.lighting.constraints.whites import white_where_free
 from lightpaint.lighting.fit import meant_by
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.problem import Problem, reduced_by
@@ -411,7 +410,7 @@ class Session:
     def _check(self, wishes: Wishes) -> None:
         """Raise LightpaintError for what cannot be asked, before anything is changed."""
         fit = meant_by(wishes.settings(self._settings), [self._nothing])
-        reduced_by(self._constraints(wishes, fit.colors), self.basis, fit)
+        reduced_by(self._constraints(wishes), self.basis, fit)
 
     def _check_names(self, names: Any) -> None:
         if unknown := [name for name in names if name not in self.basis.names]:
@@ -429,7 +428,7 @@ class Session:
         told = [step.fields["after"] for step in steps if step.fields]
         self.wishes = Wishes.of(told[-1]) if told else Wishes()
         fit = self._fit
-        constraints = self._constraints(self.wishes, fit.colors)
+        constraints = self._constraints(self.wishes)
         self.live = Live(self.basis, self.image, self.importance, fit=fit, constraints=constraints)
         self.weights = self.basis.present_weights
         self._changed()
@@ -440,16 +439,15 @@ class Session:
 
     def _asks(self) -> None:
         fit = self._fit
-        self.live.asks(fit, self._constraints(self.wishes, fit.colors))
+        self.live.asks(fit, self._constraints(self.wishes))
 
     @property
     def _fit(self) -> Settings:
         return meant_by(self.wishes.settings(self._settings), [self._nothing])
 
-    def _constraints(self, wishes: Wishes, colors: str | None) -> Constraints:
+    def _constraints(self, wishes: Wishes) -> Constraints:
         asked = constraints_of(self.basis.asked).and_then(self._given)
-        asked = asked.and_then(wishes.constraints())
-        return white_where_free(asked, self.basis.lights) if colors == "white" else asked
+        return asked.and_then(wishes.constraints())
 
     @property
     def _nothing(self) -> Target:

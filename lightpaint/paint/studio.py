@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from threading import Condition, Lock, RLock, Thread
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
@@ -20,7 +21,7 @@ from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.exports import command_line, export, verified
+from lightpaint.paint.exports import PAINTING, export, verified
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
 from lightpaint.paint.protocol import Message
@@ -233,6 +234,9 @@ class Studio:
         if basis.features is not None:
             albedo = basis.features.albedo
             offer("albedo", lambda: pictures.as_halves(albedo))
+        if basis.objects is not None:
+            index = basis.objects.index
+            offer("objects", lambda: index.astype(np.int16))
         for transform in self._transforms(session):
             offer(f"lut/{transform.name}", lambda t=transform: pictures.table_of(t))  # type: ignore[misc]
 
@@ -251,7 +255,7 @@ class Studio:
                 {**light_fields(light), "scale": scale}
                 for light, scale in zip(basis.lights, scales, strict=True)
             ],
-            "objects": [],
+            "objects": [] if basis.objects is None else list(basis.objects.names),
             "transforms": [x.name for x in self._transforms(session)],
             "transform": {"name": session.transform.name, "stops": session.transform.stops},
             "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
@@ -265,8 +269,13 @@ class Studio:
             "has_noise": basis.knows_noise,
             "first": not session.store.steps,
             "stroke": session.stroke,
-            "command": command_line(self.subject, session.wishes),
+            "command": self._command(session),
         }
+
+    def _command(self, session: Session) -> str:
+        """The command that answers the exported painting alike, where there are commands."""
+        subject = self.subject
+        return subject.command(str(subject.folder / PAINTING), session.wishes)
 
     def _clean(self) -> None:
         """Planes without their grain, one after the other."""
@@ -347,7 +356,7 @@ class Studio:
         session, lighting = self._answer()
         with self._render:
             files = export(self.subject, session.moment(), lighting, message.what, self._hears)
-        command = command_line(self.subject, session.wishes)
+        command = self._command(session)
         self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
 
     def _verify(self, message: protocol.Verify) -> list[Message]:

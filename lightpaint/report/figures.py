@@ -8,11 +8,12 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, largest
 from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import denoised
 from lightpaint.images.png import png_bytes
+from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.pictures import (
@@ -102,10 +103,16 @@ def thumbnail(
 
 def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
     """Stops that bring the 98th percentile of what a light lights to white, seen emitters aside."""
-    bright = image.max(axis=-1)
+    bright = largest(image)
     lit = bright[(bright > 0) & ~emitters_seen]
     lit = lit if lit.size else bright[bright > 0]
     return float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+
+
+def _raw_uri(look: Picture) -> str:
+    if look.raw is None:
+        return ""
+    return data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)
 
 
 def wipe(looks: list[Picture]) -> str:
@@ -121,16 +128,18 @@ def wipe(looks: list[Picture]) -> str:
             for k, look in enumerate(looks)
         )
 
+    shown = side_by_side(lambda look: data_uri(to_8_bit(look.pixels)), looks)
+    raw = side_by_side(_raw_uri, looks)
     images = "".join(
         f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
         f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
-        f'src="{data_uri(to_8_bit(look.pixels))}">'
+        f'src="{shown[k]}">'
         for k, look in enumerate(looks)
     )
     images += "".join(
         f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
         f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
-        f'src="{data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)}">'
+        f'src="{raw[k]}">'
         for k, look in enumerate(looks)
         if look.raw is not None
     )

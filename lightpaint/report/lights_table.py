@@ -8,11 +8,12 @@ from html import escape
 
 import numpy as np
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.photometry import Photometry
+from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
@@ -21,7 +22,13 @@ from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
 from lightpaint.report.looks import MOST_THUMBNAILS
 from lightpaint.report.measures import energy_shares, largest_shares, that_do_most
-from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
+from lightpaint.report.sentences import (
+    UNTOLD,
+    UNTOLD_HERE,
+    spoken_errors,
+    spoken_percent,
+    unreached_channels,
+)
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (
@@ -86,15 +93,21 @@ def _rows(
     shares = energy_shares(basis, solution.lighting)
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in solution.lighting.lights}
-    rows = []
-    for k, (light, image) in enumerate(zip(basis.lights, basis.images, strict=True)):
+
+    def shown(image: Floats) -> tuple[str, tuple[int, ...], float]:
         picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
+        return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
+
+    rows = []
+    thumbnails = side_by_side(shown, basis.images)
+    for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
         name, setting = escape(light.name), settings[light.name]
-        error = f" <small>{errors[k]}</small>" if errors[k] else ""
+        error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
+        error = f" <small>{error}</small>" if error else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
-            f'<tr><td class="thumb"><img src="{data_uri(to_8_bit(picture), largest_png=0)}" '
-            f'width="{picture.shape[1]}" height="{picture.shape[0]}" alt="{what}" '
+            f'<tr><td class="thumb"><img src="{uri}" '
+            f'width="{shape[1]}" height="{shape[0]}" alt="{what}" '
             f'title="{what}"></td>'
             f'<th scope="row" class="name">{name_of(light.name)}<small>{escape(light.plugin)}'
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"

@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
@@ -67,6 +66,9 @@ class IntegratorChoice:
     @property
     def xml(self) -> str:
         """As an element of a scene."""
+        # It brings half of the network's protocols along.
+        from xml.sax.saxutils import quoteattr
+
         inner = "".join(
             f"<{_element(value)} name={quoteattr(key)} value={quoteattr(_written(value))}/>"
             for key, value in self.options.items()

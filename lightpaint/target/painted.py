@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, largest
 from lightpaint.colour.display import to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import box_mean
@@ -85,10 +85,10 @@ def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
     if picture.lossy:
         rough = np.asarray(mine - _compressed_like(path, its), np.float64)
         near, wide = (
-            np.abs(box_mean(rough, radius)).max(axis=-1) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
+            largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
         )
         return np.asarray(np.minimum(near, wide))
-    return np.asarray(np.abs(mine - its).max(axis=-1), np.float64)
+    return np.asarray(largest(np.abs(mine - its)), np.float64)
 
 
 def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:
@@ -97,7 +97,7 @@ def _difference_of_light(picture: Picture, look: Floats, template: Template) -> 
     shown = np.abs(transform.encode(picture.image) - transform.encode(look))
     size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), transform.white)
     relative = BEYOND_WHITE * np.abs(picture.image - look) / size
-    return np.asarray(np.maximum(shown, relative).max(axis=-1), np.float64)
+    return np.asarray(largest(np.maximum(shown, relative)), np.float64)
 
 
 def _compressed_like(path: Path, display: Floats) -> Floats:

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, largest
 from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
@@ -223,7 +223,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
         )
     albedo = reading.template.albedo
     # Metals, glass and what is not there reflect no diffuse light: nothing can be said of it.
-    blind = (albedo.max(axis=-1) <= 0) & (counted > 0)
+    blind = (largest(albedo) <= 0) & (counted > 0)
     seen = np.where(blind, 0, counted)
     if not seen.any():
         raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
@@ -238,12 +238,13 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     if template is None or template.albedo is None:
         return []
     albedo = np.maximum(template.albedo, 1e-3)
-    painted = (counted > 0) & (template.albedo.max(axis=-1) > 0)
+    there_is = largest(template.albedo) > 0
+    painted = (counted > 0) & there_is
     if not painted.any():
         return []
     light = np.maximum(reading.picture.image, 0) / albedo
     there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
-    bright = float(np.percentile(there[template.albedo.max(axis=-1) > 0], 95))
+    bright = float(np.percentile(there[there_is], 95))
     # What is nearly black anyway needs little, however it is divided.
     asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.transform.white)
     share = float((asks.any(axis=-1) & painted).sum() / painted.sum())

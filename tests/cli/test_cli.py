@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
 from lightpaint.results import verify_result
+from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 
@@ -213,7 +215,7 @@ def test_template_is_the_current_look(tmp_path: Path) -> None:
 
 def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
     for output, file in (("t.exr", "t.exr"), ("t.exr", "t.png"), ("template", "template.png")):
-        command = ("template", CORNELL, "--spp", 2, "-o", output)
+        command = ("template", CORNELL, "--resolution", "1/4", "--spp", 2, "-o", output)
         succeed(tmp_path, *command, "--force")
         painted = (tmp_path / output).parent / file if "." in output else tmp_path / output / file
         painted.write_bytes(b"hours of work")
@@ -553,7 +555,7 @@ def test_wrong_choices_are_refused_in_one_line(
 
 
 def test_solved_small_and_verified_large(tmp_path: Path) -> None:
-    arguments = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64, "--seed", 8)
+    arguments = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 16, "--seed", 8)
     output = succeed(tmp_path, *arguments)
     assert "A render confirms it." in output
     sizes = {}
@@ -565,7 +567,7 @@ def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     page = (tmp_path / "warm" / "report.html").read_text(encoding="utf-8")
     assert "32 × 32 pixels, verified at 128 × 128" in page
     # A saved basis of that size takes the painting of full size as well, and says so.
-    same = ("basis", CORNELL, "--resolution", "32x32", "--spp", 64, "--seed", 8, "-o", "s.exr")
+    same = ("basis", CORNELL, "--resolution", "32x32", "--spp", 16, "--seed", 8, "-o", "s.exr")
     assert "kept from an earlier run" in run(tmp_path, *same).stderr
     done = run(tmp_path, "solve", "s.exr", WARM, "-o", "saved")
     assert done.returncode == 0, done.stderr
@@ -621,28 +623,32 @@ def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_pa
         assert f"{option[0]} cannot change a saved basis" in told
 
 
-def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(tmp_path: Path):
+def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """A painting and its mask of full size, on a film whose sides have no common factor."""
+    small = replace(PRESETS["preview"], pixels=2**11)
+    monkeypatch.setitem(PRESETS, "preview", small)
     write_room(tmp_path, lights=LIGHTS["bulb"] + LIGHTS["beam"])
     room = (
-        (tmp_path / "room.xml").read_text().replace('"height" value="20"', '"height" value="512"')
+        (tmp_path / "room.xml").read_text().replace('"height" value="20"', '"height" value="128"')
     )
     (tmp_path / "room.xml").write_text(room)
-    size = ("-D", "width=683")
+    size = ("-D", "width=171")
     succeed(tmp_path, "template", "room.xml", *size, "-o", "look.exr", "--spp", 2)
-    mask = np.zeros((512, 683), np.float32)
-    mask[200:] = 1
+    mask = np.zeros((128, 171), np.float32)
+    mask[50:] = 1
     write_parts(tmp_path / "mask.exr", [Part("mask", {"Y": mask})])
     solve = ("solve", "room.xml", "look.exr", "--mask", "mask.exr", *size, "--quality", "preview")
     done = run(tmp_path, *solve, "--spp", 8)
     assert done.returncode == 0, done.stderr
     assert (
-        "film of 683x512 reduced to 170x128 blocks of 4x4 pixels: 3 columns of pixels at the right "
+        "film of 171x128 reduced to 42x32 blocks of 4x4 pixels: 3 columns of pixels at the right "
         "are left over, and nowhere counted" in done.stderr
     )
     assert "A render confirms it." in done.stdout
-    assert read_estimate(tmp_path / "look" / "predicted.exr")[0].size == (128, 170)
-    assert read_estimate(tmp_path / "look" / "verified.exr")[0].size == (512, 683)
+    assert read_estimate(tmp_path / "look" / "predicted.exr")[0].size == (32, 42)
+    assert read_estimate(tmp_path / "look" / "verified.exr")[0].size == (128, 171)
     # Fewer samples, of what is kept or exactly; both say what they used.
     for option, spp in ((), 8), (("--exact-spp",), 4):
         done = run(tmp_path, *solve, "--spp", 4, *option)

@@ -19,15 +19,15 @@ from lightpaint.scene.scene import load_scene
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
 INTEGRATORS = {"one pass": PATH, "separate renders": SEPARATELY}
 
-#: Samples per pixel: seconds of work, where it goes slowly.
-SPP = {"one pass": 10_000, "separate renders": 1000}
+#: Samples per pixel: dozens of passes, and seconds of work where it goes slowly.
+SPP = {"one pass": 2500, "separate renders": 250}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
 import os, sys, time
 import lightpaint.basis.render.budget as budget, lightpaint.scene.render as render
 from lightpaint.cli import main
-budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**17
+budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**15
 if "SLOWLY" in os.environ:
     # However fast the machine is, there is a middle to be stopped in.
     keep = budget.Keeper.now_and_then

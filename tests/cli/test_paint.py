@@ -2,23 +2,30 @@
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
 import urllib.request
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from command import refused
 from light_groups import interleaved, pictures
+from websockets.exceptions import ConnectionClosedError
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.paint.launch import subject_of
+from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
 from lightpaint.paint.steps import Identity, Step
 from lightpaint.paint.store import Store
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
@@ -65,18 +72,10 @@ def test_what_is_painted_and_where_it_is_kept(
 @pytest.mark.usefixtures("here")
 def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> None:
     line = "--new scene.xml -q --spp 8 --lock a=40% --port 0 -s 1 --no-browser --hold 0.5 -o x"
-    values = asked(
-        f"{line} --group g=a,b* --view agx --host 127.0.0.1 --time=3".replace("--time=3", "")
-    )
-    assert values["options"] == (
-        *("--spp=8", "--lock=a=40%", "-s", "1", "--hold=0.5", "'--group=g=a,b*'"),
-    )
-    given = [
-        "solve",
-        "scene.xml",
-        "painting.exr",
-        *" ".join(values["options"]).replace("'", "").split(),
-    ]
+    values = asked(f"{line} --group g=a,b* --view agx --host 127.0.0.1")
+    words = ("--spp=8", "--lock=a=40%", "-s", "1", "--hold=0.5", "'--group=g=a,b*'")
+    assert values["options"] == words
+    given = ["solve", "scene.xml", "painting.exr", *shlex.split(" ".join(words))]
     options = command_parser().parse_args(given)
     assert settings_of(options, given).hold == values["settings"].hold == 0.5
     assert asked("--lights groups.exr --lock a")["options"] == ("--lock=a",)
@@ -173,13 +172,69 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         assert [step.label for step in store.steps] == ["mine"]
 
 
-def test_a_host_is_told_what_it_means(here: Path) -> None:
-    with painting(here, "groups.exr", "--host", "127.0.0.1") as (process, _):
-        process.send_signal(signal.SIGINT)
+def live(url: str) -> ClientConnection:
+    """The socket of a page that was opened at `url`."""
+    with urllib.request.urlopen(url) as answer:
+        cookie = answer.headers["set-cookie"].partition(";")[0]
+    base = url.partition("/?")[0]
+    headers = {"Cookie": cookie}
+    where = f"{base.replace('http', 'ws')}/live"
+    return connect(where, origin=Origin(base), additional_headers=headers, max_size=None)
+
+
+def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
+    """Say something, and hear the answer to it; to `hello` the state when there is a picture."""
+    arrays = {name: fields.pop(name) for name in ("image", "importance") if name in fields}
+    message = Message(kind, {"seq": seq, **fields}, arrays)
+    socket.send(to_frame(message.content(), message.buffers()))
+    while True:
+        frame = socket.recv(timeout=60)
+        assert isinstance(frame, bytes)
+        content, _ = of_frame(frame)
+        if "size" in content if kind == "hello" else content.get("reply") == seq:
+            return content
+
+
+def greeted(socket: ClientConnection) -> dict[str, Any]:
+    return said(socket, 0, "hello", version=VERSION)
+
+
+def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:
+    pixels = {"image": np.ones((2, 3, 3), np.float32), "importance": np.ones((2, 3), np.float32)}
+    stroke = {"stroke": 1, "region": [0, 2, 0, 3], "done": True, "label": "mine"}
+    with painting(here, "room.basis.exr") as (process, url), live(url) as socket:
+        assert greeted(socket)["history"]["undo"] == []
+        assert said(socket, 1, "paint", **stroke, **pixels)["kind"] == "answer"
+        process.kill()
+        process.wait()
+    with painting(here, "room.basis.exr") as (_, url), live(url) as socket:
+        assert greeted(socket)["history"]["undo"] == ["mine"]
+
+
+def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(here: Path) -> None:
+    with painting(here, "room.basis.exr") as (_, url):
+        with live(url) as socket:
+            greeted(socket)
+            socket.send(bytes(2**20 + 16 * 12 * 10 + 1))
+            with pytest.raises(ConnectionClosedError) as closed:
+                deque(socket, 0)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1009
+        with live(url) as socket:
+            assert greeted(socket)["kind"] == "state"
+            assert socket.protocol.extensions == []  # nothing is compressed
+
+
+def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(here: Path) -> None:
+    with painting(here, "groups.exr", "--host", "127.0.0.1") as (process, url):
+        with urllib.request.urlopen(url):
+            process.send_signal(signal.SIGHUP)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
         said = process.stderr.read()
     assert "whoever has its address, with the token, can paint here" in said
+    assert "Traceback" not in said
+    assert said.endswith("what was painted is kept in groups.paint\n")
 
 
 def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:

@@ -16,7 +16,7 @@ from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketT
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
-from lightpaint.paint import client, server
+from lightpaint.paint import client, line, server
 from lightpaint.paint.guard import Guard
 from lightpaint.paint.line import Line
 from lightpaint.paint.page_files import page_files
@@ -110,7 +110,7 @@ def test_the_token_becomes_a_cookie_that_no_script_and_no_other_page_can_use(
     assert 'content="0; url=/"' in answer.text
     page = stranger.browser.get("/")
     assert page.status_code == 200
-    assert page.headers["content-type"] == "text/html; charset=utf-8"
+    assert page.headers["content-type"] == "text/html;charset=utf-8"
 
 
 def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
@@ -526,3 +526,39 @@ def test_names_from_files_are_text() -> None:
     name = "</script><b>\u202e\ud800"
     text = to_frame({"kind": "say", "text": name}, [])
     assert json.loads(text[4:].rstrip(b"\0"))["text"].startswith("</script><b>")
+
+
+class FullDisk:
+    """What a server sees of a store that cannot write at first."""
+
+    identity = None
+
+    def __init__(self) -> None:
+        self.unsaved: str | None = None
+        self.tries = 0
+
+    def flush(self) -> str | None:
+        self.tries += 1
+        self.unsaved = None if self.tries > 2 else self.unsaved
+        return self.unsaved
+
+
+def test_a_full_disk_is_said_and_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line, "TRY_S", 0.01)
+    served, store = Served(tmp_path / "page"), FullDisk()
+    served.line.store = store  # type: ignore[assignment]
+    with served.browser:
+        served.enter()
+        with served.socket() as socket:
+            greet(socket)
+            store.unsaved = "the disk is full"
+            socket.send_bytes(paint(1))
+            assert heard(socket)["reply"] == 1
+            told = heard(socket)
+            assert (told["kind"], told["text"], told["tone"]) == ("say", "the disk is full", "warn")
+            told = heard(socket)
+            assert (told["kind"], told["tone"]) == ("say", "info")
+    assert store.tries == 3
+    assert served.said == ["the disk is full", "all that was painted is kept again"]

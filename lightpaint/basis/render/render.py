@@ -71,17 +71,24 @@ def render_basis(
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
-        return start.asking(scene.asked)
+        return _with_first_hits(start.asking(scene.asked), scene, seed)
     method = _method(scene)
     if start is not None and start.origin.method != method:
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
     made = render_all(scene, budget, seed, start, Keeper(keep), progress)
-    if start is not None and start.features is not None and start.objects is not None:
-        return replace(made, features=start.features, objects=start.objects)
+    if start is not None:
+        made = replace(made, features=start.features, objects=start.objects)
+    return _with_first_hits(made, scene, seed)
+
+
+def _with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
+    """`basis`, which knows what is seen: one kept by an earlier version may not."""
+    if basis.features is not None and basis.objects is not None:
+        return basis
     features, objects = render_first_hits(scene, seed=seed)
-    return replace(made, features=features, objects=objects)
+    return replace(basis, features=features, objects=objects)
 
 
 def memory_needed(scene: Scene) -> int:

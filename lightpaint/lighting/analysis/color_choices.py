@@ -1,7 +1,8 @@
 """What each choice of `colors` would come to, beside the one that was made.
 
-The answer is known, so the others are found from it: where the loss is no linear problem, over a
-sample of its pixels that is tilted until it has the true gradient where the answer is.
+In linear light they have the answer's own equations. Where the loss is no linear problem all are
+found over a sample of its pixels, that of the answer too, so that what the sample gets wrong is in
+both, and cancels.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +29,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
 
 #: Pixels in a sample, or more, for each light; painted pixels that are looked at.
-SAMPLE, EACH, LOOKED_AT = 2**11, 2**6, 2**12
+SAMPLE, EACH, LOOKED_AT = 2**12, 2**6, 2**12
 
 #: Change of a light's picture in a round, beside the brightest light's, that ends the rounds.
 ENOUGH = 1e-3
@@ -49,7 +50,7 @@ class ColorChoice:
             picture shows it; "" where none does, and of the answer itself.
         before, color: What that light emits in the answer, or at present where it is off, and what
             it would emit, at luminance 1; its weights, where these are all there is.
-        weights: (n, 3), in the order of the basis.
+        weights: (n, 3), in the order of the basis, as a sample of the pixels has it.
 
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target, colors="gentle"))
@@ -85,11 +86,8 @@ def color_choices(solution: Solution, delta_e: Sequence[float]) -> tuple[Choices
     best = _finder(solution)
     found: dict[Colors, Doubles] = {}
     for colors in get_args(Colors):
-        if colors == problem.fit.colors:
-            found[colors] = solution.weights
-        else:
-            with suppress(ConstraintError):  # what else is asked of a light may be no white
-                found[colors] = best(_with_colors(problem, colors))
+        with suppress(ConstraintError):  # what else is asked of a light may be no white
+            found[colors] = best(_with_colors(problem, colors))
     return tuple(
         _seen_in(view, its, found) for view, its in zip(solution.views, delta_e, strict=True)
     )
@@ -109,15 +107,15 @@ def _finder(solution: Solution) -> Callable[[Problem], Doubles]:
     part = lit
     if np.count_nonzero(loss.importance) > size:
         part = sample(lit, np.einsum("cii->ic", solution.equations.M), size)
-    tilt = part.objective_and_gradient(at)[1] - solved.gradient(at)
 
     def best(problem: Problem) -> Doubles:
         def solve(equations: NormalEquations, begin: Doubles) -> Doubles:
             return solve_reduced(problem.pulled(equations), problem.reduction, begin).weights
 
-        asked = Asked(problem.pull, tilt, at)
-        start = squares(problem)
-        return rounds(part, asked, start, solve, from_clipping=False, until=ENOUGH).weights
+        led = rounds(
+            part, Asked(problem.pull), squares(problem), solve, from_clipping=False, until=ENOUGH
+        )
+        return led.weights
 
     return best
 
@@ -143,19 +141,18 @@ def _seen_in(view: Solution, delta_e: float, found: dict[Colors, Doubles]) -> Ch
     def missed(weights: Doubles) -> float:
         return look.mean(look.missed(np.einsum("npc,nc->pc", rows, weights)))
 
-    own, told = missed(view.weights), []
+    chosen, told = found[view.problem.fit.colors or "free"], []
+    own = missed(chosen)
     for colors, weights in found.items():
-        # Both by the same few pixels, so that they differ by what the lights do.
-        is_chosen = colors == view.problem.fit.colors
-        its = delta_e if is_chosen else max(delta_e + missed(weights) - own, 0.0)
-        turned = _recoloured(view, weights)
-        told.append(ColorChoice(colors, is_chosen, its, *turned, weights))
+        # Both by the same few pixels, so that they differ by what the colours do.
+        its = delta_e if weights is chosen else max(delta_e + missed(weights) - own, 0.0)
+        turned = _recoloured(view, chosen, weights)
+        told.append(ColorChoice(colors, weights is chosen, its, *turned, weights))
     return tuple(told)
 
 
-def _recoloured(view: Solution, weights: Doubles) -> tuple[str, RGB, RGB]:
+def _recoloured(view: Solution, hue: Doubles, weights: Doubles) -> tuple[str, RGB, RGB]:
     """The light whose change of hue changes the picture most, and its colours; "" for none."""
-    hue = view.weights
     # What was off would have its present hue, or be white.
     for other in (view.basis.present_weights, np.ones_like(hue)):
         hue = np.where(luminance(hue)[:, None] > 0, hue, other)

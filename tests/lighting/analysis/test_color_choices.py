@@ -54,7 +54,7 @@ def test_choices_are_what_solving_with_them_gives(make_basis: Any, colors: Color
 @pytest.mark.parametrize("colors", get_args(Colors))
 def test_on_a_display_a_sample_of_the_pixels_says_nearly_the_same(make_basis: Any, colors: Colors):
     """Its own rounds end at a change of `ENOUGH`, far below a ΔE of 0.1."""
-    size = (60, 80)
+    size = (100, 110)
     basis, target = _basis(make_basis, size=size), _target(size)
     assert size[0] * size[1] > 2 * module.SAMPLE
     found = _choices(solve(basis, target, colors=colors, space="display"))

@@ -4,7 +4,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -86,54 +86,22 @@ def served(site: Site, path: str) -> tuple[dict[str, str], bytes]:
     return {}, b""
 
 
-@pytest.fixture
-def page(browser: Any, site: Site) -> Iterator[Any]:
-    """An empty page of the site. What a test leaves on its console as an error fails it."""
+@pytest.fixture(scope="session")
+def tab(browser: Any) -> tuple[Any, list[str]]:
+    """One page for all tests, which start a process less; and what goes wrong on it."""
     opened = browser.new_page(viewport={"width": 800, "height": 600})
     wrong: list[str] = []
     opened.on("pageerror", lambda error: wrong.append(str(error)))
     opened.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
+    return opened, wrong
+
+
+@pytest.fixture
+def page(tab: Any, site: Site) -> Iterator[Any]:
+    """An empty page of the site. What a test leaves on its console as an error fails it."""
+    opened, wrong = tab
     opened.goto(f"{site.url}/empty.html")
     yield opened
-    opened.close()
     site.arrays.clear()
-    assert wrong == []
-
-
-#: As the server of the painter has it: nothing from elsewhere, nothing inline.
-CSP = (
-    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' "
-    "data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-
-FOLDERS = {"/page/": PAGE, "/fake/": HERE / "fake"}
-
-
-class _Files(SimpleHTTPRequestHandler):
-    """Files of the page and of what stands in for the rest of it."""
-
-    def translate_path(self, path: str) -> str:
-        plain = path.split("?")[0]
-        for prefix, folder in FOLDERS.items():
-            if plain.startswith(prefix):
-                return str(folder / plain.removeprefix(prefix))
-        return str(FOLDERS["/fake/"] / "index.html")
-
-    def end_headers(self) -> None:
-        self.send_header("Content-Security-Policy", CSP)
-        self.send_header("Cache-Control", "no-store")
-        super().end_headers()
-
-    def log_message(self, *_: Any) -> None:
-        """Say nothing."""
-
-
-@pytest.fixture(scope="session")
-def fake_page() -> Iterator[str]:
-    """Address of the interface over a session that is made up."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), _Files)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_port}/"
-    server.shutdown()
-    server.server_close()
+    left, wrong[:] = wrong[:], []
+    assert left == []

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 from lightpaint.colour.transform import ViewTransform
 
@@ -63,6 +64,13 @@ def lattice(name: str, side: int, low: float, high: float) -> np.ndarray:
     return ViewTransform(name).encode(axes).astype(np.float16)
 
 
+def interpolated(lut: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Codes by a lattice, as SciPy has them."""
+    axis = np.linspace(-14, 6, len(lut))
+    between = RegularGridInterpolator((axis, axis, axis), lut.astype(np.float64))
+    return np.round(255 * between(np.clip(np.log2(light), -14, 6)))
+
+
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 @pytest.mark.parametrize("stops", [0.0, -2.3])
 def test_both_pictures_are_shown_in_srgb(page: Any, pictures: Any, which: str, stops: float):
@@ -78,10 +86,14 @@ def test_view_transforms_are_those_of_the_library(
 ):
     lut = {"name": name, "side": 48, "low": -14.0, "high": 6.0}
     site.arrays["lut"] = lattice(name, 48, -14, 6)
-    left, right = shown(page, which, pictures, {"stops": 0.7}, lut)
-    # Between points of the lattice it is straight, and the curve is not: seen in NumPy.
-    assert np.abs(left - codes(pictures["painting"], name, 0.7)).max() <= CODES
-    assert np.abs(right - codes(mixed(pictures), name, 0.7)).max() <= CODES
+    for got, light in zip(
+        shown(page, which, pictures, {"stops": 0.7}, lut),
+        (pictures["painting"], mixed(pictures)),
+        strict=True,
+    ):
+        assert np.abs(got - interpolated(site.arrays["lut"], light * 2**0.7)).max() <= CODES
+        # Between its points a lattice is straight, which the transform is not.
+        assert np.abs(got - codes(light, name, 0.7)).mean() < 0.5
 
 
 @pytest.mark.parametrize("overlay", [None, "missed", "beyond", "importance", "falsecolor"])
@@ -90,7 +102,7 @@ def test_views_agree(page: Any, pictures: Any, overlay: str | None):
     one, other = (shown(page, which, pictures, params) for which in ("cpu", "gl"))
     off = np.abs(one - other).max(axis=-1)
     # On the border of two bands of false colour, or of too dark and too bright, they may differ.
-    assert (off <= 1).mean() > 0.999
+    assert (off <= 1).mean() > 0.99
     if overlay:
         plain = shown(page, "cpu", pictures, {"stops": 0.4})
         changed = [bool((one[k] != plain[k]).any()) for k in (0, 1)]
@@ -167,10 +179,11 @@ def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
             }
             const carried = view.mixes.solution.light.slice();
             bench.shown({});
-            return view.mixes.solution.light.map((x, i) => Math.abs(carried[i] - x) / (1e-3 + x));
+            const { light } = view.mixes.solution;
+            return Array.from(light, (x, i) => Math.abs(carried[i] - x) / (1e-3 + x));
         }"""
     )
-    assert max(differences.values()) < 1e-4  # 20 sums in float32
+    assert max(differences) < 1e-4  # 20 sums in float32
 
 
 def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
@@ -219,12 +232,11 @@ def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
     assert lost == [True, False, 0]
 
 
-def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any):
-    for which in ("cpu", "gl"):
-        shown(page, which, pictures)
-        planes = {"cpu": 6, "gl": 8}[which] * N * H * W
-        assert (
-            planes
-            <= page.evaluate("() => view.memory()") - 65536 * 4
-            <= planes + 60 * H * W + 2**21
-        )
+@pytest.mark.parametrize("which", ["cpu", "gl"])
+def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, which: str):
+    shown(page, which, pictures)
+    planes = {"cpu": 6, "gl": 8}[which] * N * H * W
+    rest = page.evaluate("() => view.memory()") - planes
+    rows = 8 * 2**18 if which == "gl" else 0  # on their way to the GPU
+    # Mix and two canvases of codes, or their textures; painting and codes; nothing by the light.
+    assert 0 < rest <= 40 * H * W + rows + 8 * (2 * W + GAP) * H

@@ -5,177 +5,178 @@
  * before and from how far it is covered. So a stroke can change as long as it lasts (a line, a
  * drag that asks), and be dropped. What was before is kept in tiles, where the stroke has been.
  */
-import { VALUES, toFloats } from './half.js'
-import { union } from './layer.js'
+import { changing } from "./effects.js";
+import { VALUES, toFloats } from "./half.js";
+import { union } from "./layer.js";
 
-/** @typedef {import('./protocol.js').Region} Region */
-/** @typedef {import('./protocol.js').RGB} RGB */
+/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./effects.js").Effect} Effect */
 
 /** How a pixel was before a stroke: (s, s, 3), (s, s), and how far the stroke covers it.
  * @typedef {{top: number, left: number, image: Float32Array, importance: Float32Array,
  *   coverage: Float32Array}} Tile */
 
-/**
- * What a stroke does. paint: the pixel becomes a colour, or light of that colour on its albedo.
- * erase: it is the present look again, and not painted. weigh: its importance becomes another
- * one. ask: its light is multiplied, its luminance times `gain` and its colour by `tint`.
- * @typedef {{kind: 'paint', rgb: RGB, as: 'light' | 'look'} | {kind: 'erase'} |
- *   {kind: 'weigh', importance: number} | {kind: 'ask', gain: number, tint: RGB}} Effect
- */
-
 /** Width and height of tiles. */
-const TILE = 64
+const TILE = 64;
 
 /** Importance below which a pixel is not painted. */
-const DUST = 1e-3
+const DUST = 1e-3;
 
 /** What halves can hold, so that both views can show it. */
-const MOST = 65504
+const MOST = 65504;
 
 export class PaintCanvas {
   /** @param {[height: number, width: number]} size @param {Uint16Array} present
    * (h, w, 3) halves: the present look */
   constructor([height, width], present) {
-    this.height = height
-    this.width = width
-    this.present = present
-    this.image = toFloats(present)
-    this.importance = new Float32Array(height * width)
+    this.height = height;
+    this.width = width;
+    this.present = present;
+    this.image = toFloats(present);
+    this.importance = new Float32Array(height * width);
     /** (h, w, 3) halves. @type {Uint16Array | null} */
-    this.albedo = null
+    this.albedo = null;
     /** Which object each pixel shows, -1 for none. @type {Int16Array | null} */
-    this.objects = null
+    this.objects = null;
     /** @type {Map<number, Tile> | null} */
-    this.tiles = null
+    this.tiles = null;
     /** Where the stroke has been. @type {Region | null} */
-    this.region = null
+    this.region = null;
   }
 
   /** @returns {Region} */
   get whole() {
-    return [0, this.height, 0, this.width]
+    return [0, this.height, 0, this.width];
   }
 
   /** A region of whole pixels within the picture.
    * @param {number} top @param {number} bottom @param {number} left @param {number} right
    * @returns {Region} */
   clipped(top, bottom, left, right) {
-    const [y0, x0] = [Math.max(0, Math.floor(top)), Math.max(0, Math.floor(left))]
-    const [y1, x1] = [Math.min(this.height, Math.ceil(bottom)), Math.min(this.width, Math.ceil(right))]
-    return [Math.min(y0, this.height), Math.max(y0, y1), Math.min(x0, this.width), Math.max(x0, x1)]
+    const [y0, x0] = [Math.max(0, Math.floor(top)), Math.max(0, Math.floor(left))];
+    const [y1, x1] = [
+      Math.min(this.height, Math.ceil(bottom)),
+      Math.min(this.width, Math.ceil(right)),
+    ];
+    return [
+      Math.min(y0, this.height),
+      Math.max(y0, y1),
+      Math.min(x0, this.width),
+      Math.max(x0, x1),
+    ];
   }
 
   begin() {
-    this.tiles = new Map()
-    this.region = null
+    this.tiles = new Map();
+    this.region = null;
   }
 
   /** Cover pixels with the stroke.
    * @param {Region} region @param {(x: number, y: number, before: number) => number} cover
    * how far a pixel is covered from now on */
   cover(region, cover) {
-    this.region = union(this.region, region)
+    this.region = union(this.region, region);
     this.each(region, true, (tile, q, p, x, y) => {
-      tile.coverage[q] = cover(x, y, tile.coverage[q])
-    })
+      tile.coverage[q] = cover(x, y, tile.coverage[q]);
+    });
   }
 
   /** Nothing is covered any more, and all as it was. @returns {Region | null} what has changed */
   uncover() {
-    const { region } = this
+    const { region } = this;
     if (region)
       this.each(region, false, (tile, q, p) => {
-        this.restore(tile, q, p)
-        tile.coverage[q] = 0
-      })
-    return region
+        this.restore(tile, q, p);
+        tile.coverage[q] = 0;
+      });
+    return region;
   }
 
   /** Make of the pixels what the stroke does to them.
    * @param {Region} region @param {Effect} effect */
   apply(region, effect) {
-    const change = changing(this, effect)
-    const { importance, image, present } = this
+    const change = changing(this, effect);
+    const { importance, image, present } = this;
     this.each(region, false, (tile, q, p) => {
-      const covered = tile.coverage[q]
-      if (covered <= 0) return
-      change(tile, q, p, covered)
-      if (importance[p] < DUST) importance[p] = 0
+      const covered = tile.coverage[q];
+      if (covered <= 0) return;
+      change(tile, q, p, covered);
+      if (importance[p] < DUST) importance[p] = 0;
       for (let i = 3 * p; i < 3 * p + 3; i++)
-        image[i] = importance[p] ? Math.min(MOST, Math.max(0, image[i])) : VALUES[present[i]]
-    })
+        image[i] = importance[p] ? Math.min(MOST, Math.max(0, image[i])) : VALUES[present[i]];
+    });
   }
 
   /** The stroke is done. @returns {Region | null} where it was */
   end() {
-    const { region } = this
-    this.tiles = null
-    this.region = null
-    return region
+    const { region } = this;
+    this.tiles = null;
+    this.region = null;
+    return region;
   }
 
   /** The stroke has never been. @returns {Region | null} where it was */
   drop() {
-    this.uncover()
-    return this.end()
+    this.uncover();
+    return this.end();
   }
 
   /** What the session says of a region. @param {Region} region @param {Float32Array} image
    * @param {Float32Array} importance */
   set([top, bottom, left, right], image, importance) {
-    const width = right - left
+    const width = right - left;
     for (let y = top, from = 0; y < bottom; y++, from += width) {
-      const to = y * this.width + left
-      this.image.set(image.subarray(3 * from, 3 * (from + width)), 3 * to)
-      this.importance.set(importance.subarray(from, from + width), to)
+      const to = y * this.width + left;
+      this.image.set(image.subarray(3 * from, 3 * (from + width)), 3 * to);
+      this.importance.set(importance.subarray(from, from + width), to);
     }
     if (this.tiles)
       this.each([top, bottom, left, right], false, (tile, q, p) => {
-        this.keep(tile, q, p)
-        tile.coverage[q] = 0
-      })
+        this.keep(tile, q, p);
+        tile.coverage[q] = 0;
+      });
   }
 
   /** Another present look, of a better basis: it is what shows where nothing is painted.
    * @param {Uint16Array} present */
   setPresent(present) {
-    this.present = present
+    this.present = present;
     for (let p = 0; p < this.importance.length; p++)
       if (!this.importance[p])
-        for (let i = 3 * p; i < 3 * p + 3; i++) this.image[i] = VALUES[present[i]]
-    for (const tile of this.tiles?.values() ?? []) this.follow(tile)
+        for (let i = 3 * p; i < 3 * p + 3; i++) this.image[i] = VALUES[present[i]];
+    for (const tile of this.tiles?.values() ?? []) this.follow(tile);
   }
 
   /** @param {Tile} tile */
   follow(tile) {
-    const region = this.clipped(tile.top, tile.top + TILE, tile.left, tile.left + TILE)
+    const region = this.clipped(tile.top, tile.top + TILE, tile.left, tile.left + TILE);
     this.each(region, false, (_, q, p) => {
       if (!tile.importance[q])
-        for (let c = 0; c < 3; c++) tile.image[3 * q + c] = VALUES[this.present[3 * p + c]]
-    })
+        for (let c = 0; c < 3; c++) tile.image[3 * q + c] = VALUES[this.present[3 * p + c]];
+    });
   }
 
   /** A copy of a region, as messages have it. @param {Region} region */
   copy([top, bottom, left, right]) {
-    const [height, width] = [bottom - top, right - left]
-    const image = new Float32Array(3 * height * width)
-    const importance = new Float32Array(height * width)
+    const [height, width] = [bottom - top, right - left];
+    const image = new Float32Array(3 * height * width);
+    const importance = new Float32Array(height * width);
     for (let y = top, to = 0; y < bottom; y++, to += width) {
-      const from = y * this.width + left
-      image.set(this.image.subarray(3 * from, 3 * (from + width)), 3 * to)
-      importance.set(this.importance.subarray(from, from + width), to)
+      const from = y * this.width + left;
+      image.set(this.image.subarray(3 * from, 3 * (from + width)), 3 * to);
+      importance.set(this.importance.subarray(from, from + width), to);
     }
     return {
       image: { data: image, shape: [height, width, 3] },
       importance: { data: importance, shape: [height, width] },
-    }
+    };
   }
 
   /** Object that a pixel shows; -1 for none. @param {number} x @param {number} y */
   objectAt(x, y) {
-    const [column, row] = [Math.floor(x), Math.floor(y)]
-    const isIn = column >= 0 && row >= 0 && column < this.width && row < this.height
-    return isIn && this.objects ? this.objects[row * this.width + column] : -1
+    const [column, row] = [Math.floor(x), Math.floor(y)];
+    const isIn = column >= 0 && row >= 0 && column < this.width && row < this.height;
+    return isIn && this.objects ? this.objects[row * this.width + column] : -1;
   }
 
   /** Visit pixels of a region, by the tile of the stroke that they lie in. isNew: whether tiles
@@ -184,19 +185,19 @@ export class PaintCanvas {
    * @param {(tile: Tile, q: number, p: number, x: number, y: number) => void} visit q: place in
    * the tile, p: in the picture */
   each([top, bottom, left, right], isNew, visit) {
-    const { tiles } = this
-    if (!tiles) return
-    const across = Math.ceil(this.width / TILE)
+    const { tiles } = this;
+    if (!tiles) return;
+    const across = Math.ceil(this.width / TILE);
     for (let row = Math.floor(top / TILE); row * TILE < bottom; row++)
       for (let column = Math.floor(left / TILE); column * TILE < right; column++) {
-        const key = row * across + column
-        const tile = tiles.get(key) ?? (isNew ? this.tile(row * TILE, column * TILE) : null)
-        if (!tile) continue
-        tiles.set(key, tile)
-        const [y1, x1] = [Math.min(bottom, tile.top + TILE), Math.min(right, tile.left + TILE)]
+        const key = row * across + column;
+        const tile = tiles.get(key) ?? (isNew ? this.tile(row * TILE, column * TILE) : null);
+        if (!tile) continue;
+        tiles.set(key, tile);
+        const [y1, x1] = [Math.min(bottom, tile.top + TILE), Math.min(right, tile.left + TILE)];
         for (let y = Math.max(top, tile.top); y < y1; y++)
           for (let x = Math.max(left, tile.left); x < x1; x++)
-            visit(tile, (y - tile.top) * TILE + x - tile.left, y * this.width + x, x, y)
+            visit(tile, (y - tile.top) * TILE + x - tile.left, y * this.width + x, x, y);
       }
   }
 
@@ -208,74 +209,23 @@ export class PaintCanvas {
       image: new Float32Array(3 * TILE * TILE),
       importance: new Float32Array(TILE * TILE),
       coverage: new Float32Array(TILE * TILE),
-    }
-    const [y1, x1] = [Math.min(this.height, top + TILE), Math.min(this.width, left + TILE)]
+    };
+    const [y1, x1] = [Math.min(this.height, top + TILE), Math.min(this.width, left + TILE)];
     for (let y = top; y < y1; y++)
       for (let x = left; x < x1; x++)
-        this.keep(tile, (y - top) * TILE + x - left, y * this.width + x)
-    return tile
+        this.keep(tile, (y - top) * TILE + x - left, y * this.width + x);
+    return tile;
   }
 
   /** @param {Tile} tile @param {number} q @param {number} p */
   keep(tile, q, p) {
-    for (let c = 0; c < 3; c++) tile.image[3 * q + c] = this.image[3 * p + c]
-    tile.importance[q] = this.importance[p]
+    for (let c = 0; c < 3; c++) tile.image[3 * q + c] = this.image[3 * p + c];
+    tile.importance[q] = this.importance[p];
   }
 
   /** @param {Tile} tile @param {number} q @param {number} p */
   restore(tile, q, p) {
-    for (let c = 0; c < 3; c++) this.image[3 * p + c] = tile.image[3 * q + c]
-    this.importance[p] = tile.importance[q]
-  }
-}
-
-/** What a stroke does to one pixel. @param {PaintCanvas} canvas @param {Effect} effect
- * @returns {(tile: Tile, q: number, p: number, covered: number) => void} */
-function changing(canvas, effect) {
-  const { image, importance, present, albedo } = canvas
-  /** @type {(tile: Tile, q: number, p: number, covered: number, to: (c: number) => number) => void} */
-  const towards = (tile, q, p, covered, to) => {
-    for (let c = 0; c < 3; c++) {
-      const before = tile.image[3 * q + c]
-      image[3 * p + c] = before + covered * (to(c) - before)
-    }
-  }
-  /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
-  const count = (tile, q, p, covered) => {
-    const before = tile.importance[q]
-    importance[p] = before < 1 ? before + covered * (1 - before) : before
-  }
-  switch (effect.kind) {
-    case 'paint': {
-      const { rgb } = effect
-      const on = effect.as === 'light' ? albedo : null
-      return (tile, q, p, covered) => {
-        towards(tile, q, p, covered, (c) => (on ? VALUES[on[3 * p + c]] * rgb[c] : rgb[c]))
-        count(tile, q, p, covered)
-      }
-    }
-    case 'erase':
-      return (tile, q, p, covered) => {
-        towards(tile, q, p, covered, (c) => VALUES[present[3 * p + c]])
-        importance[p] = tile.importance[q] * (1 - covered)
-      }
-    case 'weigh':
-      return (tile, q, p, covered) => {
-        towards(tile, q, p, 0, () => 0)
-        const before = tile.importance[q]
-        importance[p] = before + covered * (effect.importance - before)
-      }
-    case 'ask': {
-      const { gain, tint } = effect
-      return (tile, q, p, covered) => {
-        const [r, g, b] = [tile.image[3 * q], tile.image[3 * q + 1], tile.image[3 * q + 2]]
-        const before = 0.2126 * r + 0.7152 * g + 0.0722 * b
-        const after = 0.2126 * r * tint[0] + 0.7152 * g * tint[1] + 0.0722 * b * tint[2]
-        // Its luminance is what the gain makes of it, whatever its colour was.
-        const level = after > 0 ? (gain * before) / after : gain
-        towards(tile, q, p, covered, (c) => tile.image[3 * q + c] * tint[c] * level)
-        count(tile, q, p, covered)
-      }
-    }
+    for (let c = 0; c < 3; c++) this.image[3 * p + c] = tile.image[3 * q + c];
+    this.importance[p] = tile.importance[q];
   }
 }

@@ -4,14 +4,14 @@
  * WebGL2 on a GPU takes a millisecond. Without one a browser may still have WebGL2, in software,
  * and slower than plain JavaScript; or none. So a frame of black planes is timed.
  */
-import { CpuView } from './cpu.js'
-import { GlView } from './gl.js'
-import { DEFAULTS } from './view.js'
+import { CpuView } from "./cpu.js";
+import { GlView } from "./gl.js";
+import { DEFAULTS } from "./view.js";
 
-/** @typedef {import('./view.js').PictureView} PictureView */
+/** @typedef {import("./view.js").PictureView} PictureView */
 
 /** Milliseconds of a frame that need no comparison. */
-const QUICK = 12
+const QUICK = 12;
 
 /**
  * A view in an element, on a canvas of its own.
@@ -22,56 +22,57 @@ const QUICK = 12
  * @returns {PictureView}
  */
 export function chooseView(element, size, count, options = {}) {
-  const gl = options.view === 'cpu' ? null : glView(size, count, options)
-  const isGl = gl && (options.view === 'gl' || frameTime(gl, count) <= Math.max(QUICK, cpuTime(size, count)))
-  if (gl && !isGl) gl.close()
-  if (options.view === 'gl' && !gl) throw new Error('no WebGL2 that can show the planes')
-  const view = gl && isGl ? gl : new CpuView(canvasOf(), size)
-  view.setCount(count)
-  element.append(view.canvas)
-  return view
+  const gl = options.view === "cpu" ? null : glView(size, count, options);
+  const isGl =
+    gl && (options.view === "gl" || frameTime(gl, count) <= Math.max(QUICK, cpuTime(size, count)));
+  if (gl && !isGl) gl.close();
+  if (options.view === "gl" && !gl) throw new Error("no WebGL2 that can show the planes");
+  const view = gl && isGl ? gl : new CpuView(canvasOf(), size);
+  view.setCount(count);
+  element.append(view.canvas);
+  return view;
 }
 
 function canvasOf() {
-  const canvas = document.createElement('canvas')
-  canvas.className = 'lightpaint-pictures'
-  return canvas
+  const canvas = document.createElement("canvas");
+  canvas.className = "lightpaint-pictures";
+  return canvas;
 }
 
 /** @param {[number, number]} size @param {number} count
  * @param {{view?: 'gl' | 'cpu' | null, onRestored?: () => void}} options */
 function glView(size, count, { view, onRestored }) {
   try {
-    const made = new GlView(canvasOf(), size, { isSlowRefused: view !== 'gl', onRestored })
-    made.setCount(count)
-    return made
+    const made = new GlView(canvasOf(), size, { isSlowRefused: view !== "gl", onRestored });
+    made.setCount(count);
+    return made;
   } catch {
-    return null
+    return null;
   }
 }
 
 /** Milliseconds of the second frame; the first one compiles.
  * @param {PictureView} view @param {number} count */
 function frameTime(view, count) {
-  ;[view.canvas.width, view.canvas.height] = [640, 360]
-  let time = Infinity
+  [view.canvas.width, view.canvas.height] = [640, 360];
+  let time = Infinity;
   for (let frame = 0; frame < 3; frame++) {
-    const start = performance.now()
-    view.setWeights(new Float64Array(3 * count).fill(1 + frame))
-    view.draw({ ...DEFAULTS, layout: 'blink', blink: 'right' })
-    view.read(0, 0, 1, 1) // Only then is it done.
-    time = performance.now() - start
+    const start = performance.now();
+    view.setWeights(new Float64Array(3 * count).fill(1 + frame));
+    view.draw({ ...DEFAULTS, layout: "blink", blink: "right" });
+    view.read(0, 0, 1, 1); // Only then is it done.
+    time = performance.now() - start;
   }
-  return time
+  return time;
 }
 
 /** What a frame without a GPU takes, from one of a few rows.
  * @param {[number, number]} size @param {number} count */
 function cpuTime([height, width], count) {
-  const rows = Math.min(height, 64)
-  const view = new CpuView(canvasOf(), [rows, width])
-  view.setCount(count)
-  const black = new Uint16Array(rows * width * 3)
-  for (let k = 0; k < count; k++) view.setPlane(k, black, 1)
-  return (frameTime(view, count) * height) / rows
+  const rows = Math.min(height, 64);
+  const view = new CpuView(canvasOf(), [rows, width]);
+  view.setCount(count);
+  const black = new Uint16Array(rows * width * 3);
+  for (let k = 0; k < count; k++) view.setPlane(k, black, 1);
+  return (frameTime(view, count) * height) / rows;
 }

@@ -4,108 +4,108 @@
  * Kelvin is a place on Planck's locus; green is the distance from it in CIE 1960 (u, v), times
  * 1000, positive towards green (1000 Duv).
  */
-import { decodeSrgb, encodeSrgb } from './lut.js'
+import { decodeSrgb, encodeSrgb } from "./lut.js";
 
-/** @typedef {import('./protocol.js').RGB} RGB */
+/** @typedef {import("./protocol.js").RGB} RGB */
 
-export { decodeSrgb as decode, encodeSrgb as encode }
+export { decodeSrgb as decode, encodeSrgb as encode };
 
 /** Temperatures for which the locus below is good, in kelvin. */
-export const KELVIN = { low: 1000, high: 15000 }
+export const KELVIN = { low: 1000, high: 15000 };
 
 /** Temperature that is neither warmer nor cooler, for gains of light. */
-const NEUTRAL_MIRED = 200
+const NEUTRAL_MIRED = 200;
 
 /** Relative luminance (ITU-R BT.709-6, item 3.2). @param {ArrayLike<number>} rgb linear */
 export function luminance(rgb) {
-  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
 /** Display colour; what is brighter than 1 is scaled down. @param {ArrayLike<number>} rgb linear */
 export function toHex(rgb) {
-  const most = Math.max(1, rgb[0], rgb[1], rgb[2])
-  const codes = [0, 1, 2].map((c) => Math.round(255 * encodeSrgb(rgb[c] / most)))
-  return `#${codes.map((code) => code.toString(16).padStart(2, '0')).join('')}`
+  const most = Math.max(1, rgb[0], rgb[1], rgb[2]);
+  const codes = [0, 1, 2].map((c) => Math.round(255 * encodeSrgb(rgb[c] / most)));
+  return `#${codes.map((code) => code.toString(16).padStart(2, "0")).join("")}`;
 }
 
 /** Linear light of `#ffaa66` or `#fa6`; null for what is no colour.
  * @param {string} text @returns {RGB | null} */
 export function ofHex(text) {
-  const found = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim())
-  if (!found) return null
-  const digits = found[1].length === 6 ? found[1] : found[1].replace(/./g, '$&$&')
-  return three((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255))
+  const found = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim());
+  if (!found) return null;
+  const digits = found[1].length === 6 ? found[1] : found[1].replace(/./g, "$&$&");
+  return three((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255));
 }
 
 /** Hue in degrees, saturation and value in [0, 1] of the display colour.
  * @param {ArrayLike<number>} rgb linear @returns {RGB} */
 export function toHsv(rgb) {
-  const [r, g, b] = three((c) => encodeSrgb(rgb[c]))
-  const most = Math.max(r, g, b)
-  const range = most - Math.min(r, g, b)
-  if (range < 1e-9) return [0, 0, most]
+  const [r, g, b] = three((c) => encodeSrgb(rgb[c]));
+  const most = Math.max(r, g, b);
+  const range = most - Math.min(r, g, b);
+  if (range < 1e-9) return [0, 0, most];
   const sixths =
-    most === r ? (g - b) / range : most === g ? 2 + (b - r) / range : 4 + (r - g) / range
-  return [(60 * sixths + 360) % 360, range / most, most]
+    most === r ? (g - b) / range : most === g ? 2 + (b - r) / range : 4 + (r - g) / range;
+  return [(60 * sixths + 360) % 360, range / most, most];
 }
 
 /** Linear light of hue, saturation and value. @param {RGB} hsv @returns {RGB} */
 export function ofHsv([hue, saturation, value]) {
   return three((c) => {
-    const k = ([5, 3, 1][c] + hue / 60) % 6
-    return decodeSrgb(value * (1 - saturation * Math.max(0, Math.min(k, 4 - k, 1))))
-  })
+    const k = ([5, 3, 1][c] + hue / 60) % 6;
+    return decodeSrgb(value * (1 - saturation * Math.max(0, Math.min(k, 4 - k, 1))));
+  });
 }
 
 /** Linear light of a temperature, its largest channel 1 and none below 0.
  * @param {number} kelvin @param {number} [green] @returns {RGB} */
 export function ofKelvin(kelvin, green = 0) {
-  const { at, along } = locus(kelvin)
-  const normal = towardsGreen(along)
-  const [u, v] = [0, 1].map((i) => at[i] + (green / 1000) * normal[i])
-  const [X, Z] = [(3 * u) / (2 * v), (4 - u - 10 * v) / (2 * v)]
-  const rgb = three((c) => Math.max(0, FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z))
-  const most = Math.max(...rgb)
-  return three((c) => rgb[c] / most)
+  const { at, along } = locus(kelvin);
+  const normal = towardsGreen(along);
+  const [u, v] = [0, 1].map((i) => at[i] + (green / 1000) * normal[i]);
+  const [X, Z] = [(3 * u) / (2 * v), (4 - u - 10 * v) / (2 * v)];
+  const rgb = three((c) => Math.max(0, FROM_XYZ[c][0] * X + FROM_XYZ[c][1] + FROM_XYZ[c][2] * Z));
+  const most = Math.max(...rgb);
+  return three((c) => rgb[c] / most);
 }
 
 /** Correlated temperature (Ohno 2013) and green of a colour; null for black, for what is further
  * than 0.05 from the locus, and beyond its ends.
  * @param {ArrayLike<number>} rgb linear @returns {{kelvin: number, green: number} | null} */
 export function toKelvin(rgb) {
-  const [X, Y, Z] = three((c) => TO_XYZ[c].reduce((sum, part, i) => sum + part * rgb[i], 0))
-  const sum = X + 15 * Y + 3 * Z
-  if (!(sum > 0)) return null
-  const [u, v] = [(4 * X) / sum, (6 * Y) / sum]
+  const [X, Y, Z] = three((c) => TO_XYZ[c].reduce((sum, part, i) => sum + part * rgb[i], 0));
+  const sum = X + 15 * Y + 3 * Z;
+  if (!(sum > 0)) return null;
+  const [u, v] = [(4 * X) / sum, (6 * Y) / sum];
   /** @param {number} mired */
   const far = (mired) => {
-    const { at } = locus(1e6 / mired)
-    return Math.hypot(u - at[0], v - at[1])
-  }
-  let [low, high] = [1e6 / KELVIN.high, 1e6 / KELVIN.low]
+    const { at } = locus(1e6 / mired);
+    return Math.hypot(u - at[0], v - at[1]);
+  };
+  let [low, high] = [1e6 / KELVIN.high, 1e6 / KELVIN.low];
   for (let round = 0; round < 60; round++) {
-    const third = (high - low) / 3
-    if (far(low + third) < far(high - third)) high -= third
-    else low += third
+    const third = (high - low) / 3;
+    if (far(low + third) < far(high - third)) high -= third;
+    else low += third;
   }
-  const mired = (low + high) / 2
-  const isEnd = mired < 1e6 / KELVIN.high + 0.01 || mired > 1e6 / KELVIN.low - 0.01
-  if (far(mired) > 0.05 || (isEnd && far(mired) > 0.002)) return null
-  const { at, along } = locus(1e6 / mired)
-  const normal = towardsGreen(along)
-  const green = 1000 * ((u - at[0]) * normal[0] + (v - at[1]) * normal[1])
-  return { kelvin: 1e6 / mired, green }
+  const mired = (low + high) / 2;
+  const isEnd = mired < 1e6 / KELVIN.high + 0.01 || mired > 1e6 / KELVIN.low - 0.01;
+  if (far(mired) > 0.05 || (isEnd && far(mired) > 0.002)) return null;
+  const { at, along } = locus(1e6 / mired);
+  const normal = towardsGreen(along);
+  const green = 1000 * ((u - at[0]) * normal[0] + (v - at[1]) * normal[1]);
+  return { kelvin: 1e6 / mired, green };
 }
 
 /** What light is multiplied with to be warmer by some mireds (cooler: below 0), along Planck's
  * locus and about 5000 K; luminance 1. @param {number} mired @returns {RGB} */
 export function warmer(mired) {
-  const least = 1e6 / KELVIN.high - NEUTRAL_MIRED
-  const most = 500 - NEUTRAL_MIRED // Below 2000 K hardly any blue is left.
-  const to = ofKelvin(1e6 / (NEUTRAL_MIRED + Math.min(most, Math.max(least, mired))))
-  const from = ofKelvin(1e6 / NEUTRAL_MIRED)
-  const gains = three((c) => to[c] / from[c])
-  return three((c) => gains[c] / luminance(gains))
+  const least = 1e6 / KELVIN.high - NEUTRAL_MIRED;
+  const most = 500 - NEUTRAL_MIRED; // Below 2000 K hardly any blue is left.
+  const to = ofKelvin(1e6 / (NEUTRAL_MIRED + Math.min(most, Math.max(least, mired))));
+  const from = ofKelvin(1e6 / NEUTRAL_MIRED);
+  const gains = three((c) => to[c] / from[c]);
+  return three((c) => gains[c] / luminance(gains));
 }
 
 /** CIE XYZ of linear Rec.709 and back (IEC 61966-2-1's primaries and white). */
@@ -113,12 +113,12 @@ const TO_XYZ = [
   [0.4123908, 0.35758434, 0.18048079],
   [0.21263901, 0.71516868, 0.07219232],
   [0.01933082, 0.11919478, 0.95053215],
-]
+];
 const FROM_XYZ = [
   [3.24096994, -1.53738318, -0.49861076],
   [-0.96924364, 1.8759675, 0.04155506],
   [0.05563008, -0.20397696, 1.05697151],
-]
+];
 
 /**
  * Planck's locus in CIE 1960 (u, v), and its direction towards lower temperatures: the rational
@@ -127,26 +127,26 @@ const FROM_XYZ = [
  * @param {number} kelvin @returns {{at: [number, number], along: [number, number]}}
  */
 function locus(kelvin) {
-  const t = kelvin
-  const a = 0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t * t
-  const b = 1 + 8.42420235e-4 * t + 7.08145163e-7 * t * t
-  const c = 0.317398726 + 4.22806245e-5 * t + 4.20481691e-8 * t * t
-  const d = 1 - 2.89741816e-5 * t + 1.61456053e-7 * t * t
-  const [da, db] = [1.54118254e-4 + 2 * 1.28641212e-7 * t, 8.42420235e-4 + 2 * 7.08145163e-7 * t]
-  const [dc, dd] = [4.22806245e-5 + 2 * 4.20481691e-8 * t, 2 * 1.61456053e-7 * t - 2.89741816e-5]
+  const t = kelvin;
+  const a = 0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t * t;
+  const b = 1 + 8.42420235e-4 * t + 7.08145163e-7 * t * t;
+  const c = 0.317398726 + 4.22806245e-5 * t + 4.20481691e-8 * t * t;
+  const d = 1 - 2.89741816e-5 * t + 1.61456053e-7 * t * t;
+  const [da, db] = [1.54118254e-4 + 2 * 1.28641212e-7 * t, 8.42420235e-4 + 2 * 7.08145163e-7 * t];
+  const [dc, dd] = [4.22806245e-5 + 2 * 4.20481691e-8 * t, 2 * 1.61456053e-7 * t - 2.89741816e-5];
   return {
     at: [a / b, c / d],
     along: [-(da * b - a * db) / b ** 2, -(dc * d - c * dd) / d ** 2],
-  }
+  };
 }
 
 /** Unit vector at a right angle to the locus. @param {[number, number]} along */
 function towardsGreen([u, v]) {
-  const length = Math.hypot(u, v)
-  return [-v / length, u / length]
+  const length = Math.hypot(u, v);
+  return [-v / length, u / length];
 }
 
 /** @param {(channel: number) => number} value @returns {RGB} */
 function three(value) {
-  return [value(0), value(1), value(2)]
+  return [value(0), value(1), value(2)];
 }

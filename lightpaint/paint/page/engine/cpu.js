@@ -5,215 +5,217 @@
  * frame takes longer than the budget, every second row and column is mixed while the brush is
  * down, and all of them when it rests.
  */
-import { VALUES, finite, toFloats } from './half.js'
-import { Layer } from './layer.js'
-import { SRGB } from './lut.js'
-import { Mix } from './mix.js'
-import { INKS, falseColour, inked, missed } from './overlay.js'
-import { GROUND, SQUARES, panes } from './view.js'
+import { VALUES, finite, toFloats } from "./half.js";
+import { Layer } from "./layer.js";
+import { SRGB } from "./lut.js";
+import { Mix } from "./mix.js";
+import { INKS, falseColour, inked, missed } from "./overlay.js";
+import { GROUND, SQUARES, panes } from "./view.js";
 
-/** @typedef {import('./view.js').Kind} Kind */
-/** @typedef {import('./view.js').Params} Params */
-/** @typedef {import('./view.js').Region} Region */
+/** @typedef {import("./view.js").Kind} Kind */
+/** @typedef {import("./view.js").Params} Params */
+/** @typedef {import("./view.js").Region} Region */
 
 /** Milliseconds of a live frame above which it is mixed at half its size. */
-export const BUDGET = 28
+export const BUDGET = 28;
 
-/** @implements {PictureView} @typedef {import('./view.js').PictureView} PictureView */
+/** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class CpuView {
   /** @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size */
   constructor(canvas, size) {
-    this.name = /** @type {const} */ ('cpu')
-    this.canvas = canvas
-    this.size = size
-    const context = canvas.getContext('2d', { alpha: false })
-    if (!context) throw new Error('no canvas to draw on')
-    this.context = context
-    /** @type {import('./mix.js').Plane[]} */
-    this.planes = []
-    this.mixes = { solution: new Mix(size), other: new Mix(size) }
+    this.name = /** @type {const} */ ("cpu");
+    this.canvas = canvas;
+    this.size = size;
+    const context = canvas.getContext("2d", { alpha: false });
+    if (!context) throw new Error("no canvas to draw on");
+    this.context = context;
+    /** @type {import("./mix.js").Plane[]} */
+    this.planes = [];
+    this.mixes = { solution: new Mix(size), other: new Mix(size) };
     /** @type {Map<string, Layer>} */
-    this.layers = new Map()
-    /** @type {import('./lut.js').Lut} */
-    this.lut = SRGB
+    this.layers = new Map();
+    /** @type {import("./lut.js").Lut} */
+    this.lut = SRGB;
     /** @type {Float32Array} */
-    this.importance = new Float32Array(0)
+    this.importance = new Float32Array(0);
     /** @type {Uint8Array | null} */
-    this.beyond = null
+    this.beyond = null;
     /** Milliseconds of a whole mix, as the last one says. */
-    this.pace = 0
-    this.step = 1
-    this.wasLive = false
+    this.pace = 0;
+    this.step = 1;
+    this.wasLive = false;
   }
 
   /** @param {number} count */
   setCount(count) {
-    this.planes = Array.from({ length: count }, () => ({ halves: null, scale: 1 }))
+    this.planes = Array.from({ length: count }, () => ({ halves: null, scale: 1 }));
     for (const mix of Object.values(this.mixes)) {
-      mix.weights = new Float64Array(3 * count)
-      mix.forget()
+      mix.weights = new Float64Array(3 * count);
+      mix.forget();
     }
   }
 
   /** @param {number} light @param {Uint16Array} halves @param {number} scale */
   setPlane(light, halves, scale) {
     if (halves.length !== this.size[0] * this.size[1] * 3)
-      throw new Error(`a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`)
-    this.planes[light] = { halves: finite(halves), scale }
-    for (const mix of Object.values(this.mixes)) mix.forget()
+      throw new Error(
+        `a plane of ${halves.length} numbers on a picture of ${this.size.join(" × ")}`,
+      );
+    this.planes[light] = { halves: finite(halves), scale };
+    for (const mix of Object.values(this.mixes)) mix.forget();
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
-  setWeights(weights, kind = 'solution') {
-    this.mixes[kind].weights = Float64Array.from(weights)
+  setWeights(weights, kind = "solution") {
+    this.mixes[kind].weights = Float64Array.from(weights);
   }
 
   /** @param {Region} region @param {Float32Array} image @param {Float32Array} importance */
   setCanvas(region, image, importance) {
-    this.importance = importance
-    this.layer('painting').setLight(image, region)
+    this.importance = importance;
+    this.layer("painting").setLight(image, region);
   }
 
   /** @param {'verified' | 'present'} kind @param {Uint16Array | null} halves */
   setPicture(kind, halves) {
-    if (halves) this.layer(kind).setLight(toFloats(halves))
-    else this.layers.delete(kind)
+    if (halves) this.layer(kind).setLight(toFloats(halves));
+    else this.layers.delete(kind);
   }
 
   /** @param {Uint8Array | null} beyond */
   setBeyond(beyond) {
-    this.beyond = beyond
-    for (const layer of this.layers.values()) layer.forget()
+    this.beyond = beyond;
+    for (const layer of this.layers.values()) layer.forget();
   }
 
-  /** @param {import('./lut.js').Lut} lut */
+  /** @param {import("./lut.js").Lut} lut */
   setLut(lut) {
-    this.lut = lut
+    this.lut = lut;
   }
 
   /** @param {Params} params */
   draw(params) {
-    const { context, canvas } = this
-    if (!params.live) this.step = 1
-    else if (!this.wasLive) this.step = this.pace > BUDGET ? 2 : 1
-    this.wasLive = params.live
-    context.fillStyle = `rgb(${GROUND.join(' ')})`
-    context.fillRect(0, 0, canvas.width, canvas.height)
+    const { context, canvas } = this;
+    if (!params.live) this.step = 1;
+    else if (!this.wasLive) this.step = this.pace > BUDGET ? 2 : 1;
+    this.wasLive = params.live;
+    context.fillStyle = `rgb(${GROUND.join(" ")})`;
+    context.fillRect(0, 0, canvas.width, canvas.height);
     for (const pane of panes(params, canvas, this.size)) {
-      const layer = this.shown(pane.kind, params)
-      if (!layer) continue
-      context.save()
-      context.beginPath()
-      context.rect(pane.x, pane.y, pane.width, pane.height)
-      context.clip()
-      const isSharp = layer.step === 1
-      context.imageSmoothingEnabled = !(isSharp && (pane.scale >= SQUARES || pane.scale === 1))
-      context.imageSmoothingQuality = pane.scale < 0.75 && !params.live ? 'medium' : 'low'
-      const scale = pane.scale * layer.step
-      const [height, width] = [layer.height * scale, layer.width * scale]
-      context.drawImage(layer.canvas, pane.left, pane.top, width, height)
-      context.restore()
+      const layer = this.shown(pane.kind, params);
+      if (!layer) continue;
+      context.save();
+      context.beginPath();
+      context.rect(pane.x, pane.y, pane.width, pane.height);
+      context.clip();
+      const isSharp = layer.step === 1;
+      context.imageSmoothingEnabled = !(isSharp && (pane.scale >= SQUARES || pane.scale === 1));
+      context.imageSmoothingQuality = pane.scale < 0.75 && !params.live ? "medium" : "low";
+      const scale = pane.scale * layer.step;
+      const [height, width] = [layer.height * scale, layer.width * scale];
+      context.drawImage(layer.canvas, pane.left, pane.top, width, height);
+      context.restore();
     }
   }
 
   /** The picture of a kind with its codes up to date; null where there is none.
    * @param {Kind} kind @param {Params} params @returns {Layer | null} */
   shown(kind, params) {
-    if (kind === 'solution' || kind === 'other') return this.mixed(kind, params)
-    const layer = this.layers.get(kind)
-    if (!layer) return null
-    const isImportance = kind === 'painting' && params.overlay === 'importance'
-    if (isImportance && layer.stale) layer.forget()
-    layer.show(this.lut, params.stops, isImportance ? 'importance' : falseOnly(params), (rgba) => {
-      if (isImportance) inked(rgba, this.importance, 1, INKS.importance, this.grid(1))
-      else falseColour(rgba, layer.light, 2 ** params.stops)
-    })
-    return layer
+    if (kind === "solution" || kind === "other") return this.mixed(kind, params);
+    const layer = this.layers.get(kind);
+    if (!layer) return null;
+    const isImportance = kind === "painting" && params.overlay === "importance";
+    if (isImportance && layer.stale) layer.forget();
+    layer.show(this.lut, params.stops, isImportance ? "importance" : falseOnly(params), (rgba) => {
+      if (isImportance) inked(rgba, this.importance, 1, INKS.importance, this.grid(1));
+      else falseColour(rgba, layer.light, 2 ** params.stops);
+    });
+    return layer;
   }
 
   /** @param {'solution' | 'other'} kind @param {Params} params */
   mixed(kind, params) {
-    const mix = this.mixes[kind]
-    const started = performance.now()
-    const isOther = mix.update(this.planes, this.step, params.live)
-    const layer = this.layer(kind, this.step)
-    if (isOther) layer.setLight(mix.light)
-    const wants = kind === 'solution' ? params.overlay : falseOnly(params)
+    const mix = this.mixes[kind];
+    const started = performance.now();
+    const isOther = mix.update(this.planes, this.step, params.live);
+    const layer = this.layer(kind, this.step);
+    if (isOther) layer.setLight(mix.light);
+    const wants = kind === "solution" ? params.overlay : falseOnly(params);
     // What is missed depends on the painting, too.
-    if (wants === 'missed') layer.forget()
-    const painting = wants === 'missed' ? this.codesOfPainting(params) : null
-    const { beyond } = this
-    layer.show(this.lut, params.stops, wants === 'importance' ? null : wants, (rgba) => {
-      const grid = this.grid(this.step)
-      if (wants === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops)
-      else if (wants === 'beyond' && beyond) inked(rgba, beyond, 255, INKS.beyond, grid)
-      else if (painting) missed(rgba, painting, this.importance, grid)
-    })
-    if (isOther) this.pace = (performance.now() - started) * this.step ** 2
-    return layer
+    if (wants === "missed") layer.forget();
+    const painting = wants === "missed" ? this.codesOfPainting(params) : null;
+    const { beyond } = this;
+    layer.show(this.lut, params.stops, wants === "importance" ? null : wants, (rgba) => {
+      const grid = this.grid(this.step);
+      if (wants === "falsecolor") falseColour(rgba, layer.light, 2 ** params.stops);
+      else if (wants === "beyond" && beyond) inked(rgba, beyond, 255, INKS.beyond, grid);
+      else if (painting) missed(rgba, painting, this.importance, grid);
+    });
+    if (isOther) this.pace = (performance.now() - started) * this.step ** 2;
+    return layer;
   }
 
   /** @param {Params} params */
   codesOfPainting(params) {
-    const layer = this.shown('painting', { ...params, overlay: null })
-    return layer && layer.image.data
+    const layer = this.shown("painting", { ...params, overlay: null });
+    return layer && layer.image.data;
   }
 
   /** @param {number} step */
   grid(step) {
-    return { height: this.size[0], width: this.size[1], step }
+    return { height: this.size[0], width: this.size[1], step };
   }
 
   /** @param {Kind} kind @param {number} [step] */
   layer(kind, step = 1) {
-    const name = `${kind}/${step}`
-    const key = step === 1 ? kind : name
-    let layer = this.layers.get(key)
-    if (!layer) this.layers.set(key, (layer = new Layer(this.size, step)))
-    return layer
+    const name = `${kind}/${step}`;
+    const key = step === 1 ? kind : name;
+    let layer = this.layers.get(key);
+    if (!layer) this.layers.set(key, (layer = new Layer(this.size, step)));
+    return layer;
   }
 
   /** @param {number} x @param {number} y @param {number} width @param {number} height */
   read(x, y, width, height) {
-    return new Uint8Array(this.context.getImageData(x, y, width, height).data.buffer)
+    return new Uint8Array(this.context.getImageData(x, y, width, height).data.buffer);
   }
 
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
-    const made = new Float32Array(3 * this.planes.length)
-    const from = 3 * (y * this.size[1] + x)
+    const made = new Float32Array(3 * this.planes.length);
+    const from = 3 * (y * this.size[1] + x);
     this.planes.forEach(({ halves, scale }, k) => {
-      for (let c = 0; halves && c < 3; c++) made[3 * k + c] = VALUES[halves[from + c]] * scale
-    })
-    return made
+      for (let c = 0; halves && c < 3; c++) made[3 * k + c] = VALUES[halves[from + c]] * scale;
+    });
+    return made;
   }
 
   /** @param {Kind} kind @param {number} x @param {number} y
    * @returns {[number, number, number]} */
   lightAt(kind, x, y) {
-    if (kind === 'solution' || kind === 'other')
-      return mixedAt(this.planesAt(x, y), this.mixes[kind].weights)
-    const from = 3 * (y * this.size[1] + x)
-    const light = this.layers.get(kind)?.light
-    return light ? [light[from], light[from + 1], light[from + 2]] : [0, 0, 0]
+    if (kind === "solution" || kind === "other")
+      return mixedAt(this.planesAt(x, y), this.mixes[kind].weights);
+    const from = 3 * (y * this.size[1] + x);
+    const light = this.layers.get(kind)?.light;
+    return light ? [light[from], light[from + 1], light[from + 2]] : [0, 0, 0];
   }
 
   lost() {
-    return false
+    return false;
   }
 
   memory() {
-    const planes = this.planes.reduce((sum, { halves }) => sum + (halves?.byteLength ?? 0), 0)
+    const planes = this.planes.reduce((sum, { halves }) => sum + (halves?.byteLength ?? 0), 0);
     const layers = [...this.layers].reduce((sum, [kind, layer]) => {
-      const isOwn = kind === 'verified' || kind === 'present'
-      return sum + layer.memory() + (isOwn ? layer.light.byteLength : 0)
-    }, 0)
-    return planes + layers + this.mixes.solution.memory() + this.mixes.other.memory()
+      const isOwn = kind === "verified" || kind === "present";
+      return sum + layer.memory() + (isOwn ? layer.light.byteLength : 0);
+    }, 0);
+    return planes + layers + this.mixes.solution.memory() + this.mixes.other.memory();
   }
 
   close() {
-    this.planes = []
-    this.layers.clear()
+    this.planes = [];
+    this.layers.clear();
   }
 }
 
@@ -222,12 +224,12 @@ export class CpuView {
  * @returns {[number, number, number]} */
 export function mixedAt(planes, weights) {
   /** @type {[number, number, number]} */
-  const sum = [0, 0, 0]
-  planes.forEach((light, i) => (sum[i % 3] += light * weights[i]))
-  return sum
+  const sum = [0, 0, 0];
+  planes.forEach((light, i) => (sum[i % 3] += light * weights[i]));
+  return sum;
 }
 
 /** @param {Params} params */
 function falseOnly(params) {
-  return params.overlay === 'falsecolor' ? params.overlay : null
+  return params.overlay === "falsecolor" ? params.overlay : null;
 }

@@ -4,229 +4,233 @@
  * The mix is a picture of its own, made when weights change; exposure, zoom and overlays are only
  * the last step. A lost context takes all that was set with it.
  */
-import { mixedAt } from './cpu.js'
-import { Planes } from './gpu.js'
-import { VALUES } from './half.js'
-import { SRGB } from './lut.js'
-import { GROUND, SQUARES, panes } from './view.js'
+import { mixedAt } from "./cpu.js";
+import { Planes } from "./gpu.js";
+import { SRGB } from "./lut.js";
+import { GROUND, SQUARES, panes } from "./view.js";
 
-/** @typedef {import('./view.js').Kind} Kind */
-/** @typedef {import('./view.js').Params} Params */
-/** @typedef {import('./view.js').Region} Region */
+/** @typedef {import("./view.js").Kind} Kind */
+/** @typedef {import("./view.js").Params} Params */
+/** @typedef {import("./view.js").Region} Region */
 
-const OVERLAYS = { falsecolor: 1, missed: 2, importance: 3, beyond: 4 }
+const OVERLAYS = { falsecolor: 1, missed: 2, importance: 3, beyond: 4 };
 
-/** @implements {PictureView} @typedef {import('./view.js').PictureView} PictureView */
+/** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class GlView {
   /** Throws where there is no WebGL2 that renders to halves.
    * @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size
    * @param {{isSlowRefused?: boolean, onRestored?: () => void}} [options] isSlowRefused: whether
    * a context without a GPU is none */
   constructor(canvas, size, options = {}) {
-    this.name = /** @type {const} */ ('gl')
-    this.canvas = canvas
-    this.size = size
-    const gl = canvas.getContext('webgl2', {
+    this.name = /** @type {const} */ ("gl");
+    this.canvas = canvas;
+    this.size = size;
+    const gl = canvas.getContext("webgl2", {
       alpha: false,
       antialias: false,
       depth: false,
-      powerPreference: 'high-performance',
+      powerPreference: "high-performance",
       failIfMajorPerformanceCaveat: options.isSlowRefused ?? false,
-    })
-    if (!gl) throw new Error('no WebGL2')
-    this.gl = gl
-    this.isLost = false
-    canvas.addEventListener('webglcontextlost', (event) => {
-      event.preventDefault()
-      this.isLost = true
-    })
-    canvas.addEventListener('webglcontextrestored', () => {
-      this.isLost = false
-      this.planes = new Planes(gl, size)
-      this.forget()
-      options.onRestored?.()
-    })
-    this.planes = new Planes(gl, size)
-    /** @type {import('./lut.js').Lut} */
-    this.lut = SRGB
+    });
+    if (!gl) throw new Error("no WebGL2");
+    this.gl = gl;
+    this.isLost = false;
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.isLost = true;
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.isLost = false;
+      this.planes = new Planes(gl, size);
+      this.forget();
+      options.onRestored?.();
+    });
+    this.planes = new Planes(gl, size);
+    /** @type {import("./lut.js").Lut} */
+    this.lut = SRGB;
     /** @type {WebGLTexture | null} */
-    this.lattice = null
+    this.lattice = null;
     /** @type {Map<Kind, WebGLTexture>} */
-    this.pictures = new Map()
+    this.pictures = new Map();
     /** @type {WebGLTexture | null} */
-    this.beyond = null
+    this.beyond = null;
     /** @type {Float32Array | null} */
-    this.image = null
+    this.image = null;
     /** @type {Params | null} */
-    this.last = null
+    this.last = null;
   }
 
   /** What a lost context took. */
   forget() {
-    this.lut = SRGB
-    this.lattice = null
-    this.beyond = null
-    this.image = null
-    this.pictures.clear()
+    this.lut = SRGB;
+    this.lattice = null;
+    this.beyond = null;
+    this.image = null;
+    this.pictures.clear();
   }
 
   get textures() {
-    return this.planes.textures
+    return this.planes.textures;
   }
 
   /** @param {number} count */
   setCount(count) {
-    this.planes.setCount(count)
+    this.planes.setCount(count);
   }
 
   /** @param {number} light @param {Uint16Array} halves @param {number} scale */
   setPlane(light, halves, scale) {
-    this.planes.setPlane(light, halves, scale)
+    this.planes.setPlane(light, halves, scale);
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
-  setWeights(weights, kind = 'solution') {
-    this.planes.setWeights(weights, kind)
+  setWeights(weights, kind = "solution") {
+    this.planes.setWeights(weights, kind);
   }
 
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
-    return this.planes.at(x, y)
+    return this.planes.at(x, y);
   }
 
   /** @param {Region} region @param {Float32Array} image @param {Float32Array} importance */
   setCanvas(region, image, importance) {
-    if (image !== this.image) region = [0, this.size[0], 0, this.size[1]]
-    this.image = image
-    const texture = this.pictures.get('painting') ?? this.textures.halves()
-    this.pictures.set('painting', texture)
-    this.textures.setCanvas(texture, region, image, importance)
+    if (image !== this.image) region = [0, this.size[0], 0, this.size[1]];
+    this.image = image;
+    const texture = this.pictures.get("painting") ?? this.textures.halves();
+    this.pictures.set("painting", texture);
+    this.textures.setCanvas(texture, region, image, importance);
   }
 
   /** @param {'verified' | 'present'} kind @param {Uint16Array | null} halves */
   setPicture(kind, halves) {
-    this.textures.drop(this.pictures.get(kind) ?? null)
-    this.pictures.delete(kind)
-    if (!halves) return
-    const texture = this.textures.halves()
-    this.textures.setHalves(texture, halves)
-    this.pictures.set(kind, texture)
+    this.textures.drop(this.pictures.get(kind) ?? null);
+    this.pictures.delete(kind);
+    if (!halves) return;
+    const texture = this.textures.halves();
+    this.textures.setHalves(texture, halves);
+    this.pictures.set(kind, texture);
   }
 
   /** @param {Uint8Array | null} beyond */
   setBeyond(beyond) {
-    this.textures.drop(this.beyond)
-    this.beyond = beyond && this.textures.bytes(beyond)
+    this.textures.drop(this.beyond);
+    this.beyond = beyond && this.textures.bytes(beyond);
   }
 
-  /** @param {import('./lut.js').Lut} lut */
+  /** @param {import("./lut.js").Lut} lut */
   setLut(lut) {
-    if (lut === this.lut) return
-    this.lut = lut
-    this.textures.drop(this.lattice)
-    this.lattice = lut.lattice && this.textures.lattice(lut)
+    if (lut === this.lut) return;
+    this.lut = lut;
+    this.textures.drop(this.lattice);
+    this.lattice = lut.lattice && this.textures.lattice(lut);
   }
 
   /** @param {Params} params */
   draw(params) {
-    const { gl, canvas } = this
-    this.last = params
-    if (this.lost()) return
-    const shown = panes(params, canvas, this.size)
-    for (const { kind } of shown) if (kind === 'solution' || kind === 'other') this.planes.mix(kind)
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null)
-    gl.viewport(0, 0, canvas.width, canvas.height)
-    gl.disable(gl.SCISSOR_TEST)
-    const [red, green, blue] = GROUND.map((code) => code / 255)
-    gl.clearColor(red, green, blue, 1)
-    gl.clear(gl.COLOR_BUFFER_BIT)
-    gl.enable(gl.SCISSOR_TEST)
-    for (const pane of shown) this.show(pane, params)
-    gl.disable(gl.SCISSOR_TEST)
+    const { gl, canvas } = this;
+    this.last = params;
+    if (this.lost()) return;
+    const shown = panes(params, canvas, this.size);
+    for (const { kind } of shown)
+      if (kind === "solution" || kind === "other") this.planes.mix(kind);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.disable(gl.SCISSOR_TEST);
+    const [red, green, blue] = GROUND.map((code) => code / 255);
+    gl.clearColor(red, green, blue, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.SCISSOR_TEST);
+    for (const pane of shown) this.show(pane, params);
+    gl.disable(gl.SCISSOR_TEST);
   }
 
   /** @param {Kind} kind */
   texture(kind) {
-    const isMix = kind === 'solution' || kind === 'other'
-    return (isMix ? this.planes.mixes[kind].texture : this.pictures.get(kind)) ?? null
+    const isMix = kind === "solution" || kind === "other";
+    return (isMix ? this.planes.mixes[kind].texture : this.pictures.get(kind)) ?? null;
   }
 
-  /** @param {import('./view.js').Pane} pane @param {Params} params */
+  /** @param {import("./view.js").Pane} pane @param {Params} params */
   show(pane, params) {
-    const { gl, canvas, textures } = this
-    const picture = this.texture(pane.kind)
-    if (!picture) return
-    const { at } = this.planes.shower.use()
-    const isSharp = pane.scale >= SQUARES || pane.scale === 1
-    const { nothing } = textures
-    const units = [picture, this.pictures.get('painting') ?? nothing, this.beyond ?? nothing]
-    units.forEach((texture, i) => textures.bind(i, gl.TEXTURE_2D, texture))
-    textures.bind(3, gl.TEXTURE_3D, this.lattice ?? textures.black)
-    for (const [i, name] of ['picture', 'painting', 'beyond', 'lattice'].entries())
-      gl.uniform1i(at(name), i)
-    const { shaper, lattice } = this.lut
-    gl.uniform2f(at('size'), this.size[1], this.size[0])
-    gl.uniform2f(at('corner'), pane.left, pane.top)
-    gl.uniform1f(at('scale'), pane.scale)
-    gl.uniform1f(at('above'), canvas.height)
-    gl.uniform1f(at('gain'), 2 ** params.stops)
-    gl.uniform1f(at('side'), shaper.side)
-    gl.uniform2f(at('shaper'), shaper.low, shaper.high)
-    gl.uniform1i(at('isSrgb'), Number(!lattice))
-    gl.uniform1i(at('isSharp'), Number(isSharp))
-    gl.uniform1i(at('isSmall'), Number(pane.scale < 0.75))
-    gl.uniform1i(at('overlay'), overlayOf(pane.kind, params))
-    gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height)
-    gl.drawArrays(gl.TRIANGLES, 0, 3)
+    const { gl, canvas, textures } = this;
+    const picture = this.texture(pane.kind);
+    if (!picture) return;
+    const { at } = this.planes.shower.use();
+    const isSharp = pane.scale >= SQUARES || pane.scale === 1;
+    const { nothing } = textures;
+    const units = [picture, this.pictures.get("painting") ?? nothing, this.beyond ?? nothing];
+    units.forEach((texture, i) => textures.bind(i, gl.TEXTURE_2D, texture));
+    textures.bind(3, gl.TEXTURE_3D, this.lattice ?? textures.black);
+    for (const [i, name] of ["picture", "painting", "beyond", "lattice"].entries())
+      gl.uniform1i(at(name), i);
+    const { shaper, lattice } = this.lut;
+    gl.uniform2f(at("size"), this.size[1], this.size[0]);
+    gl.uniform2f(at("corner"), pane.left, pane.top);
+    gl.uniform1f(at("scale"), pane.scale);
+    gl.uniform1f(at("above"), canvas.height);
+    gl.uniform1f(at("gain"), 2 ** params.stops);
+    gl.uniform1f(at("side"), shaper.side);
+    gl.uniform2f(at("shaper"), shaper.low, shaper.high);
+    gl.uniform1i(at("isSrgb"), Number(!lattice));
+    gl.uniform1i(at("isSharp"), Number(isSharp));
+    gl.uniform1i(at("isSmall"), Number(pane.scale < 0.75));
+    gl.uniform1i(at("overlay"), overlayOf(pane.kind, params));
+    gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   /** @param {number} x @param {number} y @param {number} width @param {number} height */
   read(x, y, width, height) {
-    const { gl, canvas } = this
+    const { gl, canvas } = this;
     // What was drawn is only there until the browser has shown it.
-    if (this.last) this.draw(this.last)
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null)
-    const found = new Uint8Array(width * height * 4)
-    gl.readPixels(x, canvas.height - y - height, width, height, gl.RGBA, gl.UNSIGNED_BYTE, found)
-    const made = new Uint8Array(found.length)
+    if (this.last) this.draw(this.last);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    const found = new Uint8Array(width * height * 4);
+    gl.readPixels(x, canvas.height - y - height, width, height, gl.RGBA, gl.UNSIGNED_BYTE, found);
+    const made = new Uint8Array(found.length);
     for (let row = 0; row < height; row++)
-      made.set(found.subarray(row * width * 4, (row + 1) * width * 4), (height - 1 - row) * width * 4)
-    return made
+      made.set(
+        found.subarray(row * width * 4, (row + 1) * width * 4),
+        (height - 1 - row) * width * 4,
+      );
+    return made;
   }
 
   /** @param {Kind} kind @param {number} x @param {number} y
    * @returns {[number, number, number]} */
   lightAt(kind, x, y) {
-    if (kind === 'solution' || kind === 'other')
-      return mixedAt(this.planesAt(x, y), this.planes.mixes[kind].weights)
-    const from = 3 * (y * this.size[1] + x)
-    if (kind === 'painting' && this.image)
-      return [this.image[from], this.image[from + 1], this.image[from + 2]]
-    const texture = this.texture(kind)
-    if (!texture) return [0, 0, 0]
-    this.planes.onto(texture, this.size[1], this.size[0])
-    const rgba = new Float32Array(4)
-    this.gl.readPixels(x, y, 1, 1, this.gl.RGBA, this.gl.FLOAT, rgba)
-    return [rgba[0], rgba[1], rgba[2]]
+    if (kind === "solution" || kind === "other")
+      return mixedAt(this.planesAt(x, y), this.planes.mixes[kind].weights);
+    const from = 3 * (y * this.size[1] + x);
+    if (kind === "painting" && this.image)
+      return [this.image[from], this.image[from + 1], this.image[from + 2]];
+    const texture = this.texture(kind);
+    if (!texture) return [0, 0, 0];
+    this.planes.onto(texture, this.size[1], this.size[0]);
+    const rgba = new Float32Array(4);
+    this.gl.readPixels(x, y, 1, 1, this.gl.RGBA, this.gl.FLOAT, rgba);
+    return [rgba[0], rgba[1], rgba[2]];
   }
 
   lost() {
-    return this.isLost || this.gl.isContextLost()
+    return this.isLost || this.gl.isContextLost();
   }
 
   memory() {
-    return this.textures.memory() + VALUES.byteLength + 4 * this.canvas.width * this.canvas.height
+    return this.textures.memory() + 4 * this.canvas.width * this.canvas.height;
   }
 
   close() {
-    this.gl.getExtension('WEBGL_lose_context')?.loseContext()
+    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 }
 
 /** Number of what lies over a picture of a kind. @param {Kind} kind @param {Params} params */
 function overlayOf(kind, { overlay }) {
-  if (!overlay) return 0
+  if (!overlay) return 0;
   const isHere =
-    overlay === 'falsecolor' || (overlay === 'importance' ? kind === 'painting' : kind === 'solution')
-  return isHere ? OVERLAYS[overlay] : 0
+    overlay === "falsecolor" ||
+    (overlay === "importance" ? kind === "painting" : kind === "solution");
+  return isHere ? OVERLAYS[overlay] : 0;
 }

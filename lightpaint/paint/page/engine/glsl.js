@@ -1,20 +1,20 @@
 /** What gl.js runs on the GPU. Numbers come from overlay.js, so that there is one of each. */
-import { LARGEST } from './half.js'
-import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from './overlay.js'
-import { GROUND } from './view.js'
+import { LARGEST } from "./half.js";
+import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from "./overlay.js";
+import { GROUND } from "./view.js";
 
 const HEAD = `#version 300 es
 precision highp float;
 precision highp sampler2DArray;
 precision highp sampler3D;
-`
+`;
 
 /** One triangle over all there is. */
 export const VERTEX = `${HEAD}
 void main() {
   vec2 corner = vec2(gl_VertexID == 1, gl_VertexID == 2);
   gl_Position = vec4(corner * 4.0 - 1.0, 0.0, 1.0);
-}`
+}`;
 
 /** Σ weights[k] · plane[k] of the planes in one texture, added to what is there. */
 export const MIX = `${HEAD}
@@ -31,7 +31,7 @@ void main() {
     if (weight != vec3(0.0)) sum += weight * texelFetch(planes, ivec3(at, k), 0).rgb;
   }
   mixed = vec4(clamp(sum, -${LARGEST}.0, ${LARGEST}.0), 1.0);
-}`
+}`;
 
 /** One pixel of each plane of a texture, side by side. */
 export const PROBE = `${HEAD}
@@ -40,10 +40,10 @@ uniform ivec2 at;
 out vec4 light;
 void main() {
   light = texelFetch(planes, ivec3(at, int(gl_FragCoord.x)), 0);
-}`
+}`;
 
 /** @param {number[]} codes */
-const vec3 = (codes) => `vec3(${codes.map((code) => (code / 255).toFixed(6)).join(', ')})`
+const vec3 = (codes) => `vec3(${codes.map((code) => (code / 255).toFixed(6)).join(", ")})`;
 
 /** A pane: light through the view transform, and what is laid over it. */
 export const SHOW = `${HEAD}
@@ -64,9 +64,9 @@ uniform bool isSmall;
 uniform int overlay;
 out vec4 shown;
 
-const vec3 LUMA = vec3(${LUMA.join(', ')});
+const vec3 LUMA = vec3(${LUMA.join(", ")});
 const vec3 BANDS[${BANDS.length}] = vec3[](
-  ${BANDS.map(vec3).join(',\n  ')}
+  ${BANDS.map(vec3).join(",\n  ")}
 );
 
 vec3 encode(vec3 light) {
@@ -137,4 +137,4 @@ void main() {
     display = lay(display, ${vec3(INKS.beyond)}, amount * hatch(at, 1));
   }
   shown = vec4(display, 1.0);
-}`
+}`;

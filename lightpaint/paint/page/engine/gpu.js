@@ -1,137 +1,139 @@
 /** Planes and mixes on a GPU: what one life of a WebGL2 context holds of the lights. */
-import { MIX, PROBE, SHOW, VERTEX } from './glsl.js'
-import { Textures, program } from './textures.js'
+import { MIX, PROBE, SHOW, VERTEX } from "./glsl.js";
+import { Textures, program } from "./textures.js";
 
 /** @typedef {{weights: Float64Array, texture: WebGLTexture | null, isStale: boolean}} Mixed */
 
 /** Bytes of one texture of planes; drivers refuse larger ones. */
-const LARGEST_TEXTURE = 512 * 2 ** 20
+const LARGEST_TEXTURE = 512 * 2 ** 20;
 
 export class Planes {
   /** Throws where the context does not render to halves, or holds no picture of that size.
    * @param {WebGL2RenderingContext} gl @param {[height: number, width: number]} size */
   constructor(gl, size) {
-    this.gl = gl
-    this.size = size
-    const isFloat = gl.getExtension('EXT_color_buffer_float')
-    if (!isFloat && !gl.getExtension('EXT_color_buffer_half_float'))
-      throw new Error('this WebGL2 does not render to halves')
+    this.gl = gl;
+    this.size = size;
+    const isFloat = gl.getExtension("EXT_color_buffer_float");
+    if (!isFloat && !gl.getExtension("EXT_color_buffer_half_float"))
+      throw new Error("this WebGL2 does not render to halves");
     if (Math.max(...size) > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-      throw new Error(`this WebGL2 holds no picture of ${size.join(' × ')}`)
-    this.mixer = program(gl, VERTEX, MIX)
-    this.shower = program(gl, VERTEX, SHOW)
-    this.prober = program(gl, VERTEX, PROBE)
-    this.textures = new Textures(gl, size)
-    this.target = gl.createFramebuffer()
-    this.count = 0
-    this.perSlice = 1
+      throw new Error(`this WebGL2 holds no picture of ${size.join(" × ")}`);
+    this.mixer = program(gl, VERTEX, MIX);
+    this.shower = program(gl, VERTEX, SHOW);
+    this.prober = program(gl, VERTEX, PROBE);
+    this.textures = new Textures(gl, size);
+    this.target = gl.createFramebuffer();
+    this.count = 0;
+    this.perSlice = 1;
     /** @type {WebGLTexture[]} */
-    this.slices = []
+    this.slices = [];
     /** @type {number[]} */
-    this.scales = []
+    this.scales = [];
     /** @type {Record<'solution' | 'other', Mixed>} */
-    this.mixes = { solution: mixed(0), other: mixed(0) }
+    this.mixes = { solution: mixed(0), other: mixed(0) };
   }
 
   /** @param {number} count */
   setCount(count) {
-    const { gl, textures } = this
-    for (const slice of this.slices) textures.drop(slice)
-    for (const { texture } of Object.values(this.mixes)) textures.drop(texture)
-    const layer = this.size[0] * this.size[1] * 8
+    const { gl, textures } = this;
+    for (const slice of this.slices) textures.drop(slice);
+    for (const { texture } of Object.values(this.mixes)) textures.drop(texture);
+    const layer = this.size[0] * this.size[1] * 8;
     const most = Math.min(
       gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS),
       gl.getParameter(gl.MAX_TEXTURE_SIZE), // of weights and probes, which lie in a row
       Math.max(1, Math.floor(LARGEST_TEXTURE / layer)),
-    )
-    this.count = count
-    this.perSlice = most
-    this.scales = new Array(count).fill(1)
-    this.slices = []
+    );
+    this.count = count;
+    this.perSlice = most;
+    this.scales = new Array(count).fill(1);
+    this.slices = [];
     for (let first = 0; first < count; first += most)
-      this.slices.push(textures.planes(Math.min(most, count - first)))
-    this.mixes = { solution: mixed(count), other: mixed(count) }
-    if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error('the GPU has no room for the planes')
+      this.slices.push(textures.planes(Math.min(most, count - first)));
+    this.mixes = { solution: mixed(count), other: mixed(count) };
+    if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error("the GPU has no room for the planes");
   }
 
   /** @param {number} light @param {Uint16Array} halves @param {number} scale */
   setPlane(light, halves, scale) {
     if (halves.length !== this.size[0] * this.size[1] * 3)
-      throw new Error(`a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`)
-    const slice = this.slices[Math.floor(light / this.perSlice)]
-    this.textures.setPlane(slice, light % this.perSlice, halves)
-    this.scales[light] = scale
-    for (const mix of Object.values(this.mixes)) mix.isStale = true
+      throw new Error(
+        `a plane of ${halves.length} numbers on a picture of ${this.size.join(" × ")}`,
+      );
+    const slice = this.slices[Math.floor(light / this.perSlice)];
+    this.textures.setPlane(slice, light % this.perSlice, halves);
+    this.scales[light] = scale;
+    for (const mix of Object.values(this.mixes)) mix.isStale = true;
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
-  setWeights(weights, kind = 'solution') {
-    this.mixes[kind].weights = Float64Array.from(weights)
-    this.mixes[kind].isStale = true
+  setWeights(weights, kind = "solution") {
+    this.mixes[kind].weights = Float64Array.from(weights);
+    this.mixes[kind].isStale = true;
   }
 
   /** Bring a mix up to date. @param {'solution' | 'other'} kind */
   mix(kind) {
-    const { gl, count, perSlice } = this
-    const mix = this.mixes[kind]
-    if (!mix.isStale) return
-    mix.texture ??= this.textures.halves()
-    const { at } = this.mixer.use()
-    const scaled = new Float32Array(4 * Math.max(1, count))
+    const { gl, count, perSlice } = this;
+    const mix = this.mixes[kind];
+    if (!mix.isStale) return;
+    mix.texture ??= this.textures.halves();
+    const { at } = this.mixer.use();
+    const scaled = new Float32Array(4 * Math.max(1, count));
     for (let k = 0; k < count; k++)
-      for (let c = 0; c < 3; c++) scaled[4 * k + c] = mix.weights[3 * k + c] * this.scales[k]
-    this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaled))
-    gl.uniform1i(at('planes'), 0)
-    gl.uniform1i(at('weights'), 1)
-    this.onto(mix.texture, this.size[1], this.size[0])
-    gl.clearColor(0, 0, 0, 1)
-    gl.clear(gl.COLOR_BUFFER_BIT)
-    gl.enable(gl.BLEND)
-    gl.blendFunc(gl.ONE, gl.ONE)
+      for (let c = 0; c < 3; c++) scaled[4 * k + c] = mix.weights[3 * k + c] * this.scales[k];
+    this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaled));
+    gl.uniform1i(at("planes"), 0);
+    gl.uniform1i(at("weights"), 1);
+    this.onto(mix.texture, this.size[1], this.size[0]);
+    gl.clearColor(0, 0, 0, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE);
     this.slices.forEach((slice, i) => {
-      this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice)
-      gl.uniform1i(at('first'), i * perSlice)
-      gl.uniform1i(at('count'), Math.min(perSlice, count - i * perSlice))
-      gl.drawArrays(gl.TRIANGLES, 0, 3)
-    })
-    gl.disable(gl.BLEND)
-    mix.isStale = false
+      this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
+      gl.uniform1i(at("first"), i * perSlice);
+      gl.uniform1i(at("count"), Math.min(perSlice, count - i * perSlice));
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    });
+    gl.disable(gl.BLEND);
+    mix.isStale = false;
   }
 
   /** Draw to a texture from here on. @param {WebGLTexture} texture @param {number} width
    * @param {number} height */
   onto(texture, width, height) {
-    const { gl } = this
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target)
-    const to = gl.COLOR_ATTACHMENT0
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, to, gl.TEXTURE_2D, texture, 0)
-    gl.viewport(0, 0, width, height)
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
+    const to = gl.COLOR_ATTACHMENT0;
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, to, gl.TEXTURE_2D, texture, 0);
+    gl.viewport(0, 0, width, height);
   }
 
   /** (n, 3) light of each plane at a pixel, at unit emission.
    * @param {number} x @param {number} y */
   at(x, y) {
-    const { gl, count, perSlice } = this
-    const made = new Float32Array(3 * count)
-    const { at } = this.prober.use()
-    gl.uniform1i(at('planes'), 0)
-    gl.uniform2i(at('at'), x, y)
+    const { gl, count, perSlice } = this;
+    const made = new Float32Array(3 * count);
+    const { at } = this.prober.use();
+    gl.uniform1i(at("planes"), 0);
+    gl.uniform2i(at("at"), x, y);
     this.slices.forEach((slice, i) => {
-      const here = Math.min(perSlice, count - i * perSlice)
-      this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice)
-      this.onto(this.textures.probe(here), here, 1)
-      gl.drawArrays(gl.TRIANGLES, 0, 3)
-      const rgba = new Float32Array(4 * here)
-      gl.readPixels(0, 0, here, 1, gl.RGBA, gl.FLOAT, rgba)
+      const here = Math.min(perSlice, count - i * perSlice);
+      this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
+      this.onto(this.textures.probe(here), here, 1);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      const rgba = new Float32Array(4 * here);
+      gl.readPixels(0, 0, here, 1, gl.RGBA, gl.FLOAT, rgba);
       for (let k = 0; k < here; k++)
         for (let c = 0; c < 3; c++)
-          made[3 * (i * perSlice + k) + c] = rgba[4 * k + c] * this.scales[i * perSlice + k]
-    })
-    return made
+          made[3 * (i * perSlice + k) + c] = rgba[4 * k + c] * this.scales[i * perSlice + k];
+    });
+    return made;
   }
 }
 
 /** @param {number} count @returns {Mixed} */
 function mixed(count) {
-  return { weights: new Float64Array(3 * count), texture: null, isStale: true }
+  return { weights: new Float64Array(3 * count), texture: null, isStale: true };
 }

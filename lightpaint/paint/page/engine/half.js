@@ -1,37 +1,37 @@
 /** Halves (IEC 60559 binary16): JavaScript has no array of them in all browsers yet. */
 
 /** The largest half; Inf and NaN of a picture would spread from it, and are not let in. */
-export const LARGEST = 65504
+export const LARGEST = 65504;
 
 /** Values of all halves by their bits, (65536,). Inf is the largest half, NaN is 0. */
-export const VALUES = valuesOf()
+export const VALUES = valuesOf();
 
 /** Replace Inf by the largest half and NaN by 0, in place; the same array.
  * @param {Uint16Array} halves */
 export function finite(halves) {
   for (let i = 0; i < halves.length; i++) {
-    const magnitude = halves[i] & 0x7fff
-    if (magnitude >= 0x7c00) halves[i] = magnitude > 0x7c00 ? 0 : (halves[i] & 0x8000) | 0x7bff
+    const magnitude = halves[i] & 0x7fff;
+    if (magnitude >= 0x7c00) halves[i] = magnitude > 0x7c00 ? 0 : (halves[i] & 0x8000) | 0x7bff;
   }
-  return halves
+  return halves;
 }
 
 /** @param {Uint16Array} halves @param {number} [scale] */
 export function toFloats(halves, scale = 1) {
-  const made = new Float32Array(halves.length)
-  for (let i = 0; i < made.length; i++) made[i] = VALUES[halves[i]] * scale
-  return made
+  const made = new Float32Array(halves.length);
+  for (let i = 0; i < made.length; i++) made[i] = VALUES[halves[i]] * scale;
+  return made;
 }
 
 function valuesOf() {
-  const values = new Float32Array(65536)
+  const values = new Float32Array(65536);
   for (let bits = 0; bits < 65536; bits++) {
-    const sign = bits & 0x8000 ? -1 : 1
-    const exponent = (bits >> 10) & 31
-    const mantissa = bits & 1023
-    if (exponent === 31) values[bits] = mantissa ? 0 : sign * LARGEST
-    else if (exponent) values[bits] = sign * (1 + mantissa / 1024) * 2 ** (exponent - 15)
-    else values[bits] = sign * mantissa * 2 ** -24
+    const sign = bits & 0x8000 ? -1 : 1;
+    const exponent = (bits >> 10) & 31;
+    const mantissa = bits & 1023;
+    if (exponent === 31) values[bits] = mantissa ? 0 : sign * LARGEST;
+    else if (exponent) values[bits] = sign * (1 + mantissa / 1024) * 2 ** (exponent - 15);
+    else values[bits] = sign * mantissa * 2 ** -24;
   }
-  return values
+  return values;
 }

@@ -4,11 +4,11 @@
  * Every message has a number, and is answered by one that gives it back. A lost connection is
  * made anew, and begins with `hello`.
  */
-import { VERSION, frame, pictureOf, unframe } from './protocol.js'
+import { VERSION, frame, pictureOf, unframe } from "./protocol.js";
 
-/** @typedef {import('./protocol.js').Arrays} Arrays */
-/** @typedef {import('./protocol.js').Message} Message */
-/** @typedef {import('./protocol.js').Picture} Picture */
+/** @typedef {import("./protocol.js").Arrays} Arrays */
+/** @typedef {import("./protocol.js").Message} Message */
+/** @typedef {import("./protocol.js").Picture} Picture */
 
 /**
  * What the page knows of its session. `on` hears messages of a kind, asked for or not, and
@@ -24,133 +24,133 @@ import { VERSION, frame, pictureOf, unframe } from './protocol.js'
  */
 
 /** What does not wait for strokes that are on their way. */
-export const AT_ONCE = ['paint', 'drop', 'hello', 'take_over', 'fetch']
+export const AT_ONCE = ["paint", "drop", "hello", "take_over", "fetch"];
 
 /** Who hears what: the part that all hosts share. */
 export class Hearers {
   constructor() {
     /** Until strokes that are done have been answered: what else is said comes after them.
      * @type {() => Promise<void>} */
-    this.gate = async () => {}
+    this.gate = async () => {};
     /** @type {Map<string, ((message: any) => void)[]>} */
-    this.hearers = new Map()
+    this.hearers = new Map();
   }
 
   /** @param {string} kind @param {(message: any) => void} hear */
   on(kind, hear) {
-    this.hearers.set(kind, [...(this.hearers.get(kind) ?? []), hear])
+    this.hearers.set(kind, [...(this.hearers.get(kind) ?? []), hear]);
   }
 
   /** One who fails does not keep it from the others. @param {string} kind @param {any} message */
   tell(kind, message) {
     for (const hear of this.hearers.get(kind) ?? [])
       try {
-        hear(message)
+        hear(message);
       } catch (error) {
-        console.error(error)
+        console.error(error);
       }
   }
 }
 
 /** Milliseconds before a lost connection is tried again: at first, and at most. */
-const WAITS = { first: 250, most: 5000 }
+const WAITS = { first: 250, most: 5000 };
 
 /** @implements {Host} */
 export class SocketHost extends Hearers {
   /** Where the page came from. @param {string | URL} [base] */
   constructor(base = document.baseURI) {
-    super()
-    this.base = new URL('.', base)
+    super();
+    this.base = new URL(".", base);
     /** By which the session knows this page when it is back. */
-    this.page = crypto.randomUUID?.() ?? String(Math.random())
-    this.seq = 0
+    this.page = crypto.randomUUID?.() ?? String(Math.random());
+    this.seq = 0;
     /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
-    this.asked = new Map()
+    this.asked = new Map();
     /** @type {Record<string, number>} */
-    this.generations = {}
+    this.generations = {};
     /** @type {WebSocket | null} */
-    this.socket = null
-    this.wait = WAITS.first
-    this.isOver = false
+    this.socket = null;
+    this.wait = WAITS.first;
+    this.isOver = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.timer = undefined
+    this.timer = undefined;
   }
 
   /** Connect, now and whenever the connection is lost. */
   open() {
-    const url = new URL(`live?page=${this.page}`, this.base)
-    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:'
-    const socket = new WebSocket(url)
-    socket.binaryType = 'arraybuffer'
-    this.socket = socket
+    const url = new URL(`live?page=${this.page}`, this.base);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(url);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
     socket.onopen = () => {
-      this.send('hello', { version: VERSION }).catch(() => {})
-    }
-    socket.onmessage = ({ data }) => this.receive(unframe(data))
-    socket.onclose = () => this.dropped(socket)
+      this.send("hello", { version: VERSION }).catch(() => {});
+    };
+    socket.onmessage = ({ data }) => this.receive(unframe(data));
+    socket.onclose = () => this.dropped(socket);
   }
 
   /** @param {WebSocket} socket */
   dropped(socket) {
-    if (socket !== this.socket) return
-    this.socket = null
-    const gone = new Error('the connection to the painter is lost')
-    for (const { reject } of this.asked.values()) reject(gone)
-    this.asked.clear()
-    if (this.isOver) return
-    this.tell('connection', { kind: 'connection', state: 'lost' })
-    this.timer = setTimeout(() => this.open(), this.wait)
-    this.wait = Math.min(WAITS.most, 2 * this.wait)
+    if (socket !== this.socket) return;
+    this.socket = null;
+    const gone = new Error("the connection to the painter is lost");
+    for (const { reject } of this.asked.values()) reject(gone);
+    this.asked.clear();
+    if (this.isOver) return;
+    this.tell("connection", { kind: "connection", state: "lost" });
+    this.timer = setTimeout(() => this.open(), this.wait);
+    this.wait = Math.min(WAITS.most, 2 * this.wait);
   }
 
   /** @param {Message} message */
   receive(message) {
-    const { kind, reply } = message
-    if (kind === 'state' || kind === 'renewed')
-      this.generations = { ...this.generations, ...message.resources }
-    if (kind === 'state') {
-      this.generations = { ...message.resources }
-      this.wait = WAITS.first
+    const { kind, reply } = message;
+    if (kind === "state" || kind === "renewed")
+      this.generations = { ...this.generations, ...message.resources };
+    if (kind === "state") {
+      this.generations = { ...message.resources };
+      this.wait = WAITS.first;
     }
     // Who is of another version, or has been told to leave, does not come back by itself.
-    if (kind === 'closed' && message.reason === 'version') this.isOver = true
-    this.tell(kind, message)
-    if (kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' })
-    if (reply === undefined) return
-    this.asked.get(reply)?.resolve(message)
-    this.asked.delete(reply)
+    if (kind === "closed" && message.reason === "version") this.isOver = true;
+    this.tell(kind, message);
+    if (kind === "state") this.tell("connection", { kind: "connection", state: "open" });
+    if (reply === undefined) return;
+    this.asked.get(reply)?.resolve(message);
+    this.asked.delete(reply);
   }
 
   /** @param {string} kind @param {Record<string, unknown>} [fields] @param {Arrays} [arrays]
    * @returns {Promise<Message>} */
   async send(kind, fields = {}, arrays = {}) {
-    const isOpen = this.socket?.readyState === WebSocket.OPEN
-    if (isOpen && !AT_ONCE.includes(kind)) await this.gate()
+    const isOpen = this.socket?.readyState === WebSocket.OPEN;
+    if (isOpen && !AT_ONCE.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
       if (this.socket?.readyState !== WebSocket.OPEN)
-        return reject(new Error('there is no connection to the painter'))
-      const seq = ++this.seq
-      this.asked.set(seq, { resolve, reject })
-      this.socket.send(frame({ kind, seq, ...fields }, arrays))
-    })
+        return reject(new Error("there is no connection to the painter"));
+      const seq = ++this.seq;
+      this.asked.set(seq, { resolve, reject });
+      this.socket.send(frame({ kind, seq, ...fields }, arrays));
+    });
   }
 
   /** @param {string} name @returns {Promise<Picture>} */
   async fetch(name) {
-    const path = name.split('/').map(encodeURIComponent).join('/')
-    const url = new URL(`data/${path}`, this.base)
-    const generation = this.generations[name]
-    if (generation !== undefined) url.searchParams.set('g', String(generation))
-    const response = await fetch(url, { credentials: 'same-origin' })
-    if (!response.ok) throw new Error(`${name}: ${await response.text()}`)
-    const shape = (response.headers.get('x-shape') ?? '').split(',').map(Number)
-    const dtype = response.headers.get('x-dtype') ?? ''
-    return pictureOf(dtype, shape, await response.arrayBuffer())
+    const path = name.split("/").map(encodeURIComponent).join("/");
+    const url = new URL(`data/${path}`, this.base);
+    const generation = this.generations[name];
+    if (generation !== undefined) url.searchParams.set("g", String(generation));
+    const response = await fetch(url, { credentials: "same-origin" });
+    if (!response.ok) throw new Error(`${name}: ${await response.text()}`);
+    const shape = (response.headers.get("x-shape") ?? "").split(",").map(Number);
+    const dtype = response.headers.get("x-dtype") ?? "";
+    return pictureOf(dtype, shape, await response.arrayBuffer());
   }
 
   close() {
-    this.isOver = true
-    clearTimeout(this.timer)
-    this.socket?.close()
+    this.isOver = true;
+    clearTimeout(this.timer);
+    this.socket?.close();
   }
 }

@@ -1,82 +1,81 @@
 /** One picture as the CPU shows it: its light, its codes, and a canvas with them. */
-import { Encoder, SRGB } from './lut.js'
+import { Encoder, SRGB } from "./lut.js";
 
-/** @typedef {import('./protocol.js').Region} Region */
+/** @typedef {import("./protocol.js").Region} Region */
 
 export class Layer {
   /** @param {[height: number, width: number]} size of the picture
    * @param {number} step of which each so manieth pixel of so manieth row is held */
   constructor([height, width], step = 1) {
-    this.step = step
-    this.height = Math.ceil(height / step)
-    this.width = Math.ceil(width / step)
+    this.step = step;
+    this.height = Math.ceil(height / step);
+    this.width = Math.ceil(width / step);
     /** @type {Float32Array} */
-    this.light = new Float32Array(0)
-    this.image = new ImageData(this.width, this.height)
-    this.canvas = document.createElement('canvas')
-    this.canvas.width = this.width
-    this.canvas.height = this.height
-    const context = this.canvas.getContext('2d', { alpha: false })
-    if (!context) throw new Error('no canvas to draw on')
-    this.context = context
-    this.encoder = new Encoder(SRGB, 0)
+    this.light = new Float32Array(0);
+    this.image = new ImageData(this.width, this.height);
+    this.canvas = document.createElement("canvas");
+    this.canvas.width = this.width;
+    this.canvas.height = this.height;
+    const context = this.canvas.getContext("2d", { alpha: false });
+    if (!context) throw new Error("no canvas to draw on");
+    this.context = context;
+    this.encoder = new Encoder(SRGB, 0);
     /** What of the codes is to be made anew. @type {Region | null} */
-    this.stale = null
+    this.stale = null;
     /** @type {string | null} */
-    this.laid = null
+    this.laid = null;
   }
 
   /** @param {Float32Array} light (h, w, 3), kept @param {Region} [region] what changed of it */
   setLight(light, region = this.whole()) {
-    if (light !== this.light) region = this.whole()
-    this.light = light
-    this.stale = union(this.stale, region)
+    if (light !== this.light) region = this.whole();
+    this.light = light;
+    this.stale = union(this.stale, region);
   }
 
   /** All codes are to be made anew. */
   forget() {
-    this.stale = this.whole()
+    this.stale = this.whole();
   }
 
   /** Bring codes and canvas up to date.
-   * @param {import('./lut.js').Lut} lut @param {number} stops
+   * @param {import("./lut.js").Lut} lut @param {number} stops
    * @param {string | null} overlay its name, null for none
    * @param {(rgba: Uint8ClampedArray) => void} lay draws it over all codes */
   show(lut, stops, overlay, lay) {
     if (lut !== this.encoder.lut || stops !== this.encoder.stops) {
-      this.encoder = new Encoder(lut, stops)
-      this.forget()
+      this.encoder = new Encoder(lut, stops);
+      this.forget();
     }
-    if (overlay !== this.laid || (overlay && this.stale)) this.forget()
-    this.laid = overlay
-    if (!this.stale || !this.light.length) return
-    const [top, bottom, left, right] = this.stale
-    const { width } = this
-    const rgba = this.image.data
-    if (right - left === width)
-      this.encoder.pixels(this.light, rgba, top * width, bottom * width)
+    if (overlay !== this.laid || (overlay && this.stale)) this.forget();
+    this.laid = overlay;
+    if (!this.stale || !this.light.length) return;
+    const [top, bottom, left, right] = this.stale;
+    const { width } = this;
+    const rgba = this.image.data;
+    if (right - left === width) this.encoder.pixels(this.light, rgba, top * width, bottom * width);
     else
       for (let y = top; y < bottom; y++)
-        this.encoder.pixels(this.light, rgba, y * width + left, y * width + right)
-    if (overlay) lay(rgba)
-    this.context.putImageData(this.image, 0, 0, left, top, right - left, bottom - top)
-    this.stale = null
+        this.encoder.pixels(this.light, rgba, y * width + left, y * width + right);
+    if (overlay) lay(rgba);
+    this.context.putImageData(this.image, 0, 0, left, top, right - left, bottom - top);
+    this.stale = null;
   }
 
   /** @returns {Region} */
   whole() {
-    return [0, this.height, 0, this.width]
+    return [0, this.height, 0, this.width];
   }
 
   /** Bytes of codes and canvas. */
   memory() {
-    return 2 * this.image.data.byteLength
+    return 2 * this.image.data.byteLength;
   }
 }
 
 /** The smallest region that holds two. @param {Region | null} a @param {Region | null} b
  * @returns {Region | null} */
 export function union(a, b) {
-  if (!a || !b) return a ?? b
-  return [Math.min(a[0], b[0]), Math.max(a[1], b[1]), Math.min(a[2], b[2]), Math.max(a[3], b[3])]
+  if (!a || !b) return a ?? b;
+  return [Math.min(a[0], b[0]), Math.max(a[1], b[1]), Math.min(a[2], b[2]), Math.max(a[3], b[3])];
 }

@@ -5,103 +5,103 @@
  * their way at a time, and what is there is not fetched again.
  */
 
-/** @typedef {import('./protocol.js').Picture} Picture */
+/** @typedef {import("./protocol.js").Picture} Picture */
 
 /** Pictures on their way at a time. */
-const AT_ONCE = 4
+const AT_ONCE = 4;
 
 /** Milliseconds before what could not be fetched is tried again. */
-const AGAIN = 2000
+const AGAIN = 2000;
 
 export class Loader {
-  /** @param {import('./host.js').Host} host
+  /** @param {import("./host.js").Host} host
    * @param {(slot: string, name: string, picture: Picture) => void} use a picture for its slot
    * @param {(done: number, total: number) => void} tell */
   constructor(host, use, tell) {
-    this.host = host
-    this.use = use
-    this.tell = tell
+    this.host = host;
+    this.use = use;
+    this.tell = tell;
     /** @type {Record<string, number>} */
-    this.resources = {}
+    this.resources = {};
     /** Name of the picture that each slot is to have. @type {Map<string, string>} */
-    this.wanted = new Map()
+    this.wanted = new Map();
     /** What each slot has: name and generation. @type {Map<string, string>} */
-    this.there = new Map()
+    this.there = new Map();
     /** @type {Set<string>} */
-    this.onTheWay = new Set()
-    this.total = 0
-    this.isOver = false
+    this.onTheWay = new Set();
+    this.total = 0;
+    this.isOver = false;
   }
 
   /** Which pictures there are, by name. @param {Record<string, number>} resources */
   know(resources) {
-    this.resources = { ...this.resources, ...resources }
-    this.pump()
+    this.resources = { ...this.resources, ...resources };
+    this.pump();
   }
 
   /** Have a picture in a slot, and its newer ones. @param {string} slot
    * @param {string | null} name null for none any more */
   want(slot, name) {
-    if (name === null) this.wanted.delete(slot)
-    else this.wanted.set(slot, name)
-    this.pump()
+    if (name === null) this.wanted.delete(slot);
+    else this.wanted.set(slot, name);
+    this.pump();
   }
 
   /** A picture is another one. @param {string} name */
   renew(name) {
-    this.know({ [name]: (this.resources[name] ?? 0) + 0.5 })
+    this.know({ [name]: (this.resources[name] ?? 0) + 0.5 });
   }
 
   /** All is to be set again: the view has lost it. @param {(slot: string) => boolean} [which] */
   forget(which = () => true) {
-    for (const slot of [...this.there.keys()]) if (which(slot)) this.there.delete(slot)
-    this.pump()
+    for (const slot of [...this.there.keys()]) if (which(slot)) this.there.delete(slot);
+    this.pump();
   }
 
   /** Slots that do not have what they are to have. */
   missing() {
     return [...this.wanted].filter(
       ([slot, name]) => name in this.resources && this.there.get(slot) !== this.version(name),
-    )
+    );
   }
 
   /** @param {string} name */
   version(name) {
-    return `${this.resources[name]} ${name}`
+    return `${this.resources[name]} ${name}`;
   }
 
   pump() {
-    if (this.isOver) return
-    const missing = this.missing()
-    this.total = missing.length ? Math.max(this.total, missing.length) : 0
-    this.tell(this.total - missing.length, this.total)
+    if (this.isOver) return;
+    const missing = this.missing();
+    this.total = missing.length ? Math.max(this.total, missing.length) : 0;
+    this.tell(this.total - missing.length, this.total);
     for (const [slot, name] of missing) {
-      if (this.onTheWay.size >= AT_ONCE) return
-      if (!this.onTheWay.has(slot)) this.load(slot, name)
+      if (this.onTheWay.size >= AT_ONCE) return;
+      if (!this.onTheWay.has(slot)) this.load(slot, name);
     }
   }
 
   /** @param {string} slot @param {string} name */
   async load(slot, name) {
-    this.onTheWay.add(slot)
-    const version = this.version(name)
-    let wait = 0
+    this.onTheWay.add(slot);
+    const version = this.version(name);
+    let wait = 0;
     try {
-      const picture = await this.host.fetch(name)
+      const picture = await this.host.fetch(name);
       if (this.wanted.get(slot) === name && !this.isOver) {
-        this.there.set(slot, version)
-        this.use(slot, name, picture)
+        this.there.set(slot, version);
+        this.use(slot, name, picture);
       }
     } catch (error) {
-      wait = AGAIN
-      console.warn(error)
+      wait = AGAIN;
+      console.warn(error);
     }
-    if (wait) await new Promise((resolve) => setTimeout(resolve, wait))
-    this.onTheWay.delete(slot)
-    this.pump()
+    if (wait) await new Promise((resolve) => setTimeout(resolve, wait));
+    this.onTheWay.delete(slot);
+    this.pump();
   }
 
   close() {
-    this.isOver = true
+    this.isOver = true;
   }
 }

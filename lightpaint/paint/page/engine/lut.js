@@ -5,47 +5,50 @@
  * for all light below 2^low. In between it is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
  * Where no display value depends on another channel, one curve stands for the lattice.
  */
-import { VALUES } from './half.js'
+import { VALUES } from "./half.js";
 
-/** @typedef {import('./protocol.js').Picture} Picture */
-/** @typedef {import('./protocol.js').Shaper} Shaper */
+/** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {import("./protocol.js").Shaper} Shaper */
 
 /** lattice: (side, side, side, 3) display values, axes r, g, b; of sRGB null.
- * curve: (side,) where it is one for all channels, else null.
- * @typedef {{shaper: Shaper, lattice: Float32Array | null, curve: Float32Array | null}} Lut */
+ * codes: the same times 255. curve: (side,) where it is one for all channels, else null.
+ * @typedef {{shaper: Shaper, lattice: Float32Array | null, codes: Float32Array | null,
+ *   curve: Float32Array | null}} Lut */
 
 /** Exact, and what is shown until another one is there. @type {Readonly<Lut>} */
 export const SRGB = Object.freeze({
   shaper: { side: 2, low: -16, high: 0 },
   lattice: null,
+  codes: null,
   curve: null,
-})
+});
 
 /** @param {string} name of the transform @param {Picture} picture float16 @param {Shaper} shaper
  * @returns {Lut} */
 export function lutOf(name, picture, shaper) {
-  if (name === 'srgb') return SRGB
-  const { data } = picture
+  if (name === "srgb") return SRGB;
+  const { data } = picture;
   if (data.length !== shaper.side ** 3 * 3)
-    throw new Error(`a lattice of ${data.length} numbers, not of ${shaper.side}³ colours`)
-  const lattice = Float32Array.from(data, (bits) => VALUES[bits])
-  return { shaper, lattice, curve: curveOf(lattice, shaper.side) }
+    throw new Error(`a lattice of ${data.length} numbers, not of ${shaper.side}³ colours`);
+  const lattice = Float32Array.from(data, (bits) => VALUES[bits]);
+  const codes = lattice.map((value) => 255 * value);
+  return { shaper, lattice, codes, curve: curveOf(lattice, shaper.side) };
 }
 
 /** Display value in [0, 1] of light in [0, 1], by IEC 61966-2-1. @param {number} light */
 export function encodeSrgb(light) {
-  const x = Math.min(1, Math.max(0, light))
-  return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055
+  const x = Math.min(1, Math.max(0, light));
+  return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
 }
 
 /** Light of a display value in [0, 1]: undoes encodeSrgb. @param {number} display */
 export function decodeSrgb(display) {
-  return display <= 0.04045 ? display / 12.92 : ((display + 0.055) / 1.055) ** 2.4
+  return display <= 0.04045 ? display / 12.92 : ((display + 0.055) / 1.055) ** 2.4;
 }
 
 /** Steps of a table for each doubling of light: 2^9, so that none is wrong by a sixth of a code. */
-const BITS = 9
-const SHIFT = 23 - BITS
+const BITS = 9;
+const SHIFT = 23 - BITS;
 
 /**
  * Codes of many pixels. The upper bits of a float are its logarithm, piece by piece: they are the
@@ -55,97 +58,98 @@ const SHIFT = 23 - BITS
 export class Encoder {
   /** @param {Lut} lut @param {number} stops */
   constructor(lut, stops) {
-    this.lut = lut
-    this.stops = stops
-    const { low, high } = lut.shaper
-    const float = new Float32Array(1)
-    const bits = new Int32Array(float.buffer)
-    float[0] = 2 ** Math.max(-126, Math.floor(low - stops))
-    this.first = bits[0] >> SHIFT
-    float[0] = 2 ** Math.min(127, Math.ceil(high - stops))
-    const length = (bits[0] >> SHIFT) - this.first + 1
-    this.isCurve = !lut.lattice || !!lut.curve
-    this.table = this.isCurve ? new Uint8ClampedArray(length) : new Float32Array(length)
+    this.lut = lut;
+    this.stops = stops;
+    const { low, high } = lut.shaper;
+    const float = new Float32Array(1);
+    const bits = new Int32Array(float.buffer);
+    float[0] = 2 ** Math.max(-126, Math.floor(low - stops));
+    this.first = bits[0] >> SHIFT;
+    float[0] = 2 ** Math.min(127, Math.ceil(high - stops));
+    const length = (bits[0] >> SHIFT) - this.first + 1;
+    this.isCurve = !lut.lattice || !!lut.curve;
+    this.table = this.isCurve ? new Uint8ClampedArray(length) : new Float32Array(length);
     for (let i = 0; i < length; i++) {
-      bits[0] = ((this.first + i) << SHIFT) | (1 << (SHIFT - 1)) // the middle of the step
-      this.table[i] = this.at(Math.log2(float[0]) + stops)
+      bits[0] = ((this.first + i) << SHIFT) | (1 << (SHIFT - 1)); // the middle of the step
+      this.table[i] = this.at(Math.log2(float[0]) + stops);
     }
   }
 
   /** What the table holds for a logarithm of light. @param {number} log */
   at(log) {
-    const { shaper, lattice, curve } = this.lut
-    if (!lattice) return 255 * encodeSrgb(2 ** log)
-    const last = shaper.side - 1
-    const place = ((log - shaper.low) / (shaper.high - shaper.low)) * last
-    const kept = Math.min(last, Math.max(0, place))
-    if (!curve) return kept
-    const i = Math.min(last - 1, Math.floor(kept))
-    return 255 * (curve[i] + (kept - i) * (curve[i + 1] - curve[i]))
+    const { shaper, lattice, curve } = this.lut;
+    if (!lattice) return 255 * encodeSrgb(2 ** log);
+    const last = shaper.side - 1;
+    const place = ((log - shaper.low) / (shaper.high - shaper.low)) * last;
+    const kept = Math.min(last, Math.max(0, place));
+    if (!curve) return kept;
+    const i = Math.min(last - 1, Math.floor(kept));
+    return 255 * (curve[i] + (kept - i) * (curve[i + 1] - curve[i]));
   }
 
   /** Codes of pixels (…, 3) from one to another, into RGBA.
    * @param {Float32Array} light @param {Uint8ClampedArray} rgba @param {number} from
    * @param {number} to */
   pixels(light, rgba, from, to) {
-    const bits = new Int32Array(light.buffer, light.byteOffset, light.length)
-    if (this.isCurve) this.curved(bits, rgba, from, to)
-    else this.mixed(bits, rgba, from, to)
+    const bits = new Int32Array(light.buffer, light.byteOffset, light.length);
+    if (this.isCurve) this.curved(bits, rgba, from, to);
+    else this.mixed(bits, rgba, from, to);
   }
 
   /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} from
    * @param {number} to */
   curved(bits, rgba, from, to) {
-    const { table, first } = this
-    const last = table.length - 1
+    const { table, first } = this;
+    const last = table.length - 1;
     for (let p = from; p < to; p++) {
-      const r = (bits[3 * p] >> SHIFT) - first
-      const g = (bits[3 * p + 1] >> SHIFT) - first
-      const b = (bits[3 * p + 2] >> SHIFT) - first
-      rgba[4 * p] = table[r < 0 ? 0 : r > last ? last : r]
-      rgba[4 * p + 1] = table[g < 0 ? 0 : g > last ? last : g]
-      rgba[4 * p + 2] = table[b < 0 ? 0 : b > last ? last : b]
-      rgba[4 * p + 3] = 255
+      const r = (bits[3 * p] >> SHIFT) - first;
+      const g = (bits[3 * p + 1] >> SHIFT) - first;
+      const b = (bits[3 * p + 2] >> SHIFT) - first;
+      rgba[4 * p] = table[r < 0 ? 0 : r > last ? last : r];
+      rgba[4 * p + 1] = table[g < 0 ? 0 : g > last ? last : g];
+      rgba[4 * p + 2] = table[b < 0 ? 0 : b > last ? last : b];
+      rgba[4 * p + 3] = 255;
     }
   }
 
   /** @param {Int32Array} bits @param {Uint8ClampedArray} rgba @param {number} from
    * @param {number} to */
   mixed(bits, rgba, from, to) {
-    const { table, first } = this
-    const lattice = /** @type {Float32Array} */ (this.lut.lattice)
-    const side = this.lut.shaper.side
-    const last = table.length - 1
-    const [red, green] = [side * side * 3, side * 3]
+    const { table, first } = this;
+    const codes = /** @type {Float32Array} */ (this.lut.codes);
+    const side = this.lut.shaper.side;
+    const last = table.length - 1;
+    const red = side * side * 3;
+    const green = side * 3;
     for (let p = from; p < to; p++) {
-      const i = (bits[3 * p] >> SHIFT) - first
-      const j = (bits[3 * p + 1] >> SHIFT) - first
-      const k = (bits[3 * p + 2] >> SHIFT) - first
-      const r = table[i < 0 ? 0 : i > last ? last : i]
-      const g = table[j < 0 ? 0 : j > last ? last : j]
-      const b = table[k < 0 ? 0 : k > last ? last : k]
-      const ir = r >= side - 1 ? side - 2 : r | 0
-      const ig = g >= side - 1 ? side - 2 : g | 0
-      const ib = b >= side - 1 ? side - 2 : b | 0
-      const [fr, fg, fb] = [r - ir, g - ig, b - ib]
-      const here = ir * red + ig * green + ib * 3
-      const [w00, w01] = [(1 - fr) * (1 - fg), (1 - fr) * fg]
-      const [w10, w11] = [fr * (1 - fg), fr * fg]
-      for (let c = 0; c < 3; c++) {
-        const a = here + c
-        const near =
-          w00 * lattice[a] +
-          w01 * lattice[a + green] +
-          w10 * lattice[a + red] +
-          w11 * lattice[a + red + green]
+      const i = (bits[3 * p] >> SHIFT) - first;
+      const j = (bits[3 * p + 1] >> SHIFT) - first;
+      const k = (bits[3 * p + 2] >> SHIFT) - first;
+      const r = table[i < 0 ? 0 : i > last ? last : i];
+      const g = table[j < 0 ? 0 : j > last ? last : j];
+      const b = table[k < 0 ? 0 : k > last ? last : k];
+      const ir = r >= side - 1 ? side - 2 : r | 0;
+      const ig = g >= side - 1 ? side - 2 : g | 0;
+      const ib = b >= side - 1 ? side - 2 : b | 0;
+      const fr = r - ir;
+      const fg = g - ig;
+      const fb = b - ib;
+      const w11 = fr * fg;
+      const w10 = fr - w11;
+      const w01 = fg - w11;
+      const w00 = 1 - fr - w01;
+      // From the nearer of two faces of the cell along blue to the farther one.
+      let a00 = ir * red + ig * green + ib * 3;
+      let a01 = a00 + green;
+      let a10 = a00 + red;
+      let a11 = a10 + green;
+      for (let c = 4 * p; c < 4 * p + 3; c++, a00++, a01++, a10++, a11++) {
+        const near = w00 * codes[a00] + w01 * codes[a01] + w10 * codes[a10] + w11 * codes[a11];
         const far =
-          w00 * lattice[a + 3] +
-          w01 * lattice[a + green + 3] +
-          w10 * lattice[a + red + 3] +
-          w11 * lattice[a + red + green + 3]
-        rgba[4 * p + c] = 255 * (near + fb * (far - near))
+          w00 * codes[a00 + 3] + w01 * codes[a01 + 3] + w10 * codes[a10 + 3] + w11 * codes[a11 + 3];
+        rgba[c] = near + fb * (far - near);
       }
-      rgba[4 * p + 3] = 255
+      rgba[4 * p + 3] = 255;
     }
   }
 }
@@ -153,12 +157,14 @@ export class Encoder {
 /** The curve of all channels, (side,), where the lattice is nothing else, to half a code.
  * @param {Float32Array} lattice @param {number} side */
 function curveOf(lattice, side) {
-  const curve = Float32Array.from({ length: side }, (_, i) => lattice[i * (side * side + side + 1) * 3])
-  let at = 0
+  const curve = Float32Array.from(
+    { length: side },
+    (_, i) => lattice[i * (side * side + side + 1) * 3],
+  );
+  let at = 0;
   for (let r = 0; r < side; r++)
     for (let g = 0; g < side; g++)
       for (let b = 0; b < side; b++)
-        for (const i of [r, g, b])
-          if (Math.abs(lattice[at++] - curve[i]) > 1 / 1024) return null
-  return curve
+        for (const i of [r, g, b]) if (Math.abs(lattice[at++] - curve[i]) > 1 / 1024) return null;
+  return curve;
 }

@@ -1,5 +1,5 @@
 /** Pictures that lights make together: Σ weights[k] · plane[k], without a GPU. */
-import { VALUES } from './half.js'
+import { VALUES } from "./half.js";
 
 /** @typedef {{halves: Uint16Array | null, scale: number}} Plane (h, w, 3), light at unit emission
  *   over scale */
@@ -11,70 +11,78 @@ import { VALUES } from './half.js'
 export class Mix {
   /** @param {[height: number, width: number]} size */
   constructor(size) {
-    this.size = size
-    this.weights = new Float64Array()
+    this.size = size;
+    this.weights = new Float64Array();
     /** What `light` holds. @type {Float64Array | null} */
-    this.mixed = null
-    this.step = 1
-    this.isExact = true
-    this.full = new Float32Array(0)
-    this.half = new Float32Array(0)
+    this.mixed = null;
+    this.step = 1;
+    this.isExact = true;
+    this.full = new Float32Array(0);
+    this.half = new Float32Array(0);
   }
 
   /** Height and width of what is mixed. @param {number} step */
   sizeAt(step) {
-    return this.size.map((n) => Math.ceil(n / step))
+    return this.size.map((n) => Math.ceil(n / step));
   }
 
   /** (h, w, 3) linear, at the step of the last update. */
   get light() {
-    return this.step === 1 ? this.full : this.half
+    return this.step === 1 ? this.full : this.half;
   }
 
   /** Planes have changed. */
   forget() {
-    this.mixed = null
+    this.mixed = null;
   }
 
   /** Mix what has changed. live: whether sums may be carried on, which rounds.
    * @param {Plane[]} planes @param {number} step 1 or 2 @param {boolean} live
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {
-    const wanted = this.weights
-    const before = step === this.step ? this.mixed : null
-    const isSame = before !== null && wanted.every((w, i) => w === before[i])
-    if (isSame && (live || this.isExact)) return false
+    const wanted = this.weights;
+    const before = step === this.step ? this.mixed : null;
+    const isSame = before !== null && wanted.every((w, i) => w === before[i]);
+    if (isSame && (live || this.isExact)) return false;
     const changed = before
-      ? planes.map((_, k) => k).filter((k) => [0, 1, 2].some((c) => wanted[3 * k + c] !== before[3 * k + c]))
-      : []
-    this.step = step
-    const isCarried = live && before !== null && 2 * changed.length <= planes.length
+      ? planes
+          .map((_, k) => k)
+          .filter((k) => [0, 1, 2].some((c) => wanted[3 * k + c] !== before[3 * k + c]))
+      : [];
+    this.step = step;
+    const isCarried = live && before !== null && 2 * changed.length <= planes.length;
     if (isCarried) {
-      const more = wanted.map((w, i) => w - before[i])
-      this.add(planes, changed, more, false)
-    } else this.add(planes, planes.map((_, k) => k), wanted, true)
-    this.isExact = !isCarried
-    this.mixed = wanted.slice()
-    return true
+      const more = wanted.map((w, i) => w - before[i]);
+      this.add(planes, changed, more, false);
+    } else
+      this.add(
+        planes,
+        planes.map((_, k) => k),
+        wanted,
+        true,
+      );
+    this.isExact = !isCarried;
+    this.mixed = wanted.slice();
+    return true;
   }
 
   /** @param {Plane[]} planes @param {number[]} which @param {Float64Array} weights
    * @param {boolean} fresh */
   add(planes, which, weights, fresh) {
-    const [height, width] = this.sizeAt(this.step)
-    const name = this.step === 1 ? 'full' : 'half'
-    if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3)
-    const terms = []
+    const [height, width] = this.sizeAt(this.step);
+    const name = this.step === 1 ? "full" : "half";
+    if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3);
+    const terms = [];
     for (const k of which) {
-      const { halves, scale } = planes[k]
-      const [r, g, b] = [0, 1, 2].map((c) => weights[3 * k + c] * scale)
-      if (halves && (r || g || b)) terms.push({ halves, weights: [r, g, b] })
+      const { halves, scale } = planes[k];
+      const [r, g, b] = [0, 1, 2].map((c) => weights[3 * k + c] * scale);
+      if (halves && (r || g || b)) terms.push({ halves, weights: [r, g, b] });
     }
-    addPlanes(this[name], terms, this.size[1], width, this.step, fresh)
+    addPlanes(this[name], terms, this.size[1], width, this.step, fresh);
   }
 
   memory() {
-    return this.full.byteLength + this.half.byteLength
+    return this.full.byteLength + this.half.byteLength;
   }
 }
 
@@ -85,38 +93,39 @@ export class Mix {
  * @param {number} width of the light @param {number} step @param {boolean} fresh whether light
  * starts from black */
 export function addPlanes(light, terms, across, width, step, fresh) {
-  let isFresh = fresh
-  let done = 0
+  let isFresh = fresh;
+  let done = 0;
   for (; done + 4 <= terms.length; done += 4) {
-    addFour(light, terms.slice(done, done + 4), across, width, step, isFresh)
-    isFresh = false
+    addFour(light, terms.slice(done, done + 4), across, width, step, isFresh);
+    isFresh = false;
   }
-  if (isFresh) light.fill(0)
-  for (; done < terms.length; done++) addOne(light, terms[done], across, width, step)
+  if (isFresh) light.fill(0);
+  for (; done < terms.length; done++) addOne(light, terms[done], across, width, step);
 }
 
 /** @param {Float32Array} light @param {Term[]} terms @param {number} across
  * @param {number} width @param {number} step @param {boolean} fresh */
 function addFour(light, terms, across, width, step, fresh) {
-  const [a, b, c, d] = terms.map((term) => term.halves)
-  const [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]] = terms.map((x) => x.weights)
-  const values = VALUES
-  const [stride, row] = [3 * step, 3 * width]
+  const [a, b, c, d] = terms.map((term) => term.halves);
+  const [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]] = terms.map((x) => x.weights);
+  const values = VALUES;
+  const [stride, row] = [3 * step, 3 * width];
   for (let to = 0, y = 0; to < light.length; y += step) {
-    const end = to + row
+    const end = to + row;
     for (let i = 3 * across * y; to < end; i += stride, to += 3) {
-      const [j, k] = [i + 1, i + 2]
-      const r = a0 * values[a[i]] + b0 * values[b[i]] + c0 * values[c[i]] + d0 * values[d[i]]
-      const g = a1 * values[a[j]] + b1 * values[b[j]] + c1 * values[c[j]] + d1 * values[d[j]]
-      const e = a2 * values[a[k]] + b2 * values[b[k]] + c2 * values[c[k]] + d2 * values[d[k]]
+      const j = i + 1;
+      const k = i + 2;
+      const r = a0 * values[a[i]] + b0 * values[b[i]] + c0 * values[c[i]] + d0 * values[d[i]];
+      const g = a1 * values[a[j]] + b1 * values[b[j]] + c1 * values[c[j]] + d1 * values[d[j]];
+      const e = a2 * values[a[k]] + b2 * values[b[k]] + c2 * values[c[k]] + d2 * values[d[k]];
       if (fresh) {
-        light[to] = r
-        light[to + 1] = g
-        light[to + 2] = e
+        light[to] = r;
+        light[to + 1] = g;
+        light[to + 2] = e;
       } else {
-        light[to] += r
-        light[to + 1] += g
-        light[to + 2] += e
+        light[to] += r;
+        light[to + 1] += g;
+        light[to + 2] += e;
       }
     }
   }
@@ -125,15 +134,15 @@ function addFour(light, terms, across, width, step, fresh) {
 /** @param {Float32Array} light @param {Term} term @param {number} across @param {number} width
  * @param {number} step */
 function addOne(light, { halves, weights }, across, width, step) {
-  const [r, g, b] = weights
-  const values = VALUES
-  const [stride, row] = [3 * step, 3 * width]
+  const [r, g, b] = weights;
+  const values = VALUES;
+  const [stride, row] = [3 * step, 3 * width];
   for (let to = 0, y = 0; to < light.length; y += step) {
-    const end = to + row
+    const end = to + row;
     for (let i = 3 * across * y; to < end; i += stride, to += 3) {
-      light[to] += r * values[halves[i]]
-      light[to + 1] += g * values[halves[i + 1]]
-      light[to + 2] += b * values[halves[i + 2]]
+      light[to] += r * values[halves[i]];
+      light[to + 1] += g * values[halves[i + 1]];
+      light[to + 2] += b * values[halves[i + 2]];
     }
   }
 }

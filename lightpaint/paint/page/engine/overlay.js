@@ -6,7 +6,7 @@
  */
 
 /** Light at the middle of false colour. */
-export const GREY = 0.18
+export const GREY = 0.18;
 
 /** Codes of false colour: from six stops below grey to six above, in whole stops. */
 export const BANDS = [
@@ -23,7 +23,7 @@ export const BANDS = [
   [236, 116, 44],
   [220, 60, 56],
   [255, 220, 228],
-]
+];
 
 /** Codes of: too dark, too bright, beyond reach, importance. */
 export const INKS = {
@@ -31,36 +31,36 @@ export const INKS = {
   bright: [255, 148, 40],
   beyond: [232, 72, 200],
   importance: [72, 208, 140],
-}
+};
 
 /** Difference of codes at which ink covers what it lies on. */
-export const FULL = 64
+export const FULL = 64;
 
 /** Luma of codes, for what stays under ink. */
-export const LUMA = [0.2126, 0.7152, 0.0722]
+export const LUMA = [0.2126, 0.7152, 0.0722];
 
 /** Device pixels from one line of a hatch to the next, and of them, how many have less ink. */
-export const HATCH = { period: 8, thin: 4, strength: 0.55 }
+export const HATCH = { period: 8, thin: 4, strength: 0.55 };
 
 /** Band of false colour of a luminance, exposure included. @param {number} luminance */
 export function band(luminance) {
-  const stops = Math.log2(Math.max(luminance, 1e-9) / GREY)
-  return Math.min(BANDS.length - 1, Math.max(0, Math.floor(stops + 0.5) + 6))
+  const stops = Math.log2(Math.max(luminance, 1e-9) / GREY);
+  return Math.min(BANDS.length - 1, Math.max(0, Math.floor(stops + 0.5) + 6));
 }
 
 /** How much ink a hatch lets through at a pixel of the picture; slope ±1.
  * @param {number} x @param {number} y @param {number} slope */
 export function hatch(x, y, slope) {
-  const along = (((x + slope * y) % HATCH.period) + HATCH.period) % HATCH.period
-  return along < HATCH.thin ? HATCH.strength : 1
+  const along = (((x + slope * y) % HATCH.period) + HATCH.period) % HATCH.period;
+  return along < HATCH.thin ? HATCH.strength : 1;
 }
 
 /** Lay ink over a pixel of RGBA: what is below loses its colour and half its light.
  * @param {Uint8ClampedArray} rgba @param {number} at @param {number[]} ink
  * @param {number} amount 0 to 1 */
 export function lay(rgba, at, ink, amount) {
-  const grey = (LUMA[0] * rgba[at] + LUMA[1] * rgba[at + 1] + LUMA[2] * rgba[at + 2]) * 0.6
-  for (let c = 0; c < 3; c++) rgba[at + c] = grey + (ink[c] - grey) * amount
+  const grey = (LUMA[0] * rgba[at] + LUMA[1] * rgba[at + 1] + LUMA[2] * rgba[at + 2]) * 0.6;
+  for (let c = 0; c < 3; c++) rgba[at + c] = grey + (ink[c] - grey) * amount;
 }
 
 /** Which pixels a picture shows: of (height, width), each `step`th of each `step`th row.
@@ -69,9 +69,9 @@ export function lay(rgba, at, ink, amount) {
 /** For each pixel shown: its place in RGBA, and its column, row and place in the whole picture.
  * @param {Grid} grid @param {(at: number, x: number, y: number, p: number) => void} visit */
 function each({ height, width, step }, visit) {
-  let at = 0
+  let at = 0;
   for (let y = 0; y < height; y += step)
-    for (let x = 0; x < width; x += step, at += 4) visit(at, x, y, y * width + x)
+    for (let x = 0; x < width; x += step, at += 4) visit(at, x, y, y * width + x);
 }
 
 /** Missed: solution beside painting, both as codes, where something is painted.
@@ -79,35 +79,35 @@ function each({ height, width, step }, visit) {
  * @param {Float32Array} importance @param {Grid} grid of the solution */
 export function missed(rgba, painting, importance, grid) {
   each(grid, (at, x, y, p) => {
-    const r = rgba[at] - painting[4 * p]
-    const g = rgba[at + 1] - painting[4 * p + 1]
-    const b = rgba[at + 2] - painting[4 * p + 2]
-    const most = Math.max(Math.abs(r), Math.abs(g), Math.abs(b))
-    const isDark = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b < 0
-    const amount = importance[p] > 0 ? Math.min(1, most / FULL) : 0
-    lay(rgba, at, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1))
-  })
+    const r = rgba[at] - painting[4 * p];
+    const g = rgba[at + 1] - painting[4 * p + 1];
+    const b = rgba[at + 2] - painting[4 * p + 2];
+    const most = Math.max(Math.abs(r), Math.abs(g), Math.abs(b));
+    const isDark = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b < 0;
+    const amount = importance[p] > 0 ? Math.min(1, most / FULL) : 0;
+    lay(rgba, at, isDark ? INKS.dark : INKS.bright, amount * hatch(x, y, isDark ? -1 : 1));
+  });
 }
 
 /** @param {Uint8ClampedArray} rgba changed @param {ArrayLike<number>} amounts (h, w)
  * @param {number} most what stands for all @param {number[]} ink @param {Grid} grid */
 export function inked(rgba, amounts, most, ink, grid) {
   each(grid, (at, x, y, p) => {
-    const amount = Math.min(1, Math.max(0, amounts[p] / most)) * 0.8
-    lay(rgba, at, ink, amount * hatch(x, y, 1))
-  })
+    const amount = Math.min(1, Math.max(0, amounts[p] / most)) * 0.8;
+    lay(rgba, at, ink, amount * hatch(x, y, 1));
+  });
 }
 
 /** @param {Uint8ClampedArray} rgba changed @param {Float32Array} light (…, 3)
  * @param {number} gain of the exposure */
 export function falseColour(rgba, light, gain) {
   for (let p = 0; p < light.length / 3; p++) {
-    const i = 3 * p
-    const y = LUMA[0] * light[i] + LUMA[1] * light[i + 1] + LUMA[2] * light[i + 2]
-    const [r, g, b] = BANDS[band(y * gain)]
-    rgba[4 * p] = r
-    rgba[4 * p + 1] = g
-    rgba[4 * p + 2] = b
-    rgba[4 * p + 3] = 255
+    const i = 3 * p;
+    const y = LUMA[0] * light[i] + LUMA[1] * light[i + 1] + LUMA[2] * light[i + 2];
+    const [r, g, b] = BANDS[band(y * gain)];
+    rgba[4 * p] = r;
+    rgba[4 * p + 1] = g;
+    rgba[4 * p + 2] = b;
+    rgba[4 * p + 3] = 255;
   }
 }

@@ -4,66 +4,66 @@
  * It holds the painting, shows the pictures, turns what the hand does into strokes, and follows
  * what the session says of pixels and weights.
  */
-import { luminance } from './colour.js'
-import { FIRST, LABELS, Stroke, askFor } from './hand.js'
-import { Hearers, SocketHost } from './host.js'
-import { union } from './layer.js'
-import { Screen } from './screen.js'
-import { at, zoomed } from './view.js'
-import { Work } from './work.js'
+import { luminance } from "./colour.js";
+import { FIRST, LABELS, Stroke, askFor } from "./hand.js";
+import { Hearers, SocketHost } from "./host.js";
+import { union } from "./layer.js";
+import { Screen } from "./screen.js";
+import { at, zoomed } from "./view.js";
+import { Work } from "./work.js";
 
-/** @typedef {import('./brush.js').Point} Point */
-/** @typedef {import('./hand.js').Use} Use */
-/** @typedef {import('./host.js').Host} Host */
-/** @typedef {import('./protocol.js').Region} Region */
-/** @typedef {import('./protocol.js').RGB} RGB */
-/** @typedef {import('./view.js').Kind} Kind */
-/** @typedef {import('./view.js').Pane} Pane */
+/** @typedef {import("./brush.js").Point} Point */
+/** @typedef {import("./hand.js").Use} Use */
+/** @typedef {import("./host.js").Host} Host */
+/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./protocol.js").RGB} RGB */
+/** @typedef {import("./view.js").Kind} Kind */
+/** @typedef {import("./view.js").Pane} Pane */
 
 /** The session behind the server that the page came from. @returns {Host} */
 export function openHost() {
-  const host = new SocketHost()
-  host.open()
-  return host
+  const host = new SocketHost();
+  host.open();
+  return host;
 }
 
 /** @param {Host} host @param {{view?: 'gl' | 'cpu' | null}} [options]
  * @returns {Painter} */
 export function openEngine(host, options = {}) {
-  const asked = new URLSearchParams(location.search).get('view')
-  const view = options.view ?? (asked === 'gl' || asked === 'cpu' ? asked : null)
-  return new Painter(host, { view })
+  const asked = new URLSearchParams(location.search).get("view");
+  const view = options.view ?? (asked === "gl" || asked === "cpu" ? asked : null);
+  return new Painter(host, { view });
 }
 
 export class Painter extends Hearers {
   /** @param {Host} host @param {{view: 'gl' | 'cpu' | null}} options */
   constructor(host, { view }) {
-    super()
-    this.element = document.createElement('div')
-    this.element.className = 'pictures'
-    this.screen = new Screen(this.element, { view, refill: () => this.work.refill() })
-    this.work = new Work(host, this.screen, (kind, event) => this.tell(kind, event))
+    super();
+    this.element = document.createElement("div");
+    this.element.className = "pictures";
+    this.screen = new Screen(this.element, { view, refill: () => this.work.refill() });
+    this.work = new Work(host, this.screen, (kind, event) => this.tell(kind, event));
     /** @type {Stroke | null} */
-    this.stroke = null
+    this.stroke = null;
     /** @type {Use} */
-    this.hand = FIRST
+    this.hand = FIRST;
   }
 
   // What is shown
 
   /** @param {number} width @param {number} height in CSS pixels */
   resize(width, height) {
-    this.screen.resize(width, height)
+    this.screen.resize(width, height);
   }
 
-  /** @param {import('./work.js').Show} show */
+  /** @param {import("./work.js").Show} show */
   show(show) {
-    this.work.show(show)
+    this.work.show(show);
   }
 
   /** In CSS pixels of the element. @returns {(Omit<Pane, 'middle'>)[]} */
   panes() {
-    const { ratio } = this.screen
+    const { ratio } = this.screen;
     return this.screen.panes().map(({ kind, ...pane }) => ({
       kind,
       x: pane.x / ratio,
@@ -73,133 +73,133 @@ export class Painter extends Hearers {
       scale: pane.scale / ratio,
       left: pane.left / ratio,
       top: pane.top / ratio,
-    }))
+    }));
   }
 
   /** What to show for the pictures to be larger by a factor around a place, in CSS pixels.
    * @param {number} x @param {number} y @param {number} factor */
   zoomAt(x, y, factor) {
-    const { ratio, params } = this.screen
-    const panes = this.screen.panes()
-    const [px, py] = [x * ratio, y * ratio]
-    return zoomed(params, at(panes, px, py)?.pane ?? panes[0], px, py, factor)
+    const { ratio, params } = this.screen;
+    const panes = this.screen.panes();
+    const [px, py] = [x * ratio, y * ratio];
+    return zoomed(params, at(panes, px, py)?.pane ?? panes[0], px, py, factor);
   }
 
   /** Light of a picture at a pixel. @param {Kind} kind @param {number} x @param {number} y
    * @returns {RGB} */
   lightAt(kind, x, y) {
-    const place = this.within(x, y)
-    return place && this.screen.view ? this.screen.view.lightAt(kind, ...place) : [0, 0, 0]
+    const place = this.within(x, y);
+    return place && this.screen.view ? this.screen.view.lightAt(kind, ...place) : [0, 0, 0];
   }
 
   /** What is seen at a pixel, and the share of each light in the answer's luminance there.
    * @param {number} x @param {number} y @returns {{object: string | null, shares: number[]} | null} */
   pointed(x, y) {
-    const place = this.within(x, y)
-    const { canvas, state, weights } = this.work
-    if (!place || !this.screen.view || !canvas || !state) return null
-    const light = this.screen.view.planesAt(...place).map((one, i) => one * weights[i])
+    const place = this.within(x, y);
+    const { canvas, state, weights } = this.work;
+    if (!place || !this.screen.view || !canvas || !state) return null;
+    const light = this.screen.view.planesAt(...place).map((one, i) => one * weights[i]);
     const levels = Array.from({ length: weights.length / 3 }, (_, k) =>
       Math.max(0, luminance(light.subarray(3 * k, 3 * k + 3))),
-    )
-    const whole = levels.reduce((a, b) => a + b, 0)
-    const object = state.objects?.[canvas.objectAt(...place)] ?? null
-    return { object, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) }
+    );
+    const whole = levels.reduce((a, b) => a + b, 0);
+    const object = state.objects?.[canvas.objectAt(...place)] ?? null;
+    return { object, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) };
   }
 
   /** @param {number} x @param {number} y @returns {[number, number] | null} */
   within(x, y) {
-    const [height, width] = this.screen.size
-    const [column, row] = [Math.floor(x), Math.floor(y)]
-    return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null
+    const [height, width] = this.screen.size;
+    const [column, row] = [Math.floor(x), Math.floor(y)];
+    return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
   }
 
   // What the hand does
 
   /** @param {Use} use */
   use(use) {
-    this.hand = use
+    this.hand = use;
   }
 
   /** Where strokes go, if there is any painting to be done. */
   get place() {
-    const { canvas, strokes, isReady } = this.work
-    return canvas && strokes && isReady ? { canvas, strokes } : null
+    const { canvas, strokes, isReady } = this.work;
+    return canvas && strokes && isReady ? { canvas, strokes } : null;
   }
 
   /** @param {Point} point in pixels of the picture */
   begin(point) {
-    if (this.stroke) this.end()
-    const { place } = this
-    if (!place || this.hand.tool === 'pick') return
-    const scale = this.panes()[0]?.scale ?? 1
-    this.stroke = new Stroke(place.canvas, this.hand, point, scale)
-    this.work.isPainting = true
-    place.strokes.begin()
-    this.touched(this.stroke.begin())
+    if (this.stroke) this.end();
+    const { place } = this;
+    if (!place || this.hand.tool === "pick") return;
+    const scale = this.panes()[0]?.scale ?? 1;
+    this.stroke = new Stroke(place.canvas, this.hand, point, scale);
+    this.work.isPainting = true;
+    place.strokes.begin();
+    this.touched(this.stroke.begin());
   }
 
   /** @param {Point[]} points */
   move(points) {
-    if (!this.stroke) return
-    this.touched(this.stroke.move(points))
-    if (this.stroke.use.tool === 'ask') this.tell('asking', this.stroke.asked)
+    if (!this.stroke) return;
+    this.touched(this.stroke.move(points));
+    if (this.stroke.use.tool === "ask") this.tell("asking", this.stroke.asked);
   }
 
   end() {
-    const { stroke, place } = this
-    if (!stroke || !place) return
-    const { stops, mired } = stroke.asked
-    if (stroke.use.tool === 'ask' && !stops && !mired) return this.cancel()
-    this.ended()
-    place.canvas.end()
-    place.strokes.end(LABELS[stroke.use.tool])
+    const { stroke, place } = this;
+    if (!stroke || !place) return;
+    const { stops, mired } = stroke.asked;
+    if (stroke.use.tool === "ask" && !stops && !mired) return this.cancel();
+    this.ended();
+    place.canvas.end();
+    place.strokes.end(LABELS[stroke.use.tool]);
   }
 
   /** The stroke that has begun is none. */
   cancel() {
-    const { stroke, place } = this
-    if (!stroke || !place) return
-    this.ended()
-    const region = place.canvas.drop()
-    place.strokes.drop()
-    if (region) this.work.redraw([region])
+    const { stroke, place } = this;
+    if (!stroke || !place) return;
+    this.ended();
+    const region = place.canvas.drop();
+    place.strokes.drop();
+    if (region) this.work.redraw([region]);
   }
 
   ended() {
-    this.stroke = null
-    this.work.isPainting = false
+    this.stroke = null;
+    this.work.isPainting = false;
   }
 
   /** A straight stroke, whole. @param {Point} from @param {Point} to */
   line(from, to) {
-    this.begin(from)
-    this.move([to])
-    this.end()
+    this.begin(from);
+    this.move([to]);
+    this.end();
   }
 
   /** Brighter and warmer by so much, in an object, or for null everywhere.
    * @param {{stops: number, mired: number, object: number | null}} asked */
   ask(asked) {
-    if (this.stroke) this.end()
-    const { place } = this
-    if (!place) return
-    place.strokes.begin()
-    this.touched([askFor(place.canvas, asked)])
-    place.canvas.end()
-    place.strokes.end(LABELS.ask)
+    if (this.stroke) this.end();
+    const { place } = this;
+    if (!place) return;
+    place.strokes.begin();
+    this.touched([askFor(place.canvas, asked)]);
+    place.canvas.end();
+    place.strokes.end(LABELS.ask);
   }
 
   /** @param {Region[]} regions */
   touched(regions) {
-    this.work.redraw(regions)
-    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0])
-    if (region) this.work.strokes?.touch(region)
+    this.work.redraw(regions);
+    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
+    if (region) this.work.strokes?.touch(region);
   }
 
   close() {
-    this.work.loader.close()
-    this.screen.close()
-    this.element.remove()
+    this.work.loader.close();
+    this.screen.close();
+    this.element.remove();
   }
 }

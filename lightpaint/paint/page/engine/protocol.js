@@ -6,7 +6,7 @@
  */
 
 /** Of this protocol. */
-export const VERSION = 1
+export const VERSION = 1;
 
 /** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
 /** An array; float16 is the bits of halves in a Uint16Array (see half.js).
@@ -40,26 +40,26 @@ const DTYPES = {
   float64: Float64Array,
   int16: Int16Array,
   uint8: Uint8Array,
-}
+};
 
 /** What the bytes of an array are.
  * @param {string} dtype @param {number[]} shape @param {ArrayBuffer} buffer @param {number} at
  * @returns {Picture} */
 export function pictureOf(dtype, shape, buffer, at = 0) {
-  const made = DTYPES[dtype]
-  const length = shape.reduce((a, b) => a * b, 1)
-  if (!made) throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(', ')}`)
+  const made = DTYPES[dtype];
+  const length = shape.reduce((a, b) => a * b, 1);
+  if (!made) throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(", ")}`);
   if (at + length * made.BYTES_PER_ELEMENT > buffer.byteLength)
-    throw new Error(`${buffer.byteLength} bytes are no array of shape ${shape.join(' × ')}`)
-  return { data: new made(buffer, at, length), shape }
+    throw new Error(`${buffer.byteLength} bytes are no array of shape ${shape.join(" × ")}`);
+  return { data: new made(buffer, at, length), shape };
 }
 
 /** Name of what an array holds. Halves travel from session to page only.
  * @param {Data} data */
 export function dtypeOf(data) {
   for (const [name, made] of Object.entries(DTYPES))
-    if (name !== 'float16' && data instanceof made) return name
-  throw new Error('an array that no message holds')
+    if (name !== "float16" && data instanceof made) return name;
+  throw new Error("an array that no message holds");
 }
 
 /** What `buffers` says of some arrays.
@@ -69,38 +69,36 @@ export function described(arrays) {
     name,
     dtype: dtypeOf(data),
     shape,
-  }))
+  }));
 }
 
 /** One binary frame of a message.
  * @param {Record<string, unknown>} content @param {Arrays} [arrays]
  * @returns {ArrayBuffer} */
 export function frame(content, arrays = {}) {
-  const text = new TextEncoder().encode(
-    JSON.stringify({ ...content, buffers: described(arrays) }),
-  )
-  const pictures = Object.values(arrays)
-  const start = padded(4 + text.length)
-  const size = pictures.reduce((at, { data }) => at + padded(data.byteLength), start)
-  const made = new ArrayBuffer(size)
-  new DataView(made).setUint32(0, text.length, true)
-  const bytes = new Uint8Array(made)
-  bytes.set(text, 4)
-  let at = start
+  const text = new TextEncoder().encode(JSON.stringify({ ...content, buffers: described(arrays) }));
+  const pictures = Object.values(arrays);
+  const start = padded(4 + text.length);
+  const size = pictures.reduce((at, { data }) => at + padded(data.byteLength), start);
+  const made = new ArrayBuffer(size);
+  new DataView(made).setUint32(0, text.length, true);
+  const bytes = new Uint8Array(made);
+  bytes.set(text, 4);
+  let at = start;
   for (const { data } of pictures) {
-    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), at)
-    at += padded(data.byteLength)
+    bytes.set(new Uint8Array(data.buffer, data.byteOffset, data.byteLength), at);
+    at += padded(data.byteLength);
   }
-  return made
+  return made;
 }
 
 /** The message of a binary frame. Throws for what is none.
  * @param {ArrayBuffer} buffer @returns {Message} */
 export function unframe(buffer) {
-  const length = new DataView(buffer).getUint32(0, true)
-  if (4 + length > buffer.byteLength) throw new Error('a frame that is cut short')
-  const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)))
-  return withArrays(content, buffer, padded(4 + length))
+  const length = new DataView(buffer).getUint32(0, true);
+  if (4 + length > buffer.byteLength) throw new Error("a frame that is cut short");
+  const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  return withArrays(content, buffer, padded(4 + length));
 }
 
 /** A message whose buffers lie one after the other, each padded.
@@ -108,15 +106,15 @@ export function unframe(buffer) {
  * @returns {Message} */
 function withArrays(content, buffer, at) {
   /** @type {Arrays} */
-  const arrays = {}
+  const arrays = {};
   for (const { name, dtype, shape } of /** @type {About[]} */ (content.buffers ?? [])) {
-    arrays[name] = pictureOf(dtype, shape, buffer, at)
-    at += padded(arrays[name].data.byteLength)
+    arrays[name] = pictureOf(dtype, shape, buffer, at);
+    at += padded(arrays[name].data.byteLength);
   }
-  return { ...content, kind: String(content.kind), arrays }
+  return { ...content, kind: String(content.kind), arrays };
 }
 
 /** @param {number} size */
 function padded(size) {
-  return (size + 7) & ~7
+  return (size + 7) & ~7;
 }

@@ -1,126 +1,131 @@
 /** Where the pictures are drawn: one view, its size in device pixels, and when it draws. */
-import { chooseView } from './choose.js'
-import { DEFAULTS, panes } from './view.js'
+import { chooseView } from "./choose.js";
+import { DEFAULTS, panes } from "./view.js";
 
-/** @typedef {import('./view.js').PictureView} PictureView */
-/** @typedef {import('./view.js').Params} Params */
-/** @typedef {import('./view.js').Pane} Pane */
+/** @typedef {import("./view.js").PictureView} PictureView */
+/** @typedef {import("./view.js").Params} Params */
+/** @typedef {import("./view.js").Pane} Pane */
 
 /** Milliseconds after which a picture that was drawn quickly is drawn sharply. */
-const REST = 180
+const REST = 180;
 
 /** Milliseconds that a GPU has to come back. */
-const PATIENCE = 3000
+const PATIENCE = 3000;
 
 export class Screen {
   /** @param {HTMLElement} element
    * @param {{view?: 'gl' | 'cpu' | null, refill: () => void}} options refill: all that is shown is to
    * be set again */
   constructor(element, options) {
-    this.element = element
-    this.options = options
+    this.element = element;
+    this.options = options;
     /** @type {PictureView | null} */
-    this.view = null
+    this.view = null;
     /** @type {[number, number]} */
-    this.size = [1, 1]
-    this.count = 0
+    this.size = [1, 1];
+    this.count = 0;
     /** @type {Params} */
-    this.params = { ...DEFAULTS }
-    this.width = 0
-    this.height = 0
-    this.frame = 0
-    this.isLive = false
+    this.params = { ...DEFAULTS };
+    this.width = 0;
+    this.height = 0;
+    this.frame = 0;
+    this.isLive = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.rest = undefined
+    this.rest = undefined;
+    /** Milliseconds that a GPU has to come back. */
+    this.patience = PATIENCE;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this.patience = undefined
+    this.waiting = undefined;
   }
 
   /** A view of pictures of a size, and of so many lights.
    * @param {[height: number, width: number]} size @param {number} count
    * @param {'gl' | 'cpu' | null} [which] */
   begin(size, count, which = this.options.view ?? null) {
-    this.view?.close()
-    this.view?.canvas.remove()
-    this.size = size
-    this.count = count
-    const onRestored = () => this.restored()
-    this.view = chooseView(this.element, size, count, { view: which, onRestored })
-    this.view.canvas.addEventListener('webglcontextlost', () => this.lost())
-    this.fit()
+    this.view?.close();
+    this.view?.canvas.remove();
+    this.size = size;
+    this.count = count;
+    const onRestored = () => this.restored();
+    this.view = chooseView(this.element, size, count, { view: which, onRestored });
+    this.view.canvas.addEventListener("webglcontextlost", () => this.lost());
+    this.fit();
   }
 
   /** The GPU has gone; without it, if it does not come back. */
   lost() {
-    clearTimeout(this.patience)
-    this.patience = setTimeout(() => {
-      this.begin(this.size, this.count, 'cpu')
-      this.options.refill()
-    }, PATIENCE)
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => {
+      this.begin(this.size, this.count, "cpu");
+      this.options.refill();
+    }, this.patience);
   }
 
   restored() {
-    clearTimeout(this.patience)
-    this.view?.setCount(this.count)
-    this.options.refill()
+    clearTimeout(this.waiting);
+    this.view?.setCount(this.count);
+    this.options.refill();
   }
 
   /** @param {number} width @param {number} height in CSS pixels */
   resize(width, height) {
-    this.width = width
-    this.height = height
-    this.fit()
+    this.width = width;
+    this.height = height;
+    this.fit();
   }
 
   /** As many pixels as the display has. */
   fit() {
-    if (!this.view) return
-    const { canvas } = this.view
-    canvas.style.width = `${this.width}px`
-    canvas.style.height = `${this.height}px`
-    const [width, height] = [this.width, this.height].map((n) => Math.max(1, Math.round(n * this.ratio)))
-    if (canvas.width !== width) canvas.width = width
-    if (canvas.height !== height) canvas.height = height
-    this.now()
+    if (!this.view) return;
+    const { canvas } = this.view;
+    canvas.style.display = "block";
+    canvas.style.width = `${this.width}px`;
+    canvas.style.height = `${this.height}px`;
+    const [width, height] = [this.width, this.height].map((n) =>
+      Math.max(1, Math.round(n * this.ratio)),
+    );
+    if (canvas.width !== width) canvas.width = width;
+    if (canvas.height !== height) canvas.height = height;
+    this.now();
   }
 
   /** Device pixels for each CSS pixel. */
   get ratio() {
-    return Math.max(1, window.devicePixelRatio || 1)
+    return Math.max(1, window.devicePixelRatio || 1);
   }
 
   /** In device pixels. @returns {Pane[]} */
   panes() {
-    const [width, height] = [this.width * this.ratio, this.height * this.ratio].map(Math.round)
-    return panes(this.params, { width, height }, this.size)
+    const [width, height] = [this.width * this.ratio, this.height * this.ratio].map(Math.round);
+    return panes(this.params, { width, height }, this.size);
   }
 
   /** Draw soon. isLive: and once more, sharply, when nothing has come for a while.
    * @param {boolean} [isLive] */
   request(isLive = false) {
     if (isLive) {
-      this.isLive = true
-      clearTimeout(this.rest)
+      this.isLive = true;
+      clearTimeout(this.rest);
       this.rest = setTimeout(() => {
-        this.isLive = false
-        this.request()
-      }, REST)
+        this.isLive = false;
+        this.request();
+      }, REST);
     }
-    this.frame ||= requestAnimationFrame(() => this.now())
+    this.frame ||= requestAnimationFrame(() => this.now());
   }
 
   now() {
-    cancelAnimationFrame(this.frame)
-    this.frame = 0
-    this.view?.draw({ ...this.params, live: this.isLive })
+    cancelAnimationFrame(this.frame);
+    this.frame = 0;
+    this.view?.draw({ ...this.params, live: this.isLive });
   }
 
   close() {
-    clearTimeout(this.rest)
-    clearTimeout(this.patience)
-    cancelAnimationFrame(this.frame)
-    this.view?.close()
-    this.view?.canvas.remove()
-    this.view = null
+    clearTimeout(this.rest);
+    clearTimeout(this.waiting);
+    cancelAnimationFrame(this.frame);
+    this.view?.close();
+    this.view?.canvas.remove();
+    this.view = null;
   }
 }

@@ -4,12 +4,12 @@
  * What changes in the meantime is sent together with the next one. A stroke that is done is kept
  * until the session has said that it has it, and sent again, whole, after a lost connection.
  */
-import { union } from './layer.js'
+import { union } from "./layer.js";
 
-/** @typedef {import('./protocol.js').Region} Region */
-/** @typedef {import('./protocol.js').Arrays} Arrays */
-/** @typedef {import('./protocol.js').Message} Message */
-/** @typedef {import('./canvas.js').PaintCanvas} PaintCanvas */
+/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./protocol.js").Arrays} Arrays */
+/** @typedef {import("./protocol.js").Message} Message */
+/** @typedef {import("./canvas.js").PaintCanvas} PaintCanvas */
 
 /** The stroke in progress. dirty: what is not sent. whole: where it has been.
  * @typedef {{stroke: number, dirty: Region | null, whole: Region | null, isKnown: boolean}} Live */
@@ -18,142 +18,154 @@ import { union } from './layer.js'
  *   {stroke: number, isDropped: true}} Left */
 
 export class Strokes {
-  /** @param {import('./host.js').Host} host @param {PaintCanvas} canvas
+  /** @param {import("./host.js").Host} host @param {PaintCanvas} canvas
    * @param {() => void} [refused] hears that the session has not taken a stroke */
   constructor(host, canvas, refused = () => {}) {
-    this.host = host
-    this.canvas = canvas
-    this.refused = refused
-    this.count = 0
+    this.host = host;
+    this.canvas = canvas;
+    this.refused = refused;
+    this.count = 0;
     /** @type {Live | null} */
-    this.live = null
+    this.live = null;
     /** @type {Left[]} */
-    this.left = []
-    this.isBusy = false
-    this.isOpen = true
+    this.left = [];
+    this.isBusy = false;
+    this.isOpen = true;
+    this.isOver = false;
     /** @type {(() => void)[]} */
-    this.waiting = []
+    this.waiting = [];
     /** Whether the next patch is of a stroke that the canvas has dropped already. */
-    this.isDropping = false
-    host.gate = () => this.settled()
-    host.on('connection', ({ state }) => this.connected(state === 'open'))
-    host.on('state', ({ stroke }) => {
-      this.count = Math.max(this.count, Number(stroke) || 0)
-    })
+    this.isDropping = false;
+    host.gate = () => this.settled();
+    host.on("connection", ({ state }) => this.connected(state === "open"));
+    // With another basis, a session begins anew with what is done.
+    host.on("renewed", () => {
+      if (this.live) this.live.dirty = this.live.whole;
+    });
+    host.on("state", ({ stroke }) => {
+      this.count = Math.max(this.count, Number(stroke) || 0);
+    });
+  }
+
+  /** Say nothing any more. */
+  close() {
+    this.isOver = true;
+    this.left = [];
+    this.tell();
   }
 
   /** Whether anything of a stroke is on its way, or will be. */
   get isPending() {
-    return this.isBusy || this.left.length > 0 || this.live !== null
+    return this.isBusy || this.left.length > 0 || this.live !== null;
   }
 
   /** Once all strokes that are done are answered. @returns {Promise<void>} */
   settled() {
     return new Promise((resolve) => {
-      this.waiting.push(resolve)
-      this.tell()
-    })
+      this.waiting.push(resolve);
+      this.tell();
+    });
   }
 
   tell() {
-    if (!this.left.length) for (const resolve of this.waiting.splice(0)) resolve()
+    if (!this.left.length) for (const resolve of this.waiting.splice(0)) resolve();
   }
 
   begin() {
-    this.live = { stroke: ++this.count, dirty: null, whole: null, isKnown: false }
+    this.live = { stroke: ++this.count, dirty: null, whole: null, isKnown: false };
   }
 
   /** Pixels of the stroke have changed. @param {Region} region */
   touch(region) {
-    if (!this.live || region[0] >= region[1] || region[2] >= region[3]) return
-    this.live.dirty = union(this.live.dirty, region)
-    this.live.whole = union(this.live.whole, region)
-    this.pump()
+    if (!this.live || region[0] >= region[1] || region[2] >= region[3]) return;
+    this.live.dirty = union(this.live.dirty, region);
+    this.live.whole = union(this.live.whole, region);
+    this.pump();
   }
 
   /** The stroke is done. @param {string} label what undo calls it */
   end(label) {
-    const { live } = this
-    this.live = null
+    const { live } = this;
+    this.live = null;
     if (live?.whole) {
-      const { stroke, whole } = live
-      const cut = live.dirty ?? /** @type {Region} */ ([whole[0], whole[0], whole[2], whole[2]])
-      this.left.push({ stroke, cut, whole, arrays: this.canvas.copy(whole), label })
+      const { stroke, whole } = live;
+      const cut = live.dirty ?? /** @type {Region} */ ([whole[0], whole[0], whole[2], whole[2]]);
+      this.left.push({ stroke, cut, whole, arrays: this.canvas.copy(whole), label });
     }
-    this.pump()
+    this.pump();
   }
 
   /** The stroke has never been; the canvas knows already. */
   drop() {
-    const { live } = this
-    this.live = null
-    if (live?.isKnown) this.left.push({ stroke: live.stroke, isDropped: true })
-    this.pump()
+    const { live } = this;
+    this.live = null;
+    if (live?.isKnown) this.left.push({ stroke: live.stroke, isDropped: true });
+    this.pump();
   }
 
   /** @param {boolean} isOpen */
   connected(isOpen) {
-    this.isOpen = isOpen
+    this.isOpen = isOpen;
     if (!isOpen) {
       // What of them was heard nobody knows.
-      for (const one of this.left) if (!('isDropped' in one)) one.cut = one.whole
-      if (this.live) this.live.dirty = this.live.whole
+      for (const one of this.left) if (!("isDropped" in one)) one.cut = one.whole;
+      if (this.live) this.live.dirty = this.live.whole;
     }
-    this.pump()
+    this.pump();
   }
 
   /** Send the next thing, if nothing is on its way. */
   pump() {
-    if (this.isBusy || !this.isOpen) return
-    const [next] = this.left
-    if (next && 'isDropped' in next) this.send('drop', { stroke: next.stroke }, {}, next)
+    if (this.isBusy || !this.isOpen || this.isOver) return;
+    const [next] = this.left;
+    if (next && "isDropped" in next) this.send("drop", { stroke: next.stroke }, {}, next);
     else if (next) {
-      const { stroke, cut, label } = next
-      this.send('paint', { stroke, region: cut, done: true, label }, cutOf(next), next)
+      const { stroke, cut, label } = next;
+      this.send("paint", { stroke, region: cut, done: true, label }, cutOf(next), next);
     } else if (this.live?.dirty) {
-      const { stroke, dirty } = this.live
-      this.live.dirty = null
-      this.live.isKnown = true
-      this.send('paint', { stroke, region: dirty, done: false }, this.canvas.copy(dirty), null)
+      const { stroke, dirty } = this.live;
+      this.live.dirty = null;
+      this.live.isKnown = true;
+      this.send("paint", { stroke, region: dirty, done: false }, this.canvas.copy(dirty), null);
     }
   }
 
   /** @param {string} kind @param {Record<string, unknown>} fields @param {Arrays} arrays
    * @param {Left | null} left what is answered with it */
   async send(kind, fields, arrays, left) {
-    this.isBusy = true
-    this.isDropping = kind === 'drop'
+    this.isBusy = true;
+    this.isDropping = kind === "drop";
     try {
-      const reply = await this.host.send(kind, fields, arrays)
-      if (left) this.left = this.left.filter((one) => one !== left)
-      if (left && reply.kind === 'failed') this.refused()
+      const reply = await this.host.send(kind, fields, arrays);
+      if (left) this.left = this.left.filter((one) => one !== left);
+      if (left && reply.kind === "failed") this.refused();
     } catch {
       // The connection is lost; `connected` says when it is there again.
-      this.isOpen = false
+      this.isOpen = false;
     }
-    this.isBusy = false
-    this.isDropping = false
-    this.tell()
-    this.pump()
+    this.isBusy = false;
+    this.isDropping = false;
+    this.tell();
+    this.pump();
   }
 }
 
 /** Of a stroke that is done, the pixels that have to be sent.
  * @param {{cut: Region, whole: Region, arrays: Arrays}} left @returns {Arrays} */
 function cutOf({ cut, whole, arrays }) {
-  const [height, width] = [cut[1] - cut[0], cut[3] - cut[2]]
-  if (cut === whole) return arrays
-  const across = whole[3] - whole[2]
+  const [height, width] = [cut[1] - cut[0], cut[3] - cut[2]];
+  if (cut === whole) return arrays;
+  const across = whole[3] - whole[2];
   /** @type {Arrays} */
-  const made = {}
+  const made = {};
   for (const [name, { data, shape }] of Object.entries(arrays)) {
-    const depth = shape[2] ?? 1
-    const part = new Float32Array(height * width * depth)
+    const depth = shape[2] ?? 1;
+    const part = new Float32Array(height * width * depth);
     for (let y = 0; y < height; y++) {
-      const from = ((cut[0] - whole[0] + y) * across + cut[2] - whole[2]) * depth
-      part.set(data.subarray(from, from + width * depth), y * width * depth)
+      const from = ((cut[0] - whole[0] + y) * across + cut[2] - whole[2]) * depth;
+      part.set(data.subarray(from, from + width * depth), y * width * depth);
     }
-    made[name] = { data: part, shape: [height, width, ...shape.slice(2)] }
+    made[name] = { data: part, shape: [height, width, ...shape.slice(2)] };
   }
-  return made
+  return made;
 }

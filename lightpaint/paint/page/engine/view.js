@@ -6,8 +6,8 @@
  * set last.
  */
 
-/** @typedef {import('./protocol.js').Region} Region */
-/** @typedef {import('./protocol.js').Shaper} Shaper */
+/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./protocol.js").Shaper} Shaper */
 
 /** The painting; the mix of the planes with the weights; the mix with other weights (another
  * look); a picture that was set by name.
@@ -29,17 +29,17 @@
 
 /** @type {Readonly<Params>} */
 export const DEFAULTS = Object.freeze({
-  left: 'painting',
-  right: 'solution',
-  layout: 'side',
+  left: "painting",
+  right: "solution",
+  layout: "side",
   wipe: 0.5,
-  blink: 'left',
+  blink: "left",
   zoom: 1,
   pan: /** @type {[number, number]} */ ([0, 0]),
   stops: 0,
   overlay: null,
   live: false,
-})
+});
 
 /**
  * A view of pictures of one size on one canvas.
@@ -56,7 +56,7 @@ export const DEFAULTS = Object.freeze({
  *   what changed, and the whole painting (h, w, 3) and importance (h, w). May keep both.
  * @property {(kind: 'verified' | 'present', halves: Uint16Array | null) => void} setPicture
  * @property {(beyond: Uint8Array | null) => void} setBeyond (h, w)
- * @property {(lut: import('./lut.js').Lut) => void} setLut
+ * @property {(lut: import("./lut.js").Lut) => void} setLut
  * @property {(params: Params) => void} draw
  * @property {(x: number, y: number, width: number, height: number) => Uint8Array} read
  *   RGBA truly on the canvas after the last draw, in device pixels from its top left
@@ -76,79 +76,75 @@ export const DEFAULTS = Object.freeze({
  * middle: of what the picture was fitted into */
 
 /** Device pixels between two panes. */
-export const GAP = 4
+export const GAP = 4;
 
 /** Device pixels for each of the picture from which on single pixels are shown as squares. */
-export const SQUARES = 2
+export const SQUARES = 2;
 
 /** Shown where no picture is. */
-export const GROUND = [24, 24, 26]
+export const GROUND = [24, 24, 26];
 
 /** What is drawn where. Of a wipe the second pane is in front, cut at the wipe.
  * @param {Params} params @param {{width: number, height: number}} canvas
  * @param {[height: number, width: number]} size of the picture @returns {Pane[]} */
 export function panes(params, canvas, size) {
-  const { width, height } = canvas
-  const whole = { x: 0, y: 0, width, height }
-  if (params.layout === 'blink')
-    return [placed(params[params.blink], whole, whole, params, size)]
-  if (params.layout === 'wipe') {
-    const cut = Math.round(width * Math.min(1, Math.max(0, params.wipe)))
-    const front = { ...whole, width: cut }
-    const back = { ...whole, x: cut, width: width - cut }
+  const { width, height } = canvas;
+  const whole = { x: 0, y: 0, width, height };
+  if (params.layout === "blink") return [placed(params[params.blink], whole, whole, params, size)];
+  if (params.layout === "wipe") {
+    const cut = Math.round(width * Math.min(1, Math.max(0, params.wipe)));
+    const front = { ...whole, width: cut };
+    const back = { ...whole, x: cut, width: width - cut };
     return [
       placed(params.right, back, whole, params, size),
       placed(params.left, front, whole, params, size),
-    ].filter((pane) => pane.width > 0)
+    ].filter((pane) => pane.width > 0);
   }
-  const beside = Math.max(1, Math.floor((width - GAP) / 2))
-  const above = Math.max(1, Math.floor((height - GAP) / 2))
-  const isBeside = fit([beside, height], size) >= fit([width, above], size)
-  const first = isBeside ? { ...whole, width: beside } : { ...whole, height: above }
-  const second = isBeside
-    ? { ...first, x: width - beside }
-    : { ...first, y: height - above }
+  const beside = Math.max(1, Math.floor((width - GAP) / 2));
+  const above = Math.max(1, Math.floor((height - GAP) / 2));
+  const isBeside = fit([beside, height], size) >= fit([width, above], size);
+  const first = isBeside ? { ...whole, width: beside } : { ...whole, height: above };
+  const second = isBeside ? { ...first, x: width - beside } : { ...first, y: height - above };
   return [
     placed(params.left, first, first, params, size),
     placed(params.right, second, second, params, size),
-  ]
+  ];
 }
 
 /** Which pixel of which picture lies at a place of the canvas, both not rounded; null between.
  * @param {Pane[]} shown @param {number} x @param {number} y */
 export function at(shown, x, y) {
   for (const pane of [...shown].reverse()) {
-    const isIn =
-      x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height
-    if (isIn) return { pane, ...inPicture(pane, x, y) }
+    const isIn = x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height;
+    if (isIn) return { pane, ...inPicture(pane, x, y) };
   }
-  return null
+  return null;
 }
 
 /** A place of the canvas in pixels of the picture of a pane, also beyond it.
  * @param {Pane} pane @param {number} x @param {number} y */
 export function inPicture(pane, x, y) {
-  return { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale }
+  return { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale };
 }
 
 /** Zoom by a factor so that what lies under a place of a pane stays there.
  * @param {Params} params @param {Pane} pane @param {number} x @param {number} y
  * @param {number} factor @returns {{zoom: number, pan: [number, number]}} */
 export function zoomed(params, pane, x, y, factor) {
-  const zoom = Math.min(64, Math.max(0.25, params.zoom * factor))
-  const scale = (pane.scale * zoom) / params.zoom
-  const kept = 1 / pane.scale - 1 / scale
-  const [across, down] = pane.middle
+  const zoom = Math.min(64, Math.max(0.25, params.zoom * factor));
+  const scale = (pane.scale * zoom) / params.zoom;
+  const kept = 1 / pane.scale - 1 / scale;
+  const [across, down] = pane.middle;
   return {
     zoom,
     pan: [params.pan[0] + (x - across) * kept, params.pan[1] + (y - down) * kept],
-  }
+  };
 }
 
 /** The zoom at which each pixel of the picture is one of the canvas.
  * @param {Params} params @param {Pane} pane */
 export function actualSize(params, pane) {
-  return params.zoom / pane.scale
+  return params.zoom / pane.scale;
 }
 
 /** @typedef {{x: number, y: number, width: number, height: number}} Box */
@@ -158,16 +154,16 @@ export function actualSize(params, pane) {
  * @param {Kind} kind @param {Box} box @param {Box} area @param {Params} params
  * @param {[number, number]} size @returns {Pane} */
 function placed(kind, box, area, params, [height, width]) {
-  const scale = fit([area.width, area.height], [height, width]) * params.zoom
+  const scale = fit([area.width, area.height], [height, width]) * params.zoom;
   /** @type {[number, number]} */
-  const middle = [area.x + area.width / 2, area.y + area.height / 2]
-  const left = Math.round(middle[0] - scale * (width / 2 + params.pan[0]))
-  const top = Math.round(middle[1] - scale * (height / 2 + params.pan[1]))
-  return { kind, ...box, scale, left, top, middle }
+  const middle = [area.x + area.width / 2, area.y + area.height / 2];
+  const left = Math.round(middle[0] - scale * (width / 2 + params.pan[0]));
+  const top = Math.round(middle[1] - scale * (height / 2 + params.pan[1]));
+  return { kind, ...box, scale, left, top, middle };
 }
 
 /** Device pixels for each of the picture where all of it is seen.
  * @param {[width: number, height: number]} area @param {[height: number, width: number]} size */
 function fit([across, down], [height, width]) {
-  return Math.max(1e-6, Math.min(across / width, down / height))
+  return Math.max(1e-6, Math.min(across / width, down / height));
 }

@@ -1,229 +1,243 @@
 /**
  * What the page has of the session: the painting, weights, pictures; and how they follow it.
  */
-import { PaintCanvas } from './canvas.js'
-import { union } from './layer.js'
-import { Loader } from './loader.js'
-import { SRGB, lutOf } from './lut.js'
-import { VERSION } from './protocol.js'
-import { Strokes } from './strokes.js'
+import { PaintCanvas } from "./canvas.js";
+import { union } from "./layer.js";
+import { Loader } from "./loader.js";
+import { SRGB, lutOf } from "./lut.js";
+import { VERSION } from "./protocol.js";
+import { Strokes } from "./strokes.js";
 
-/** @typedef {import('./host.js').Host} Host */
-/** @typedef {import('./protocol.js').Message} Message */
-/** @typedef {import('./protocol.js').Picture} Picture */
-/** @typedef {import('./protocol.js').Region} Region */
-/** @typedef {import('./protocol.js').RGB} RGB */
-/** @typedef {import('./screen.js').Screen} Screen */
+/** @typedef {import("./host.js").Host} Host */
+/** @typedef {import("./protocol.js").Message} Message */
+/** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./protocol.js").RGB} RGB */
+/** @typedef {import("./screen.js").Screen} Screen */
 
 /**
  * What is shown. gains: which lights are heard, null for all. instead, other: weights that the
  * solution and the other mix are shown with.
- * @typedef {Omit<import('./view.js').Params, 'live'> & {transform: string, clean: boolean,
+ * @typedef {Omit<import("./view.js").Params, 'live'> & {transform: string, clean: boolean,
  *   gains: boolean[] | null, instead: RGB[] | null, other: RGB[] | null}} Show
  */
 
 /** Pictures that are wanted as soon as there are any, by name. */
-const WANTED = ['present', 'albedo', 'objects', 'verified', 'beyond']
+const WANTED = ["present", "albedo", "objects", "verified", "beyond"];
 
 export class Work {
   /** @param {Host} host @param {Screen} screen
    * @param {(kind: string, event: any) => void} tell */
   constructor(host, screen, tell) {
-    this.host = host
-    this.screen = screen
-    this.tell = tell
+    this.host = host;
+    this.screen = screen;
+    this.tell = tell;
     this.loader = new Loader(
       host,
       (slot, name, picture) => this.loaded(slot, name, picture),
-      (done, total) => tell('loading', { done, total }),
-    )
+      (done, total) => tell("loading", { done, total }),
+    );
     /** @type {Message | null} */
-    this.state = null
+    this.state = null;
     /** @type {PaintCanvas | null} */
-    this.canvas = null
+    this.canvas = null;
     /** @type {Strokes | null} */
-    this.strokes = null
+    this.strokes = null;
     /** @type {Show | null} */
-    this.shown = null
-    this.weights = new Float64Array()
-    this.version = -1
-    /** @type {import('./lut.js').Lut} */
-    this.lut = SRGB
+    this.shown = null;
+    this.weights = new Float64Array();
+    this.version = -1;
+    /** @type {import("./lut.js").Lut} */
+    this.lut = SRGB;
     /** Whether the canvas is what the session has. */
-    this.isReady = false
+    this.isReady = false;
     /** Whether a stroke is in progress. */
-    this.isPainting = false
-    host.on('state', (message) => this.begin(message))
-    host.on('answer', (message) => this.answered(message))
-    host.on('patch', (message) => this.patched(message))
-    host.on('renewed', ({ resources }) => {
-      this.loader.know(resources)
-      this.want()
-    })
-    host.on('verified', () => this.loader.renew('verified'))
-    host.on('explained', () => this.loader.renew('beyond'))
+    this.isPainting = false;
+    host.on("state", (message) => this.begin(message));
+    host.on("answer", (message) => this.answered(message));
+    host.on("patch", (message) => this.patched(message));
+    host.on("renewed", ({ resources }) => {
+      this.loader.know(resources);
+      this.want();
+    });
+    host.on("verified", () => this.loader.renew("verified"));
+    host.on("explained", () => this.loader.renew("beyond"));
   }
 
   /** @param {Message} state */
   begin(state) {
-    const before = this.state
-    const [height, width] = /** @type {[number, number]} */ (state.size)
-    this.state = state
-    this.version = -1
-    if (!before || String(before.size) !== String(state.size) || before.lights.length !== state.lights.length) {
-      this.screen.begin([height, width], state.lights.length)
-      this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width))
-      const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {})
-      this.strokes = new Strokes(this.host, this.canvas, refused)
-      this.strokes.count = Math.max(0, Number(state.stroke) || 0)
-      this.isReady = false
-      this.loader.forget()
+    const before = this.state;
+    const [height, width] = /** @type {[number, number]} */ (state.size);
+    this.state = state;
+    this.version = -1;
+    if (
+      !before ||
+      String(before.size) !== String(state.size) ||
+      before.lights.length !== state.lights.length
+    ) {
+      this.screen.begin([height, width], state.lights.length);
+      this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
+      const refused = () => this.host.send("hello", { version: VERSION }).catch(() => {});
+      this.strokes?.close();
+      this.strokes = new Strokes(this.host, this.canvas, refused);
+      this.strokes.count = Math.max(0, Number(state.stroke) || 0);
+      this.isReady = false;
+      this.loader.forget();
     }
-    this.answered(state)
-    this.loader.know(state.resources)
-    this.want()
-    if (this.loader.there.has('present')) this.sync()
+    this.answered(state);
+    this.loader.know(state.resources);
+    this.want();
+    if (this.loader.there.has("present")) this.sync();
   }
 
   /** Weights that come with a message. @param {Message} message */
   answered(message) {
-    const weights = message.arrays?.weights?.data
-    const version = message.version ?? this.version
-    if (message.kind === 'answer' && version < this.version) return
-    if (message.kind === 'answer') this.version = version
-    if (!weights) return
-    this.weights = Float64Array.from(weights)
-    this.weigh()
-    this.screen.request(true)
+    const weights = message.arrays?.weights?.data;
+    const version = message.version ?? this.version;
+    if (message.kind === "answer" && version < this.version) return;
+    if (message.kind === "answer") this.version = version;
+    if (!weights) return;
+    this.weights = Float64Array.from(weights);
+    this.weigh();
+    this.screen.request(true);
   }
 
   /** @param {Message} message */
   patched(message) {
-    const { canvas, strokes } = this
-    this.answered(message)
-    const { image, importance } = message.arrays
-    const isOwn = strokes?.isDropping
-    if (strokes) strokes.isDropping = false
-    if (!canvas || !image || !importance || isOwn) return
-    const region = /** @type {Region} */ (message.region)
-    canvas.set(region, /** @type {Float32Array} */ (image.data), /** @type {Float32Array} */ (importance.data))
-    this.redraw([region])
+    const { canvas, strokes } = this;
+    this.answered(message);
+    const { image, importance } = message.arrays;
+    const isOwn = strokes?.isDropping;
+    if (strokes) strokes.isDropping = false;
+    if (!canvas || !image || !importance || isOwn) return;
+    const region = /** @type {Region} */ (message.region);
+    canvas.set(
+      region,
+      /** @type {Float32Array} */ (image.data),
+      /** @type {Float32Array} */ (importance.data),
+    );
+    this.redraw([region]);
   }
 
   /** The canvas as the session has it, once it has all strokes. */
   async sync() {
-    const { canvas, strokes } = this
-    if (!canvas || !strokes) return
-    await strokes.settled()
-    if (strokes.isPending) return
+    const { canvas, strokes } = this;
+    if (!canvas || !strokes) return;
+    await strokes.settled();
+    if (strokes.isPending) return;
     try {
       const [image, importance] = await Promise.all(
-        ['painting', 'importance'].map((name) => this.host.fetch(name)),
-      )
+        ["painting", "importance"].map((name) => this.host.fetch(name)),
+      );
       // What has been painted since then is newer.
-      if (strokes.isPending || canvas !== this.canvas) return
-      canvas.set(canvas.whole, /** @type {Float32Array} */ (image.data), /** @type {Float32Array} */ (importance.data))
-      this.isReady = true
-      this.redraw([canvas.whole])
+      if (strokes.isPending || canvas !== this.canvas) return;
+      canvas.set(
+        canvas.whole,
+        /** @type {Float32Array} */ (image.data),
+        /** @type {Float32Array} */ (importance.data),
+      );
+      this.isReady = true;
+      this.redraw([canvas.whole]);
     } catch (error) {
-      this.tell('trouble', { text: error instanceof Error ? error.message : String(error) })
+      this.tell("trouble", { text: error instanceof Error ? error.message : String(error) });
     }
   }
 
   /** Which pictures are to be there. */
   want() {
-    const { state, shown, loader } = this
-    if (!state) return
-    const isClean = shown?.clean ?? true
-    for (const name of WANTED) loader.want(name, name)
+    const { state, shown, loader } = this;
+    if (!state) return;
+    const isClean = shown?.clean ?? true;
+    for (const name of WANTED) loader.want(name, name);
     for (let k = 0; k < state.lights.length; k++) {
-      const clean = `clean/${k}`
-      const isThere = isClean && clean in loader.resources
-      loader.want(`plane ${k}`, isThere ? clean : `plane/${k}`)
+      const clean = `clean/${k}`;
+      const isThere = isClean && clean in loader.resources;
+      loader.want(`plane ${k}`, isThere ? clean : `plane/${k}`);
     }
-    const transform = shown?.transform ?? 'srgb'
-    loader.want('lut', transform === 'srgb' ? null : `lut/${transform}`)
-    if (transform === 'srgb') this.setLut(SRGB)
+    const transform = shown?.transform ?? "srgb";
+    loader.want("lut", transform === "srgb" ? null : `lut/${transform}`);
+    if (transform === "srgb") this.setLut(SRGB);
   }
 
   /** @param {string} slot @param {string} name @param {Picture} picture */
   loaded(slot, name, picture) {
-    const { view } = this.screen
-    const { canvas, state } = this
-    if (!view || !canvas || !state) return
-    const { data } = picture
-    if (slot.startsWith('plane ')) {
-      const light = Number(slot.slice(6))
-      view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1)
-    } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut))
-    else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data))
-    else if (slot === 'albedo') canvas.albedo = /** @type {Uint16Array} */ (data)
-    else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data)
-    else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data))
-    else if (slot === 'beyond') view.setBeyond(/** @type {Uint8Array} */ (data))
-    this.screen.request()
+    const { view } = this.screen;
+    const { canvas, state } = this;
+    if (!view || !canvas || !state) return;
+    const { data } = picture;
+    if (slot.startsWith("plane ")) {
+      const light = Number(slot.slice(6));
+      view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
+    } else if (slot === "lut") this.setLut(lutOf(name.slice(4), picture, state.lut));
+    else if (slot === "present") this.setPresent(/** @type {Uint16Array} */ (data));
+    else if (slot === "albedo") canvas.albedo = /** @type {Uint16Array} */ (data);
+    else if (slot === "objects") canvas.objects = /** @type {Int16Array} */ (data);
+    else if (slot === "verified") view.setPicture("verified", /** @type {Uint16Array} */ (data));
+    else if (slot === "beyond") view.setBeyond(/** @type {Uint8Array} */ (data));
+    this.screen.request();
   }
 
   /** @param {Uint16Array} present */
   setPresent(present) {
-    const { canvas, state } = this
-    if (!canvas || !state) return
-    canvas.setPresent(present)
-    if (showsPresent(this.shown))
-      this.screen.view?.setPicture('present', present)
-    if (!this.isReady && state.first) this.isReady = true
-    else if (!this.isReady) this.sync()
-    this.redraw([canvas.whole])
+    const { canvas, state } = this;
+    if (!canvas || !state) return;
+    canvas.setPresent(present);
+    if (showsPresent(this.shown)) this.screen.view?.setPicture("present", present);
+    if (!this.isReady && state.first) this.isReady = true;
+    else if (!this.isReady) this.sync();
+    this.redraw([canvas.whole]);
   }
 
-  /** @param {import('./lut.js').Lut} lut */
+  /** @param {import("./lut.js").Lut} lut */
   setLut(lut) {
-    this.lut = lut
-    this.screen.view?.setLut(lut)
+    this.lut = lut;
+    this.screen.view?.setLut(lut);
   }
 
   /** Set all of it again: the view is another one, or has lost it. */
   refill() {
-    this.setLut(this.lut)
-    this.weigh()
-    if (this.canvas) this.redraw([this.canvas.whole])
-    this.loader.forget((slot) => slot.startsWith('plane ') || slot === 'verified' || slot === 'beyond')
+    this.setLut(this.lut);
+    this.weigh();
+    if (this.canvas) this.redraw([this.canvas.whole]);
+    this.loader.forget(
+      (slot) => slot.startsWith("plane ") || slot === "verified" || slot === "beyond",
+    );
   }
 
   /** @param {Show} show */
   show(show) {
-    const before = this.shown
-    this.shown = show
-    this.screen.params = { ...show, live: false }
-    if (before?.transform !== show.transform || before?.clean !== show.clean) this.want()
+    const before = this.shown;
+    this.shown = show;
+    this.screen.params = { ...show, live: false };
+    if (before?.transform !== show.transform || before?.clean !== show.clean) this.want();
     if (this.canvas && showsPresent(show) !== showsPresent(before))
-      this.screen.view?.setPicture('present', showsPresent(show) ? this.canvas.present : null)
-    this.weigh()
-    this.screen.request()
+      this.screen.view?.setPicture("present", showsPresent(show) ? this.canvas.present : null);
+    this.weigh();
+    this.screen.request();
   }
 
   /** Tell the view which weights are shown. */
   weigh() {
-    const { view } = this.screen
-    if (!view || !this.state) return
-    const { gains = null, instead = null, other = null } = this.shown ?? {}
-    const weights = Float64Array.from(instead?.flat() ?? this.weights)
-    if (gains) weights.forEach((weight, i) => (weights[i] = gains[Math.floor(i / 3)] ? weight : 0))
-    if (weights.length === 3 * this.state.lights.length) view.setWeights(weights)
-    if (other) view.setWeights(Float64Array.from(other.flat()), 'other')
+    const { view } = this.screen;
+    if (!view || !this.state) return;
+    const { gains = null, instead = null, other = null } = this.shown ?? {};
+    const weights = Float64Array.from(instead?.flat() ?? this.weights);
+    if (gains) weights.forEach((weight, i) => (weights[i] = gains[Math.floor(i / 3)] ? weight : 0));
+    if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
+    if (other) view.setWeights(Float64Array.from(other.flat()), "other");
   }
 
   /** @param {Region[]} regions */
   redraw(regions) {
-    const { canvas } = this
-    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0])
-    if (!canvas || !region) return
-    this.screen.view?.setCanvas(region, canvas.image, canvas.importance)
-    this.screen.request(this.isPainting)
+    const { canvas } = this;
+    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
+    if (!canvas || !region) return;
+    this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
+    this.screen.request(this.isPainting);
   }
 }
 
 /** @param {Show | null} show */
 function showsPresent(show) {
-  return show?.left === 'present' || show?.right === 'present'
+  return show?.left === "present" || show?.right === "present";
 }

@@ -104,7 +104,7 @@ export function Number_(props) {
       disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)} />
-    ${unit !== undefined && html`<span class="unit">${unit}</span>`}
+    ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}
   </label>`;
 }
 

@@ -28,7 +28,7 @@ export class LightRow extends Component {
   shouldComponentUpdate(next) {
     const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
     return keys.some((key) => (key === "here"
-      ? percent(this.props.here ?? 0) !== percent(next.here ?? 0)
+      ? heard(this.props.here) !== heard(next.here)
       : next[key] !== this.props[key]));
   }
 
@@ -112,6 +112,9 @@ export class LightRow extends Component {
     </div>`;
   }
 }
+
+/** @param {number | undefined} share */
+const heard = (share) => (share === undefined ? "" : percent(share));
 
 /** @param {{share: number, here?: number}} props */
 function Share({ share, here }) {

@@ -9,8 +9,8 @@ import { look, remember, take } from "./tools.js";
 /** @typedef {import("./engine.js").Point} Point */
 /** @typedef {import("./model.js").UiStore} UiStore */
 
-/** A second finger within this time makes no stroke of the first. */
-const SECOND_FINGER_MS = 250;
+/** A second finger makes no stroke of the first within this time, or before it has come so far. */
+const SECOND_FINGER = { ms: 250, px: 24 };
 
 export class Pointer {
   /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved */
@@ -23,6 +23,7 @@ export class Pointer {
     /** @type {null | "stroke" | "pan" | "pinch"} */
     this.doing = null;
     this.began = 0;
+    this.way = 0;
     /** @type {Point | null} */
     this.last = null;
     this.isSpace = false;
@@ -53,7 +54,7 @@ export class Pointer {
     const place = this.place(event);
     this.fingers.set(event.pointerId, place);
     capture(event);
-    if (event.pointerType === "touch" && this.fingers.size === 2) return this.pinch();
+    if (event.pointerType === "touch" && this.fingers.size === 2) return this.pinch(event);
     if (this.fingers.size > 1) return;
     if (event.button === 1 || this.isSpace) {
       this.doing = "pan";
@@ -84,6 +85,7 @@ export class Pointer {
     }
     this.doing = "stroke";
     this.began = event.timeStamp;
+    this.way = 0;
     this.engine.begin(point);
     this.last = point;
   }
@@ -101,6 +103,7 @@ export class Pointer {
       const all = event.getCoalescedEvents?.() ?? [];
       const points = (all.length ? all : [event]).map((one) => this.point(one));
       const found = /** @type {Point[]} */ (points.filter(Boolean));
+      this.way += Math.hypot(place.x - before.x, place.y - before.y);
       if (found.length) this.last = found[found.length - 1];
       this.engine.move(found);
     }
@@ -132,10 +135,12 @@ export class Pointer {
     this.last = point;
   }
 
-  /** The second finger: what the first began is forgotten, or ended if it is a stroke by now. */
-  pinch() {
+  /** The second finger: what the first began is forgotten, or ended if it is a stroke by now.
+   * @param {PointerEvent} event */
+  pinch(event) {
     if (this.doing === "stroke") {
-      if (performance.now() - this.began < SECOND_FINGER_MS) this.engine.cancel();
+      const { ms, px } = SECOND_FINGER;
+      if (event.timeStamp - this.began < ms || this.way < px) this.engine.cancel();
       else this.engine.end();
     }
     this.pane = null;

@@ -16,6 +16,9 @@ export class Session {
     this.store = store;
     /** Replies come twice: to who asked, and to who listens. @type {WeakSet<Message>} */
     this.done = new WeakSet();
+    /** Lights that a hand moves, and where to. @type {Map<number, {rgb: RGB, done: boolean}>} */
+    this.hands = new Map();
+    this.isMoving = false;
     /** What was asked of a light before a hand moved it. @type {Map<number, Asked>} */
     this.before = new Map();
     for (const kind of HEARD) host.on(kind, (message) => this.receive({ ...message, kind }, message));
@@ -56,6 +59,7 @@ export class Session {
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
     })[message.kind]?.(message);
+    if (told?.weights) told.weights = told.weights.map((rgb, k) => this.hands.get(k)?.rgb ?? rgb);
     if (told) this.store.set(told);
     if (told?.asked) this.forget(told.asked);
   }
@@ -101,21 +105,40 @@ export class Session {
   }
 
   /**
-   * Set a light by hand: it is held there, and the others are solved around it.
+   * Set a light by hand: it is held there, and the others are solved around it. It is shown there
+   * at once; one message is on its way, and the newest place of the hand goes with the next.
    * @param {number} light @param {RGB} emission @param {boolean} done
    */
   hold(light, emission, done) {
-    const { lights, asked } = this.store.value;
-    const { name, is_scalar: isScalar } = lights[light];
-    const now = asked[name] ?? {};
-    if (!this.before.has(light)) this.before.set(light, withoutLevel(now));
-    const level = isScalar ? emission[0] : emission;
-    return this.ask(light, { lock: level }, done);
+    const { lights, asked, weights } = this.store.value;
+    if (!this.before.has(light)) {
+      this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}));
+    }
+    this.hands.set(light, { rgb: emission, done });
+    this.store.set({ weights: weights.map((rgb, k) => (k === light ? emission : rgb)) });
+    void this.move();
+  }
+
+  async move() {
+    if (this.isMoving) return;
+    this.isMoving = true;
+    /** @type {Map<number, object>} */
+    const sent = new Map();
+    const waiting = () => [...this.hands].find(([light, hand]) => sent.get(light) !== hand);
+    for (let next = waiting(); next; next = waiting()) {
+      const [light, hand] = next;
+      sent.set(light, hand);
+      const isScalar = this.store.value.lights[light].is_scalar;
+      await this.ask(light, { lock: isScalar ? hand.rgb[0] : hand.rgb }, hand.done);
+      if (hand.done && this.hands.get(light) === hand) this.hands.delete(light);
+    }
+    this.isMoving = false;
   }
 
   /** Let the solve have a light again, with what was asked of it before. @param {number} light */
   release(light) {
     const { lights, asked } = this.store.value;
+    this.hands.delete(light);
     const before = this.before.get(light) ?? withoutLevel(asked[lights[light].name] ?? {});
     this.before.delete(light);
     return this.ask(light, before);
@@ -124,6 +147,7 @@ export class Session {
   /** @param {number} light @param {boolean} off */
   turn(light, off) {
     if (!off) return this.release(light);
+    this.hands.delete(light);
     const { lights, asked } = this.store.value;
     if (!this.before.has(light)) {
       this.before.set(light, withoutLevel(asked[lights[light].name] ?? {}));

@@ -2,6 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../vendor/preact.js";
 import { toHex } from "./colours.js";
+import { counted } from "./format.js";
 import { gainOf, paintOf, shown } from "./model.js";
 import { paneAt, Pointer } from "./pointer.js";
 import { look } from "./tools.js";
@@ -20,7 +21,7 @@ const NAMES = { painting: "Painting", solution: "Answer", other: "Other look", v
 function nameOf(ui, kind) {
   if (kind === "other" && ui.hovered !== null) {
     const stops = Math.round(Math.log2(gainOf(ui, ui.hovered)));
-    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${stops} stops brighter` : ""}`;
+    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, "stop")} brighter` : ""}`;
   }
   if (kind === "other" && ui.mix) {
     const [a, b] = [ui.mix.a, ui.mix.b].map((id) => ui.looks.find((one) => one.id === id)?.name);
@@ -201,7 +202,12 @@ function useSurface(frame, pointer, hands) {
     const ends = new AbortController();
     const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
       element.addEventListener(name, hear, { signal: ends.signal, passive: false });
-    on("pointerdown", (event) => pointer.down(event));
+    // Whoever came by a pointer sees where they are; the outline is for the keyboard.
+    on("pointerdown", (event) => {
+      element.dataset.by = "pointer";
+      pointer.down(event);
+    });
+    on("blur", () => delete element.dataset.by);
     on("pointermove", (event) => pointer.move(event));
     on("pointerup", (event) => pointer.up(event));
     on("pointercancel", (event) => pointer.up(event));

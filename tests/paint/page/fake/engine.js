@@ -155,21 +155,9 @@ export class FakeEngine {
   async send(done) {
     if (this.busy && !done) return;
     this.busy = true;
-    const towards = this.weights.map((_, k) => [0, 1, 2].map((c) => {
-      let [up, own] = [0, 1e-9];
-      const plane = this.room.planes[k];
-      for (let i = c; i < plane.length; i += 21) {
-        const was = this.mixed?.[i] ?? this.original[i];
-        if (Math.abs(this.image[i] - this.original[i]) > 1e-4) up += (this.image[i] - was) * plane[i];
-        own += plane[i] * plane[i];
-      }
-      return 0.5 * up / own;
-    }));
-    const reply = await this.host.send("paint", { stroke: this.strokes, region: [0, this.room.h, 0, this.room.w], done, label: this.hand.tool, towards });
+    await this.host.send("paint", { stroke: this.strokes, region: [0, this.room.h, 0, this.room.w], done, label: this.hand.tool },
+      { image: { data: this.image, shape: [this.room.h, this.room.w, 3] } });
     this.busy = false;
-    this.hear(reply);
-    this.mixed = this.mix(this.weights);
-    this.tell("message", reply);
   }
 
   end() {

@@ -2,6 +2,15 @@
 
 const flat = (weights) => ({ weights: { data: Float64Array.from(weights.flat()), shape: [weights.length, 3] } });
 
+/** As halves: sign, five bits of exponent, ten of mantissa; rounded down. */
+function halves(floats) {
+  const bits = new Uint32Array(Float32Array.from(floats).buffer);
+  return Uint16Array.from(bits, (x) => {
+    const exponent = ((x >>> 23) & 255) - 112;
+    return exponent <= 0 ? 0 : (Math.min(30, exponent) << 10) | ((x >>> 13) & 1023);
+  });
+}
+
 export class FakeHost {
   constructor(room, { isFirst }) {
     Object.assign(this, { room, isFirst, said: [], hearers: {}, looks: [], ids: 0, stroke: 0 });
@@ -12,24 +21,28 @@ export class FakeHost {
     this.steps = [];
     this.undone = [];
     this.resources = Object.fromEntries(room.lights.map((_, k) => [`thumb/${k}`, 1]));
-    Object.assign(this.resources, { albedo: 1, objects: 1 });
+    Object.assign(this.resources, { albedo: 1, objects: 1, present: 1, painting: 1, importance: 1 });
+    room.lights.forEach((_, k) => { this.resources[`plane/${k}`] = 1; });
+    this.original = this.mixed();
   }
 
   on(kind, hear) { (this.hearers[kind] ??= []).push(hear); }
-  tell(message) { for (const hear of this.hearers[message.kind] ?? []) hear({ arrays: {}, ...message }); }
+  tell(message) { for (const hear of this.hearers[message.kind] ?? []) hear(message); }
   open() { this.tell(this.state()); }
   close() {}
 
   /** Every message is answered, a little later; tests may have it fail, or wait. */
   async send(kind, fields = {}, arrays = {}) {
     this.said.push({ kind, ...fields });
+    this.busy = (this.busy ?? 0) + 1;
     await new Promise((done) => setTimeout(done, 1));
-    if (this.fails) {
-      const text = this.fails;
-      this.fails = null;
-      return { kind: "failed", text, arrays: {} };
-    }
-    return this[kind]?.(fields, arrays) ?? { kind: "failed", text: `no ${kind}`, arrays: {} };
+    const failed = (text) => ({ kind: "failed", text });
+    const made = this.fails ? failed(this.fails) : this[kind]?.(fields, arrays) ?? failed(`no ${kind}`);
+    this.fails = null;
+    const reply = { arrays: {}, ...made, reply: this.said.length };
+    this.tell(reply);
+    this.busy -= 1;
+    return reply;
   }
 
   state() {
@@ -66,13 +79,32 @@ export class FakeHost {
   patch() { return { kind: "patch", region: [0, 0, 0, 0], ...this.exact(), ...this.asks(), arrays: flat(this.weights) }; }
   step(label, undo) { this.steps.push({ label, undo }); this.undone = []; }
 
-  /** Towards the paint: each light by how much of the painted light's change lies where it shines. */
-  paint({ stroke, done, label, towards }) {
+  /** A step towards the paint: each light by how far it looks like what was painted since. */
+  paint({ stroke, region: [top, , left], done, label }, { image }) {
     this.stroke = stroke;
-    if (towards) this.weights = this.weights.map((rgb, k) => (this.asked[this.room.lights[k].name]?.lock ? rgb
-      : rgb.map((x, c) => Math.max(0, x + towards[k][c]))));
+    const { w, planes, lights } = this.room;
+    const [rows, columns] = image.shape;
+    const mixed = this.mixed();
+    this.weights = this.weights.map((rgb, k) => rgb.map((x, c) => {
+      if (this.asked[lights[k].name]?.lock) return x;
+      let [up, own] = [0, 1e-9];
+      for (let i = 0; i < rows * columns; i += 5) {
+        const at = 3 * ((top + Math.floor(i / columns)) * w + left + (i % columns)) + c;
+        if (Math.abs(image.data[3 * i + c] - this.original[at]) > 1e-3) up += (image.data[3 * i + c] - mixed[at]) * planes[k][at];
+        own += planes[k][at] ** 2;
+      }
+      return Math.max(0, x + 0.3 * up / own);
+    }));
     if (done) this.step(label);
     return this.answer(Boolean(done));
+  }
+
+  mixed() {
+    const made = new Float32Array(this.room.w * this.room.h * 3);
+    this.room.planes.forEach((plane, k) => {
+      for (let i = 0; i < made.length; i += 1) made[i] += plane[i] * this.weights[k][i % 3];
+    });
+    return made;
   }
 
   drop() { return this.patch(); }
@@ -87,7 +119,7 @@ export class FakeHost {
   }
   tie({ ties }) { this.ties = ties; return this.answer(); }
   set({ values }) { this.settings = values; return this.answer(); }
-  kept() { return { kind: "looks", looks: [...this.looks], arrays: {} }; }
+  kept() { return { kind: "looks", looks: [...this.looks] }; }
   save_look({ name }) {
     const id = (this.ids += 1);
     this.looks.push({ id, name, weights: this.weights.map((rgb) => [...rgb]), delta_e: 2.3, stamp: "", thumbnail: `look/${id}` });
@@ -97,14 +129,20 @@ export class FakeHost {
   rename_look({ look, name }) { this.looks = this.looks.map((one) => (one.id === look ? { ...one, name } : one)); return this.kept(); }
   copy_look({ look }) { const one = this.looks.find(({ id }) => id === look); this.looks.push({ ...one, id: (this.ids += 1), name: `${one.name} 2` }); return this.kept(); }
   drop_look({ look }) { this.looks = this.looks.filter(({ id }) => id !== look); return this.kept(); }
-  export({ what }) { return { kind: "exported", files: what.map((one) => `gallery-evening/${one}`), command: "lightpaint solve gallery.xml gallery-evening/target.exr", arrays: {} }; }
-  verify({ run }) { return run ? { kind: "progress", what: "verify", done: 3, total: 16, unit: "passes", arrays: {} } : { kind: "say", text: "The render was stopped.", tone: "info", arrays: {} }; }
-  explain() { return { kind: "explained", sentences: ["No light reaches the floor at the left.", "The cove is at its limit."], arrays: {} }; }
+  export({ what }) { return { kind: "exported", files: what.map((one) => `gallery-evening/${one}`), command: "lightpaint solve gallery.xml gallery-evening/target.exr" }; }
+  verify({ run }) { return run ? { kind: "progress", what: "verify", done: 3, total: 16, unit: "passes" } : { kind: "say", text: "The render was stopped.", tone: "info" }; }
+  explain() { return { kind: "explained", sentences: ["No light reaches the floor at the left.", "The cove is at its limit."] }; }
   take_over() { return this.state(); }
 
   async fetch(name) {
     const [kind, at] = name.split("/");
-    const { w, h, planes, n } = this.room;
+    const { w, h, planes, n, surfaces } = this.room;
+    if (kind === "plane") return { data: halves(planes[at]), shape: [h, w, 3] };
+    if (kind === "present") return { data: halves(this.original), shape: [h, w, 3] };
+    if (kind === "painting") return { data: this.original.slice(), shape: [h, w, 3] };
+    if (kind === "importance") return { data: new Float32Array(w * h), shape: [h, w] };
+    if (kind === "albedo") return { data: halves(Float32Array.from(surfaces.flatMap(({ albedo }) => albedo))), shape: [h, w, 3] };
+    if (kind === "objects") return { data: Int16Array.from(surfaces, ({ object }) => object), shape: [h, w] };
     const weights = kind === "thumb" ? this.room.lights.map((_, k) => (k === Number(at) ? [8 / n, 8 / n, 8 / n].map((x) => x * n / 8) : [0, 0, 0]))
       : this.looks.find((one) => one.thumbnail === name)?.weights ?? this.weights;
     const small = [Math.ceil(h / 2), Math.ceil(w / 2)];

@@ -1,6 +1,6 @@
 /** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`. */
 
-import { mount } from "/page/app.js";
+import { mount } from "../app.js";
 import { FakeEngine } from "./engine.js";
 import { FakeHost } from "./host.js";
 import { makeRoom } from "./room.js";
@@ -19,7 +19,8 @@ if (asked.has("shadow")) {
   element.style.height = "100%";
   shadow.append(element);
 }
-const engine = new FakeEngine(host, room);
+// `?engine`: the one that ships, over the same session.
+const engine = asked.has("engine") ? (await import("../engine/painter.js")).openEngine(host) : new FakeEngine(host, room);
 const painter = await mount(element, host, { global: !asked.has("shadow"), engine });
 Object.assign(window, { painter, host, engine });
 host.open();

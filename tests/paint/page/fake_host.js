@@ -1,0 +1,89 @@
+/** Sessions that are none, for tests of what is sent. */
+import { Hearers } from "/engine/host.js";
+
+/** Keeps what is said until a test answers it. */
+export class SlowHost extends Hearers {
+  said = [];
+  isOpen = true;
+
+  send(kind, fields = {}, arrays = {}) {
+    if (!this.isOpen) return Promise.reject(new Error("lost"));
+    return new Promise((resolve, reject) => {
+      this.said.push({ kind, fields, arrays, resolve, reject });
+    });
+  }
+
+  /** How many messages are on their way. */
+  get inFlight() {
+    return this.said.filter((one) => !one.isDone).length;
+  }
+
+  /** Answer the first that is not. */
+  async answer(kind = "answer", more = {}) {
+    const next = this.said.find((one) => !one.isDone);
+    next.isDone = true;
+    this.tell(kind, { kind, arrays: {}, ...more });
+    next.resolve({ kind, arrays: {}, ...more });
+    await settle();
+  }
+
+  async lose() {
+    this.isOpen = false;
+    for (const one of this.said.filter((x) => !x.isDone)) {
+      one.isDone = true;
+      one.reject(new Error("lost"));
+    }
+    this.tell("connection", { kind: "connection", state: "lost" });
+    await settle();
+  }
+
+  async find(stroke = 0) {
+    this.isOpen = true;
+    this.tell("state", { kind: "state", stroke, arrays: {} });
+    this.tell("connection", { kind: "connection", state: "open" });
+    await settle();
+  }
+
+  /** What was said, without pixels. */
+  get told() {
+    return this.said.map(({ kind, fields, arrays }) => ({
+      kind,
+      ...fields,
+      shapes: Object.fromEntries(Object.entries(arrays).map(([k, v]) => [k, v.shape])),
+    }));
+  }
+}
+
+/** Let promises that are settled be heard. */
+export const settle = () => new Promise((done) => setTimeout(done, 0));
+
+/** A socket whose other end is the test. */
+export class FakeSocket {
+  static OPEN = 1;
+  static made = [];
+  readyState = 0;
+  sent = [];
+
+  constructor(url) {
+    this.url = String(url);
+    FakeSocket.made.push(this);
+  }
+
+  send(data) {
+    this.sent.push(data);
+  }
+
+  open() {
+    this.readyState = 1;
+    this.onopen?.({});
+  }
+
+  receive(data) {
+    this.onmessage?.({ data });
+  }
+
+  close() {
+    this.readyState = 3;
+    this.onclose?.({});
+  }
+}

@@ -1,0 +1,179 @@
+"""What a stroke leaves on the canvas, against closed forms."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+H, W = 64, 80
+
+
+def painted(page: Any, script: str, *, light: float = 0, objects: Any = None) -> Any:
+    """Image (H, W, 3) and importance (H, W) after a script that has `canvas` and the modules."""
+    image, importance = page.evaluate(
+        f"""async ([H, W, light, objects]) => {{
+            const brush = await import("/engine/brush.js");
+            const hand = await import("/engine/hand.js");
+            const canvas = bench.plain(H, W, light, objects);
+            {script}
+            return [Array.from(canvas.image), Array.from(canvas.importance)];
+        }}""",
+        [H, W, light, None if objects is None else np.ravel(objects).tolist()],
+    )
+    return np.reshape(image, (H, W, 3)), np.reshape(importance, (H, W))
+
+
+def stroke(use: str, begin: str, *moves: str) -> str:
+    moved = "".join(f"stroke.move([{move}]);" for move in moves)
+    return f"""
+        const use = {{ ...hand.FIRST, size: 20, hardness: 1, flow: 1, {use} }};
+        const stroke = new hand.Stroke(canvas, use, {begin}, 1);
+        stroke.begin(); {moved}
+        if (use.end !== false) canvas.end();
+    """
+
+
+def place(x: float, y: float, pressure: float = 1.0) -> str:
+    return f"{{ x: {x}, y: {y}, pressure: {pressure} }}"
+
+
+@pytest.mark.parametrize("hardness", [0, 0.5, 1])
+def test_one_stamp_has_the_energy_of_its_profile(page: Any, hardness: float):
+    image, importance = painted(
+        page, stroke(f"size: 40, hardness: {hardness}, rgb: [2, 1, 0.5]", place(40.3, 31.8))
+    )
+    inner, outer = hardness * 19.5, 20 + 0.5 * hardness
+    r = np.linspace(0, outer, 200_001)
+    t = np.clip((r - inner) / (outer - inner), 0, 1)
+    profile = 0.5 + 0.5 * np.cos(math.pi * t)
+    area = np.trapezoid(2 * math.pi * r * profile, r)
+    # A sum over pixels instead of an integral.
+    np.testing.assert_allclose(importance.sum(), area, rtol=2e-3)
+    np.testing.assert_allclose(image.sum((0, 1)), area * np.array([2, 1, 0.5]), rtol=2e-3)
+    if hardness == 0:
+        assert area == pytest.approx(20**2 * (math.pi / 2 * 2 / 2 - 2 / math.pi), rel=1e-6)
+
+
+def test_stamps_flow_together(page: Any):
+    def at_middle(flow: float, pressure: float) -> float:
+        spot = place(40.5, 32.5, pressure)
+        script = (
+            stroke(f"flow: {flow}", spot)
+            + f"""
+            canvas.begin();
+            brush.stamp(canvas, {spot}, use); brush.stamp(canvas, {spot}, use);
+            canvas.apply(canvas.whole, {{ kind: "paint", rgb: [1, 1, 1], as: "look" }});
+        """
+        )
+        return float(painted(page, script)[0][32, 40, 0])
+
+    # Once by the stroke, twice by the second one: what is not covered gets less.
+    assert at_middle(0.3, 1) == pytest.approx(1 - 0.7**3, abs=1e-6)
+    assert at_middle(0.6, 0.5) == pytest.approx(1 - 0.7**3, abs=1e-6)
+
+
+def test_a_path_is_the_same_whatever_points_it_goes_through(page: Any):
+    ends = place(15, 20), place(60, 44)
+    whole, _ = painted(page, stroke("flow: 0.4", ends[0], ends[1]))
+    parts = [place(15 + 45 * t, 20 + 24 * t) for t in (0.1, 0.13, 0.5, 0.9, 1)]
+    many, _ = painted(page, stroke("flow: 0.4", ends[0], *parts))
+    np.testing.assert_allclose(many, whole, atol=1e-5)  # float64 places, float32 light
+
+
+def test_a_line_covers_a_capsule(page: Any):
+    lines = stroke('tool: "line"', place(20, 30), place(70, 10), place(60, 30))
+    image, importance = painted(page, lines)
+    # Only the last end counts: a rectangle and two half circles.
+    area = 40 * 20 + math.pi * 10**2
+    np.testing.assert_allclose(importance.sum(), area, rtol=5e-3)  # stamps leave a wavy edge
+    np.testing.assert_array_equal(image[..., 0], importance)
+    assert importance[12, 65] == 0
+
+
+def test_paint_as_light_is_on_the_albedo(page: Any):
+    script = "canvas.albedo = new Uint16Array(3 * H * W).fill(0x3400);"  # a quarter
+    image, _ = painted(page, script + stroke('as: "light", rgb: [4, 2, 1]', place(40, 32)))
+    np.testing.assert_allclose(image[32, 40], [1, 0.5, 0.25])
+
+
+def test_fill_is_one_object(page: Any):
+    objects = np.full((H, W), -1)
+    objects[10:30, 20:70], objects[15:20, 30:40] = 2, 5
+    image, importance = painted(
+        page, stroke('tool: "fill", rgb: [0.5, 0.25, 1]', place(22.5, 12.5)), objects=objects
+    )
+    np.testing.assert_array_equal(importance, objects == 2)
+    np.testing.assert_array_equal(image[objects == 2], np.tile([0.5, 0.25, 1], (950, 1)))
+
+
+def test_the_eraser_brings_the_present_look_back(page: Any):
+    fill = stroke("tool: 'fill', rgb: [3, 3, 3]", place(1, 1))
+    again = "{" + stroke("tool: 'eraser', size: 30", place(40, 32)) + "}"
+    image, importance = painted(page, "{" + fill + "}" + again, light=0.25)
+    assert importance[32, 40] == 0
+    np.testing.assert_array_equal(image[32, 40], 0.25)
+    np.testing.assert_array_equal(image[0, 0], 3)
+    np.testing.assert_array_equal(image[importance == 0], 0.25)
+
+
+def test_the_importance_brush_leaves_light_alone(page: Any):
+    fill = stroke("tool: 'fill', rgb: [3, 2, 1]", place(1, 1))
+    again = "{" + stroke("tool: 'weight', importance: 0.25", place(40, 32)) + "}"
+    image, importance = painted(page, "{" + fill + "}" + again)
+    assert (importance[32, 40], importance[0, 0]) == (0.25, 1)
+    np.testing.assert_array_equal(image, np.tile([3.0, 2, 1], (H, W, 1)))
+
+
+def test_a_drag_asks_for_stops_and_keeps_luminance(page: Any):
+    # Up by 80 pixels is a stop. In the middle of a soft spot all of it.
+    image, importance = painted(
+        page, stroke('tool: "ask"', place(40.5, 40.5), place(40.5, -39.5)), light=0.25
+    )
+    np.testing.assert_allclose(image[40, 40], 0.5, rtol=1e-6)
+    np.testing.assert_allclose(image[..., 1], 0.25 * (1 + importance), rtol=1e-6)
+    # To the right is warmer, as bright as before.
+    image, importance = painted(
+        page, stroke('tool: "ask"', place(40.5, 40.5), place(140.5, 40.5)), light=0.25
+    )
+    r, g, b = image[40, 40]
+    assert r > g > b
+    luminance = image @ [0.2126, 0.7152, 0.0722]
+    np.testing.assert_allclose(luminance, 0.25, rtol=1e-5)
+    left, _ = painted(page, stroke('tool: "ask"', place(40.5, 40.5), place(-20, 40.5)), light=0.25)
+    assert left[40, 40, 0] < left[40, 40, 2]
+
+
+def test_asking_by_numbers_is_exact_in_an_object(page: Any):
+    objects = np.zeros((H, W), int)
+    objects[:, 40:] = 1
+    image, importance = painted(
+        page,
+        "hand.askFor(canvas, { stops: -1.5, mired: 0, object: 1 });",
+        light=0.5,
+        objects=objects,
+    )
+    np.testing.assert_array_equal(importance, objects)
+    np.testing.assert_allclose(image[:, 40:], 0.5 * 2**-1.5, rtol=1e-6)
+    np.testing.assert_array_equal(image[:, :40], 0.5)
+
+
+@pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "ask"])
+def test_a_dropped_stroke_has_never_been(page: Any, tool: str):
+    first = "{" + stroke("rgb: [1, 2, 3], hardness: 0", place(30, 30), place(60, 50)) + "}"
+    before = painted(page, first, light=0.5)
+    second = stroke(
+        f"tool: '{tool}', end: false, importance: 0.5", place(35, 25), place(50, 60), place(20, 20)
+    )
+    after = painted(page, first + second + "canvas.drop();", light=0.5)
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_at_the_border_nothing_is_written_elsewhere(page: Any):
+    image, importance = painted(
+        page, stroke("size: 30, rgb: [1, 1, 1]", place(-5, 32), place(-50, -50), place(200, 90))
+    )
+    assert importance[32, 5] > 0.5
+    assert importance[32, 20] == 0
+    np.testing.assert_array_equal(image[importance == 0], 0)

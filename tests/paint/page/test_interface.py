@@ -1,0 +1,556 @@
+"""The interface in a browser: every control says what it does, by mouse, keys and touch.
+
+Session and picture engine are made up (`fake/`): here it counts what the interface sends to them.
+"""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+class Painter:
+    """A page, and what a person does on it."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+
+    def said(self, kind: str) -> list[dict[str, Any]]:
+        """What was sent to the session, of a kind, once all is still."""
+        self.still()
+        return [one for one in self.page.evaluate("() => window.host.said") if one["kind"] == kind]
+
+    def still(self) -> None:
+        """Wait until all is answered, and shown."""
+        self.page.evaluate(
+            "async () => { do { await new Promise((done) => setTimeout(done, 20)); }"
+            " while (window.host.busy); }"
+        )
+
+    def calls(self, name: str) -> list[Any]:
+        """What the engine was asked to do."""
+        calls = self.page.evaluate("() => window.engine.calls")
+        return [call for call in calls if call[0] == name]
+
+    def ui(self, key: str) -> Any:
+        return self.page.evaluate("(key) => window.painter.store.value[key]", key)
+
+    def button(self, name: str, **about: Any) -> Any:
+        return self.page.get_by_role("button", name=name, **about).first
+
+    def slide(self, label: str, presses: str, times: int = 1) -> None:
+        slider = self.page.get_by_role("slider", name=label, exact=True).first
+        slider.focus()
+        for _ in range(times):
+            slider.press(presses)
+
+    def type(self, label: str, text: str) -> None:
+        field = self.page.get_by_role("textbox", name=label, exact=True).first
+        field.fill(text)
+        field.press("Enter")
+
+    def choose(self, label: str, value: str) -> None:
+        self.page.get_by_role("combobox", name=label, exact=True).first.select_option(value)
+
+    def stroke(self, *, modifiers: str = "", by: float = 80) -> None:
+        """Drag over the middle of the painting."""
+        x, y = self.place()
+        if modifiers:
+            self.page.keyboard.down(modifiers)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x + by, y, steps=4)
+        self.page.mouse.up()
+        if modifiers:
+            self.page.keyboard.up(modifiers)
+
+    def place(self) -> tuple[float, float]:
+        box = self.page.locator(".stage").bounding_box()
+        pane = self.page.evaluate("() => window.engine.panes()[0]")
+        return (
+            box["x"] + pane["x"] + 0.4 * pane["width"],
+            box["y"] + pane["y"] + 0.5 * pane["height"],
+        )
+
+    def tell(self, **message: Any) -> None:
+        self.page.evaluate("(message) => window.host.tell(message)", message)
+        self.still()
+
+
+@pytest.fixture
+def opened(browser: Any, site: Any) -> Iterator[Any]:
+    """Opens painters. No test leaves an error on the console, or one that nobody caught."""
+    contexts, errors = [], []
+
+    def open_painter(query: str = "", init: str = "", **about: Any) -> Painter:
+        context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **about})
+        contexts.append(context)
+        context.set_default_timeout(5000)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on(
+            "console",
+            lambda said: errors.append(said.text) if said.type in ("error", "warning") else None,
+        )
+        if init:
+            page.add_init_script(init)
+        page.goto(f"{site.url}/fake/index.html?size=48x27&{query}")
+        page.wait_for_selector(".lightpaint .tag")
+        return Painter(page)
+
+    yield open_painter
+    for context in contexts:
+        context.close()
+    assert not errors
+
+
+@pytest.fixture
+def painter(opened: Any) -> Painter:
+    return opened()
+
+
+def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None:
+    painter = opened("first")
+    assert painter.page.get_by_text("Paint how it should look").is_visible()
+    assert painter.page.get_by_text("You can paint already").is_visible()
+    painter.stroke()
+    assert [call[1] for call in painter.calls("begin")] == ["brush"]
+    assert painter.calls("end")
+    assert painter.said("paint")[-1]["done"] is True
+    assert not painter.page.get_by_text("Paint how it should look").is_visible()
+    assert painter.page.get_by_text("Close to what was painted").is_visible()
+
+
+def test_keys_of_paint_programs(painter: Painter) -> None:
+    press = painter.page.keyboard.press
+    for key, tool in zip(
+        "ewiglab", ["eraser", "weight", "pick", "fill", "line", "ask", "brush"], strict=True
+    ):
+        press(key)
+        assert painter.ui("tool") == tool
+    size, hardness = painter.ui("size"), painter.ui("hardness")
+    press("]")
+    assert painter.ui("size") > size
+    press("[")
+    press("[")
+    assert painter.ui("size") < size
+    press("Shift+}")
+    assert painter.ui("hardness") > hardness
+    press("3")
+    assert painter.ui("flow") == 0.3
+    press("0")
+    assert painter.ui("flow") == 1
+    first, second = painter.ui("colour"), painter.ui("second")["colour"]
+    press("x")
+    assert (painter.ui("colour"), painter.ui("second")["colour"]) == (second, first)
+    press("Control+z")
+    press("Control+Shift+Z")
+    assert painter.said("undo")
+    assert painter.said("redo")
+    for layout in ("wipe", "blink", "side"):
+        press("v")
+        assert painter.ui("show")["layout"] == layout
+    press("c")
+    press("o")
+    press(".")
+    show = painter.ui("show")
+    assert (show["clean"], show["overlay"], show["stops"]) == (False, "missed", 0.5)
+    press("+")
+    assert painter.ui("show")["zoom"] > 1
+    press("f")
+    assert painter.ui("show")["zoom"] == 1
+
+
+def test_every_key_of_the_overlay_is_there(painter: Painter) -> None:
+    painter.page.keyboard.press("?")
+    dialog = painter.page.get_by_role("dialog", name="Keys")
+    dialog.wait_for()
+    assert dialog.locator("kbd").count() > 40
+    painter.page.keyboard.press("e")  # goes nowhere while a window is open
+    assert painter.ui("tool") == "brush"
+    painter.page.keyboard.press("Escape")
+    assert not dialog.is_visible()
+
+
+def test_mouse_with_modifiers(painter: Painter) -> None:
+    painter.stroke(modifiers="Alt")
+    assert not painter.calls("begin")
+    picked = painter.ui("colour")
+    assert picked != [1, 0.45, 0.13]
+    painter.stroke()
+    painter.page.keyboard.down("Shift")
+    x, y = painter.place()
+    painter.page.mouse.click(x + 40, y + 40)
+    painter.page.keyboard.up("Shift")
+    assert len(painter.calls("line")) == 1
+    painter.page.mouse.move(x, y)
+    painter.stroke(modifiers="Space")
+    assert painter.ui("show")["pan"][0] < 0
+    assert len(painter.calls("begin")) == 1
+    painter.page.keyboard.down("Control")
+    painter.page.mouse.wheel(0, -240)
+    painter.page.keyboard.up("Control")
+    painter.still()
+    assert painter.ui("show")["zoom"] == pytest.approx(2, rel=1e-6)
+
+
+def test_escape_leaves_a_stroke(painter: Painter) -> None:
+    x, y = painter.place()
+    painter.page.mouse.move(x, y)
+    painter.page.mouse.down()
+    painter.page.mouse.move(x + 30, y)
+    painter.page.keyboard.press("Escape")
+    painter.page.mouse.up()
+    assert painter.calls("cancel")
+    assert not painter.calls("end")
+    assert painter.said("drop")
+
+
+def test_one_finger_paints_and_two_move_and_zoom(opened: Any) -> None:
+    size = {"width": 1024, "height": 768}
+    painter = opened(viewport=size, has_touch=True, is_mobile=True)
+    touch = painter.page.context.new_cdp_session(painter.page)
+    x, y = painter.place()
+
+    def send(kind: str, *points: tuple[float, float]) -> None:
+        made = [{"x": a, "y": b, "id": k} for k, (a, b) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": made})
+
+    send("touchStart", (x, y))
+    send("touchMove", (x + 20, y))
+    send("touchMove", (x + 40, y))
+    send("touchEnd")
+    painter.still()
+    assert len(painter.calls("begin")) == len(painter.calls("end")) == 1
+    send("touchStart", (x, y))
+    send("touchStart", (x, y), (x + 50, y))
+    send("touchMove", (x - 25, y), (x + 75, y))
+    send("touchEnd")
+    painter.still()
+    assert painter.ui("show")["zoom"] == pytest.approx(2, rel=0.1)
+    assert painter.calls("cancel")  # of what the first finger had begun
+    assert len(painter.calls("end")) == 1
+
+
+def test_the_colour_panel(painter: Painter) -> None:
+    painter.type("Hex", "#336699")
+    blue = painter.ui("colour")
+    assert blue == pytest.approx([0.0331, 0.1329, 0.3185], abs=1e-4)  # IEC 61966-2-1 by hand
+    painter.button("RGB").click()
+    painter.type("Red", "255")
+    assert painter.ui("colour") == pytest.approx([1, *blue[1:]])
+    painter.button("HSV", exact=True).click()
+    painter.type("Saturation", "0")
+    assert len({round(x, 9) for x in painter.ui("colour")}) == 1
+    painter.button("White", exact=True).click()
+    painter.type("Kelvin", "6504")
+    painter.type("Green", "10")
+    rgb = painter.ui("colour")
+    assert rgb[1] == max(rgb)  # greener than daylight, in which green is not the largest
+    painter.type("Brightness", "2")
+    assert painter.ui("stops") == 2
+    painter.button("2700 K").click()
+    warm = painter.ui("colour")
+    assert warm[0] > warm[1] > warm[2]
+    painter.stroke()
+    assert painter.page.get_by_role("group", name="Used lately").get_by_role("button").count() == 1
+    painter.button("Look", exact=True).click()
+    assert painter.ui("as") == "look"
+
+
+def test_asking_in_numbers(painter: Painter) -> None:
+    painter.page.keyboard.press("a")
+    painter.choose("Where", "3")
+    painter.type("Brighter", "-1.5")
+    painter.type("Warmer", "40")
+    painter.button("Ask for it").click()
+    assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
+    painter.stroke()
+    assert painter.calls("begin")[-1][1] == "ask"
+
+
+def test_names_from_files_are_text(painter: Painter) -> None:
+    painter.page.keyboard.press("a")
+    assert "blue <b>ball</b>" in painter.page.get_by_role("combobox", name="Where").inner_text()
+    painter.tell(kind="say", text="<img src=x>", tone="info")
+    assert painter.page.get_by_text("<img src=x>").is_visible()
+    assert painter.page.locator(".toasts img").count() == 0
+
+
+def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
+    painter.slide("key, stops from now", "ArrowRight", 20)
+    asked = painter.said("ask")
+    assert asked[-1]["light"] == 0
+    assert asked[-1]["done"] is True
+    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    lock = asked[-1]["asked"]["lock"]
+    assert lock == pytest.approx([x * 2 for x in present], rel=1e-6)  # 20 steps of a twentieth
+    painter.button("Let the solve have key again").click()
+    assert painter.said("ask")[-1]["asked"] == {}
+    painter.slide("key, stops from now", "Home")
+    assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
+
+
+def test_what_a_light_may_do(painter: Painter) -> None:
+    page = painter.page
+    page.get_by_role("button", name="key", exact=True).click()
+    painter.type("At most", "150")
+    assert painter.said("ask")[-1]["asked"] == {"limits": {"max": "150%"}}
+    painter.type("At least", "20")
+    assert painter.said("ask")[-1]["asked"] == {"limits": {"min": "20%", "max": "150%"}}
+    painter.choose("Colour", "kelvin")
+    painter.type("From", "3000")
+    asked = painter.said("ask")[-1]["asked"]
+    assert asked == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
+    panel = page.get_by_role("group", name="What the solve may do with key")
+    panel.get_by_role("button", name="Off", exact=True).click()
+    assert painter.said("ask")[-1]["asked"] == {"off": True}
+    panel.get_by_role("button", name="Free", exact=True).click()
+    assert painter.said("ask")[-1]["asked"] == asked  # as it was before it was off
+    painter.choose("Colour", "color")
+    painter.type("Hex or kelvin", "3200K")
+    assert painter.said("ask")[-1]["asked"]["color"] == "3200K"
+    painter.choose("Colour", "primaries")
+    assert len(painter.said("ask")[-1]["asked"]["primaries"]) == 3
+    panel.get_by_role("button", name="As now", exact=True).click()
+    assert painter.said("ask")[-1]["asked"] == {"lock": True}
+    painter.choose("On one dimmer with", "cove")
+    assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
+    painter.button("Untie").click()
+    assert painter.said("tie")[-1]["ties"] == []
+
+
+def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
+    painter.button("Solo: show pendant").click()
+    assert painter.page.evaluate("() => window.engine.shown.gains") == [k == 2 for k in range(7)]
+    painter.button("Show all").click()
+    painter.button("Mute: show the picture without key").click()
+    assert painter.page.evaluate("() => window.engine.shown.gains") == [k != 0 for k in range(7)]
+    assert not painter.said("ask")
+    painter.page.locator(".light-thumb").nth(1).hover()
+    painter.still()
+    shown = painter.page.evaluate("() => window.engine.shown")
+    assert shown["right"] == "other"
+    assert [max(rgb) > 0 for rgb in shown["other"]] == [k == 1 for k in range(7)]
+
+
+def test_what_is_under_the_pointer(painter: Painter) -> None:
+    painter.page.mouse.move(*painter.place())
+    painter.page.wait_for_timeout(80)
+    assert "back wall" in painter.page.locator(".here").inner_text()
+    assert sum(painter.ui("pointed")["shares"]) == pytest.approx(1, abs=1e-6)
+    assert painter.page.locator(".share.is-here").count() == 7
+
+
+def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
+    painter = opened("lights=64")
+    rows = painter.page.locator(".light")
+    assert rows.count() == 64
+    painter.page.get_by_label("Search lights").fill("row b")
+    assert rows.count() == 8
+    painter.button("Row B", exact=False).click()
+    assert rows.count() == 0
+    painter.page.get_by_label("Search lights").fill("nothing such")
+    assert painter.page.get_by_text("No light is called so").is_visible()
+    painter.page.get_by_label("Search lights").fill("")
+    painter.choose("Sort by", "share")
+    names = [row.get_attribute("data-light") for row in rows.all()]
+    shares = painter.page.evaluate(
+        "() => Object.fromEntries(painter.store.value.lights.map((one, k) =>"
+        " [one.name, painter.store.value.lit[k].share]))"
+    )
+    alone = [shares[name] for name in names[:3]]
+    assert alone == sorted(alone, reverse=True)
+
+
+def test_truth(painter: Painter) -> None:
+    painter.button("How true?").click()
+    painter.button("False colour").click()
+    assert painter.ui("show")["overlay"] == "falsecolor"
+    painter.button("Out of reach").click()  # asks for what it shows
+    assert painter.said("explain")
+    assert painter.page.get_by_text("The cove is at its limit").is_visible()
+    painter.button("Verify").click()
+    assert painter.said("verify")[-1]["run"] is True
+    bar = painter.page.get_by_role("progressbar", name="Verifying")
+    painter.tell(kind="progress", what="verify", done=5, total=16, unit="passes")
+    assert bar.get_attribute("aria-valuenow") == "5"
+    painter.button("Stop the render").click()
+    assert painter.said("verify")[-1]["run"] is False
+    painter.tell(kind="verified", spp=64, agrees=True, text="The render agrees.")
+    painter.button("Answer | Render").click()
+    show = painter.ui("show")
+    assert (show["left"], show["right"], show["layout"]) == ("solution", "verified", "wipe")
+    painter.slide("Wipe", "ArrowRight")
+    assert painter.ui("show")["wipe"] == pytest.approx(0.52)
+
+
+def test_how_pictures_are_shown(painter: Painter) -> None:
+    painter.choose("Compare", "present solution")
+    painter.choose("View", "agx")
+    painter.type("Exposure", "1.5")
+    painter.page.get_by_label("Clean").uncheck()
+    show = painter.page.evaluate("() => window.engine.shown")
+    assert (show["left"], show["transform"], show["stops"]) == ("present", "agx", 1.5)
+    assert show["clean"] is False
+    assert not painter.said("set")  # for the eye only
+
+
+def test_looks(painter: Painter) -> None:
+    painter.button("Keep look").click()
+    painter.stroke()
+    painter.page.keyboard.press("Control+s")
+    assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
+    painter.button("Look 2", exact=True).click()
+    painter.page.get_by_label("Name of Look 2").fill("Dawn")
+    painter.page.get_by_label("Name of Look 2").press("Enter")
+    assert painter.said("rename_look")[-1] == {"kind": "rename_look", "look": 2, "name": "Dawn"}
+    painter.button("Go on from Look 1").click()
+    assert painter.said("load_look")[-1]["look"] == 1
+    painter.button("Compare looks").click()
+    painter.type("Between", "25")
+    one, two = (look["weights"] for look in painter.ui("looks"))
+    shown = painter.page.evaluate("() => window.engine.shown")
+    assert shown["instead"] == one
+    assert shown["other"][0] == pytest.approx([0.75 * a + 0.25 * b for a, b in zip(one[0], two[0])])
+    painter.button("Back to the painting").click()
+    assert painter.ui("show")["left"] == "painting"
+    painter.page.locator(".look").first.hover()
+    painter.button("Duplicate Look 1").click()
+    painter.button("Delete Look 1", exact=True).click()
+    assert not painter.said("drop_look")  # asks once more
+    painter.button("Delete Look 1: press again").click()
+    assert painter.said("drop_look")[-1]["look"] == 1
+    assert painter.said("copy_look")[-1]["look"] == 1
+
+
+def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
+    painter.button("Write files").click()
+    painter.page.get_by_label("Report").uncheck()
+    painter.button("Write", exact=True).click()
+    assert painter.said("export")[-1]["what"] == ["target", "lighting", "relit"]
+    assert painter.page.get_by_text("gallery-evening/lighting", exact=True).is_visible()
+    assert painter.page.get_by_text("lightpaint solve gallery.xml").is_visible()
+
+
+def test_settings(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.button("Let go").click()
+    assert painter.said("set")[-1]["values"]["hold"] == 0
+    painter.button("Keep", exact=True).click()
+    painter.type("Strength", "2.5")
+    painter.button("As light").click()
+    painter.button("Whites").click()
+    painter.page.get_by_label("Take the paint at its word").check()
+    painter.type("Use at most", "3")
+    painter.type("Stay as now, strength", "0.01")
+    assert painter.said("set")[-1]["values"] == {
+        "hold": 2.5, "space": "linear", "colors": "white", "literal": True,
+        "prefer_current": 0.01, "sparse": 3,
+    }  # fmt: skip
+    painter.type("Use at most", "")
+    assert painter.said("set")[-1]["values"]["sparse"] is None
+
+
+def test_what_fails_is_said_and_the_painter_lives(painter: Painter) -> None:
+    painter.page.evaluate("() => { window.host.fails = 'the disk is full'; }")
+    painter.button("Keep look").click()
+    assert painter.page.get_by_text("the disk is full").is_visible()
+    painter.button("Dismiss").click()
+    assert not painter.page.get_by_text("the disk is full").is_visible()
+    painter.button("Keep look").click()
+    assert len(painter.said("save_look")) == 2
+
+
+def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
+    painter.tell(kind="connection", state="lost")
+    assert painter.page.get_by_role("alert").get_by_text("connection is lost").is_visible()
+    painter.tell(kind="connection", state="open")
+    assert not painter.page.get_by_role("alert").is_visible()
+    painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+    painter.stroke()
+    assert not painter.calls("begin")  # who does not have it does not paint on it
+    painter.button("Take over").click()
+    assert painter.said("take_over")
+    assert not painter.page.get_by_role("alert").is_visible()
+
+
+def test_by_keyboard_alone(painter: Painter) -> None:
+    """All controls are reached by Tab, each says what it is, and the pictures take paint."""
+    reached = []
+    for _ in range(110):
+        painter.page.keyboard.press("Tab")
+        reached.append(painter.page.evaluate("() => document.activeElement.outerHTML.slice(0, 90)"))
+    controls = painter.page.evaluate(
+        "() => [...document.querySelectorAll('.lightpaint :is(button, input, select)')]"
+        ".filter((one) => !one.disabled && one.checkVisibility()).map((one) =>"
+        " one.outerHTML.slice(0, 90))"
+    )
+    assert set(controls) <= set(reached)
+    painter.page.locator(".stage").focus()
+    for key in ("ArrowRight", "ArrowDown", "Enter"):
+        painter.page.keyboard.press(key)
+    assert len(painter.calls("begin")) == len(painter.calls("end")) == 1
+
+
+def test_in_a_shadow_root_it_looks_the_same(opened: Any) -> None:
+    plain, shadow = opened(), opened("shadow")
+    for painter in (plain, shadow):
+        painter.page.wait_for_timeout(100)
+    width = "() => engine.element.getBoundingClientRect().width"
+    assert plain.page.evaluate(width) == shadow.page.evaluate(width)
+    shadow.stroke()
+    assert shadow.calls("begin")
+    shadow.page.keyboard.press("e")  # the pictures have the focus
+    assert shadow.ui("tool") == "eraser"
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (1024, 768), (900, 600)])
+def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    for key in "bwa":
+        painter.page.keyboard.press(key)
+        cut = painter.page.evaluate(
+            "() => ['.top', '.options', '.tools', '.side', '.answer', '.fold-body'].filter((name) => {"
+            " const one = document.querySelector(`.lightpaint ${name}`);"
+            " return one.scrollWidth > one.clientWidth + 1; })"
+        )
+        assert cut == []
+
+
+def _axe() -> str:
+    """The source of axe-core: LIGHTPAINT_AXE, or where npm has it."""
+    places = [Path("node_modules")]
+    if npm := shutil.which("npm"):
+        found = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=False)
+        places.append(Path(found.stdout.strip()))
+    candidates = [Path(os.environ.get("LIGHTPAINT_AXE", "/nowhere"))]
+    candidates += [place / "axe-core" / "axe.min.js" for place in places]
+    for path in candidates:
+        if path.is_file():
+            return path.read_text(encoding="utf8")
+    pytest.skip("axe-core")
+
+
+@pytest.mark.parametrize("state", ["first", "busy", "keys", "export", "settings"])
+def test_axe_finds_nothing(opened: Any, state: str) -> None:
+    painter = opened("first&lights=12", init=_axe())
+    if state == "busy":
+        painter.button("How true?").click()
+        painter.button("False colour").click()
+        painter.button("Keep look").click()
+        painter.button("Keep look").click()
+        painter.page.get_by_role("button", name="key", exact=True).click()
+        painter.button("Solo: show pendant").click()
+        painter.page.keyboard.press("v")
+        painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+        painter.tell(kind="say", text="Something is so.", tone="warn")
+    elif state != "first":
+        painter.page.evaluate("(dialog) => painter.store.set({ dialog })", state)
+    painter.page.wait_for_timeout(250)  # toasts have faded in
+    found = painter.page.evaluate("() => axe.run(document.querySelector('.lightpaint'))")
+    assert [(one["id"], [n["html"] for n in one["nodes"]]) for one in found["violations"]] == []

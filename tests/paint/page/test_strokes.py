@@ -1,0 +1,256 @@
+"""What the page says of strokes: one message in flight, nothing lost."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.paint.protocol import Message, of_frame, said_of, to_frame
+
+
+@pytest.fixture
+def told(page: Any) -> Any:
+    """What is said to a host, after a script with `strokes`, `canvas` and `host`."""
+
+    def run(script: str) -> Any:
+        return page.evaluate(
+            f"""async () => {{
+                const {{ SlowHost, settle }} = await import("/fake_host.js");
+                const {{ Strokes }} = await import("/engine/strokes.js");
+                const canvas = bench.plain(20, 30, 0);
+                const host = new SlowHost();
+                const strokes = new Strokes(host, canvas, () => host.refused = true);
+                {script}
+            }}"""
+        )
+
+    return run
+
+
+def test_one_message_is_in_flight_and_the_rest_is_merged(told: Any):
+    said, flights = told(
+        """
+        const flights = [];
+        strokes.begin();
+        for (const x of [0, 5, 9]) {
+            strokes.touch([x, x + 2, x, x + 3]);
+            flights.push(host.inFlight);
+        }
+        await host.answer();
+        strokes.touch([1, 2, 1, 2]);
+        flights.push(host.inFlight);
+        strokes.end("brush");
+        await host.answer();
+        await host.answer();
+        return [host.told, [...flights, host.inFlight]];
+        """
+    )
+    assert flights == [1, 1, 1, 1, 0]
+    assert [one["region"] for one in said] == [[0, 2, 0, 3], [5, 11, 5, 12], [1, 2, 1, 2]]
+    assert [one["done"] for one in said] == [False, False, True]
+    assert {one["stroke"] for one in said} == {1}
+    assert said[1]["shapes"] == {"image": [6, 7, 3], "importance": [6, 7]}
+    assert said[2]["label"] == "brush"
+
+
+def test_a_stroke_that_is_sent_already_still_ends(told: Any):
+    said = told(
+        """
+        strokes.begin(); strokes.touch([3, 4, 5, 6]); await host.answer();
+        strokes.end("brush"); await host.answer();
+        return host.told;
+        """
+    )
+    assert [(one["region"], one["done"]) for one in said] == [
+        ([3, 4, 5, 6], False),
+        ([3, 3, 5, 5], True),
+    ]
+
+
+def test_what_is_done_is_sent_as_it_was_then(told: Any):
+    pixels = told(
+        """
+        strokes.begin(); canvas.image.fill(1); strokes.touch([0, 2, 0, 2]);
+        strokes.end("a");
+        strokes.begin(); canvas.image.fill(2); strokes.touch([0, 2, 0, 2]);
+        strokes.end("b");
+        for (let k = 0; k < 3; k++) await host.answer();
+        return host.said.map(({ fields, arrays }) =>
+            [fields.stroke, fields.done, ...arrays.image.data.slice(0, 1)]);
+        """
+    )
+    assert pixels == [[1, False, 1], [1, True], [2, True, 2]]
+
+
+def test_a_lost_connection_loses_no_stroke(told: Any):
+    said = told(
+        """
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
+        strokes.touch([4, 6, 4, 6]); strokes.end("a");
+        await host.lose();
+        strokes.begin(); strokes.touch([8, 9, 8, 9]); strokes.end("b");
+        strokes.begin(); strokes.touch([1, 2, 1, 2]); strokes.touch([3, 4, 3, 4]);
+        host.said.length = 0;
+        await host.find(1);
+        for (let k = 0; k < 3; k++) await host.answer();
+        return host.told;
+        """
+    )
+    assert [(one["stroke"], one["region"], one["done"]) for one in said] == [
+        (1, [0, 6, 0, 6], True),  # whole, whatever was heard of it
+        (2, [8, 9, 8, 9], True),
+        (3, [1, 4, 1, 4], False),
+    ]
+
+
+def test_a_session_with_another_basis_is_told_all_of_the_stroke(told: Any):
+    said = told(
+        """
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
+        host.tell("renewed", { kind: "renewed", resources: {} });
+        strokes.touch([5, 6, 5, 6]);
+        return host.told;
+        """
+    )
+    assert [one["region"] for one in said] == [[0, 2, 0, 2], [0, 6, 0, 6]]
+
+
+def test_strokes_go_on_counting_where_the_session_is(told: Any):
+    assert told("await host.find(41); strokes.begin(); return strokes.live.stroke;") == 42
+
+
+def test_a_dropped_stroke_is_said_to_be_dropped_if_anything_of_it_was_said(told: Any):
+    said = told(
+        """
+        strokes.begin(); strokes.drop();
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
+        await host.answer(); await host.answer("patch");
+        return host.told;
+        """
+    )
+    assert [(one["kind"], one["stroke"]) for one in said] == [("paint", 2), ("drop", 2)]
+
+
+def test_an_error_does_not_end_painting(told: Any):
+    said, refused = told(
+        """
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer("failed");
+        const before = host.refused;
+        strokes.touch([2, 4, 0, 2]); strokes.end("a");
+        await host.answer("failed"); await host.answer("failed");
+        strokes.begin(); strokes.touch([0, 2, 0, 2]);
+        return [host.told, [before ?? false, host.refused]];
+        """
+    )
+    assert len(said) == 4
+    assert refused == [False, True]
+
+
+def test_what_else_is_said_comes_after_strokes_that_are_done(told: Any):
+    order = told(
+        """
+        const order = [];
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
+        host.gate().then(() => order.push("undo"));
+        await host.answer(); order.push("live");
+        await host.answer(); order.push("done");
+        return order;
+        """
+    )
+    assert order in (["live", "undo", "done"], ["live", "done", "undo"])
+
+
+def test_frames_are_those_of_the_library(page: Any):
+    image = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
+    frame = page.evaluate(
+        """async () => {
+            const { frame } = await import("/engine/protocol.js");
+            const data = Float32Array.from({ length: 24 }, (_, i) => i);
+            const image = { data, shape: [2, 4, 3] };
+            const importance = { data: new Float32Array(8).fill(1), shape: [2, 4] };
+            const fields = { kind: "paint", seq: 7, stroke: 3, region: [1, 3, 2, 6],
+                done: true, label: "Pinsel – größer" };
+            return Array.from(new Uint8Array(frame(fields, { image, importance })));
+        }"""
+    )
+    content, buffers = of_frame(bytes(frame))
+    seq, said, arrays = said_of(content, buffers)
+    assert (seq, said.stroke, said.region, said.done) == (7, 3, (1, 3, 2, 6), True)
+    assert said.label == "Pinsel – größer"
+    np.testing.assert_array_equal(arrays["image"], image)
+    np.testing.assert_array_equal(arrays["importance"], 1)
+    # And back.
+    weights = np.random.default_rng(0).random((3, 3))
+    message = Message("answer", {"stroke": 3, "name": "é"}, {"weights": weights, "b": image[0]})
+    sent = list(to_frame(message.content(7), message.buffers()))
+    got = page.evaluate(
+        """async (bytes) => {
+            const { unframe } = await import("/engine/protocol.js");
+            const made = unframe(Uint8Array.from(bytes).buffer);
+            const { weights, b } = made.arrays;
+            return [made.kind, made.reply, made.name, Array.from(weights.data), weights.shape,
+                Array.from(b.data)];
+        }""",
+        sent,
+    )
+    assert got[:3] == ["answer", 7, "é"]
+    np.testing.assert_array_equal(np.reshape(got[3], got[4]), weights)
+    np.testing.assert_array_equal(got[5], image[0].ravel())
+
+
+def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any, site: Any):
+    site.arrays["plane/0"] = np.arange(6, dtype=np.float16).reshape(1, 2, 3)
+    site.arrays["lut/ocio:A B/c"] = np.zeros((2, 2), np.uint8)
+    heard = page.evaluate(
+        """async () => {
+            const { FakeSocket, settle } = await import("/fake_host.js");
+            const { frame, unframe } = await import("/engine/protocol.js");
+            const { SocketHost } = await import("/engine/host.js");
+            const real = window.WebSocket;
+            window.WebSocket = FakeSocket;
+            const host = new SocketHost();
+            const heard = [];
+            const early = await host.send("undo").catch((error) => error.message);
+            host.on("connection", ({ state }) => heard.push(state));
+            host.on("answer", ({ reply }) => heard.push(`answer ${reply}`));
+            host.open();
+            const [first] = FakeSocket.made;
+            first.open();
+            first.receive(frame({ kind: "state", reply: 1, resources: { "plane/0": 4 } }));
+            const answered = host.send("undo");
+            const lost = host.send("redo").catch((error) => error.message);
+            await settle();
+            const sent = first.sent.map(unframe).map(({ kind, seq }) => [kind, seq]);
+            first.receive(frame({ kind: "answer", reply: 2 }));
+            const reply = (await answered).reply;
+            host.wait = 1;
+            first.close();
+            await new Promise((done) => setTimeout(done, 20));
+            const second = FakeSocket.made[1];
+            second.open();
+            await settle();
+            const again = second.sent.map(unframe).map(({ kind, version }) => [kind, version]);
+            second.receive(frame({ kind: "state", reply: 4, resources: { "plane/0": 4 } }));
+            const picture = await host.fetch("plane/0");
+            const other = await host.fetch("lut/ocio:A B/c");
+            const none = await host.fetch("nothing").catch((error) => error.message);
+            host.close();
+            window.WebSocket = real;
+            return { heard, early, sent, reply, lost: await lost, again, none,
+                urls: FakeSocket.made.map((one) => one.url.replace(/=.*/, "")),
+                picture: [picture.shape, Array.from(picture.data)], other: other.shape };
+        }"""
+    )
+    assert heard["heard"] == ["open", "answer 2", "lost", "open"]
+    assert heard["sent"] == [["hello", 1], ["undo", 2], ["redo", 3]]
+    assert (heard["reply"], heard["again"]) == (2, [["hello", 1]])
+    assert "no connection" in heard["early"]
+    assert "lost" in heard["lost"]
+    assert heard["urls"] == [f"{site.url.replace('http', 'ws')}/live?page"] * 2
+    bits = np.arange(6, dtype=np.float16).view(np.uint16).tolist()
+    assert heard["picture"] == [[1, 2, 3], bits]
+    assert heard["other"] == [2, 2]
+    assert "there is no such picture" in heard["none"]
+    [line] = tab[1]
+    assert "404" in line
+    tab[1].clear()
