@@ -315,8 +315,9 @@ class Session:
         image, importance = pixels
         painted = (importance > 0)[..., None]
         self.image[where] = np.where(painted, image, self.present[where])
+        same = np.array_equal(self.importance[where], importance)
         self.importance[where] = importance
-        self.live.painted(where)
+        self.live.painted(where, with_importance=not same)
 
     def _pixels(self, region: Region) -> Pixels:
         top, bottom, left, right = region
