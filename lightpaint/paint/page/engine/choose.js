@@ -60,7 +60,7 @@ function frameTime(view, count) {
     const start = performance.now();
     view.setWeights(new Float64Array(3 * count).fill(1 + frame));
     view.draw({ ...DEFAULTS, layout: "blink", blink: "right" });
-    view.read(0, 0, 1, 1); // Only then is it done.
+    if (view.name === "gl") view.read(0, 0, 1, 1); // Only then is it done.
     time = performance.now() - start;
   }
   return time;

@@ -26,7 +26,8 @@ export class CpuView {
     this.name = /** @type {const} */ ("cpu");
     this.canvas = canvas;
     this.size = size;
-    const context = canvas.getContext("2d", { alpha: false });
+    // Pixels come from the processor: a canvas of the GPU, or of one in software, would be slower.
+    const context = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
     if (!context) throw new Error("no canvas to draw on");
     this.context = context;
     /** @type {import("./mix.js").Plane[]} */

@@ -16,7 +16,7 @@ export class Layer {
     this.canvas = document.createElement("canvas");
     this.canvas.width = this.width;
     this.canvas.height = this.height;
-    const context = this.canvas.getContext("2d", { alpha: false });
+    const context = this.canvas.getContext("2d", { alpha: false, willReadFrequently: true });
     if (!context) throw new Error("no canvas to draw on");
     this.context = context;
     this.encoder = new Encoder(SRGB, 0);
