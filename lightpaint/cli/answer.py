@@ -21,6 +21,7 @@ from lightpaint.report.sentences import (
     spoken_errors,
     spoken_percent,
     unreached_channels,
+    untold_lights,
     what_holds,
     what_is_missed,
 )
@@ -130,6 +131,8 @@ def _show_short(look: Look) -> None:
             room=NAME,
         )
     terminal.print_table(table, swatches)
+    if said := untold_lights(look.lighting):
+        terminal.tell(said)
     if rest := sorted(set(range(len(lights))) - set(shown)):
         terminal.tell(_spoken_rest(look, rest))
     if any(lights[k].is_active for k in shown):

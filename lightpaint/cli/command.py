@@ -7,7 +7,7 @@ import traceback
 import warnings
 from collections.abc import Sequence
 
-from lightpaint.cli import lines, terminal
+from lightpaint.cli import lines
 from lightpaint.cli.manner import Manner, Outcome, speaking
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
@@ -34,7 +34,7 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
         from lightpaint.signals import interruptible_between_pieces
 
         with interruptible_between_pieces():
-            from lightpaint.cli import commands
+            from lightpaint.cli import commands, terminal
             from lightpaint.cli.options import values_of
             from lightpaint.scene.variant import SlowBackendWarning
 

@@ -44,8 +44,16 @@ def paint(
     from lightpaint.paint.server import check_installed
 
     check_installed()
-    how = {"settings": settings, "constraints": constraints, "choice": choice, "options": options}
-    subject = subject_of(source, folder, **how)  # type: ignore[arg-type]
+    from lightpaint.cli.spelling import solve_command
+
+    subject = subject_of(
+        source,
+        folder,
+        settings=settings,
+        constraints=constraints,
+        choice=choice,
+        command=lambda painting, wishes: solve_command(source.path, painting, options, wishes),
+    )
     if (scene := subject.scene) is not None:
         remarks = *remarks_of_scene(scene), *remarks_of_film(scene, settings)
         for remark in (*remarks, *remarks_of_memory(scene)):

@@ -120,6 +120,8 @@ def _ties(light: LightSetting) -> dict[str, Any]:
         ties["standard_error"] = light.standard_error
     if light.interval is not None:
         ties["interval"] = light.interval
+    if light.untold:
+        ties["untold"] = True
     if light.is_fixed:
         ties["is_fixed"] = True
     if light.members != (light.name,):

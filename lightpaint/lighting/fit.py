@@ -20,7 +20,7 @@ Colors = Literal["free", "gentle", "white"]
 
 #: Weight of all that is not painted beside all that is, where it was painted over the current look:
 #: benchmarks/intent.py has what others do.
-HOLD = 1.0
+HOLD = 3.0
 
 F = TypeVar("F", bound="Fit")
 

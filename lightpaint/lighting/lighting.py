@@ -128,6 +128,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 reached=ALL_REACHED,
                 standard_error=None,
                 interval=None,
+                untold=False,
             )
             if light is changed
             else light

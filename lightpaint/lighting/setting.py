@@ -30,6 +30,7 @@ class LightSetting:
     standard_error: of the emission, from the noise it was solved with, where that is known; None in
     channels that reach nothing.
     interval: 95 % interval of each channel, lower and upper end; as standard_error.
+    untold: whether so little is known of it that it cannot be told at the samples of the basis.
     """
 
     name: str
@@ -46,6 +47,7 @@ class LightSetting:
     reached: tuple[bool, bool, bool] = ALL_REACHED
     standard_error: Errors | None = None
     interval: Intervals | None = None
+    untold: bool = False
 
     def __post_init__(self) -> None:
         if not self.members:

@@ -1,10 +1,9 @@
-"""What leaves a session: files that other programs read, the verifying render, a command line."""
+"""What leaves a session: files that other programs read, and the verifying render."""
 
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -15,7 +14,6 @@ from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.paint.session import Moment
 from lightpaint.paint.subject import Subject
-from lightpaint.paint.wishes import Wishes
 from lightpaint.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
@@ -26,13 +24,6 @@ from lightpaint.target.own import write_painting
 
 #: Files of an export, and the folder of its report.
 PAINTING, LIGHTING, RELIT, ANSWER = "painting.exr", "lighting.json", "relit.xml", "answer"
-
-
-def command_line(subject: Subject, wishes: Wishes) -> str:
-    """The command that answers the exported painting as the session does."""
-    painting = subject.folder / PAINTING
-    words = ["lightpaint solve", quote(subject.source), quote(str(painting))]
-    return " ".join([*words, *subject.options, *wishes.options()])
 
 
 def export(

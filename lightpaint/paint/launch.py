@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
+from lightpaint.paint.wishes import Wishes
 from lightpaint.scene.quality import on_film
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile, check_needed
@@ -38,7 +39,7 @@ def subject_of(
     settings: Settings | None = None,
     constraints: Constraints | None = None,
     choice: TransformChoice | None = None,
-    options: Sequence[str] = (),
+    command: Callable[[str, Wishes], str] = lambda painting, wishes: "",
 ) -> Subject:
     """What is to be painted, read and checked before anything is rendered.
 
@@ -51,7 +52,7 @@ def subject_of(
         "settings": settings,
         "constraints": constraints,
         "choice": choice or TransformChoice(),
-        "options": tuple(options),
+        "command": command,
     }
     if not isinstance(source, SceneFile):
         default = Settings()

@@ -16,23 +16,19 @@ A full disk ends nothing: what cannot be written stays in memory, in order, `uns
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.database import damaged, opened, transaction
-from lightpaint.paint.packed import packed, packed_patch, unpacked, unpacked_patch
-from lightpaint.paint.steps import Identity, KeptLook, Patch, Pixels, Region, Step
+from lightpaint.paint.kept import KeptPatch, LookArrays, PackedArrays, packed_arrays
+from lightpaint.paint.packed import packed_patch
+from lightpaint.paint.steps import Identity, KeptLook, Step
 from lightpaint.records import strict_json
-
-#: What looks are made of.
-DTYPES = ("float32", "float64", "float16", "uint8", "int16")
 
 _Write = Callable[[sqlite3.Connection], object]
 
@@ -60,7 +56,7 @@ class Store:
         self._last = 0  # id of the last step there ever was
         self._waiting: list[_Write] = []  # what is still to be written, in order
         self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
-        self._arrays: dict[int, _Packed] = {}  # the same of looks
+        self._arrays: dict[int, PackedArrays] = {}  # the same of looks
         self._database = opened(path, identity)
         try:
             self._read()
@@ -123,10 +119,12 @@ class Store:
         with self._lock:
             fields, arrays = _text(look.fields), look.arrays
             number, blobs = look.id, None
-            if not (isinstance(arrays, _LookArrays) and arrays.is_of(self, number)):
-                blobs = _packed_arrays(arrays)
+            if not (isinstance(arrays, LookArrays) and arrays.is_of(self._look_arrays, number)):
+                blobs = packed_arrays(arrays)
                 self._arrays[number] = blobs
-            self._looks[number] = KeptLook(number, strict_json(fields), _LookArrays(self, number))
+            self._looks[number] = KeptLook(
+                number, strict_json(fields), LookArrays(self._look_arrays, number)
+            )
 
             def write(database: sqlite3.Connection) -> None:
                 said = (number, fields)
@@ -210,16 +208,18 @@ class Store:
         for (position,) in ask("SELECT value FROM about WHERE name = 'position'"):
             self.position = min(int(position), len(self.steps))
         for number, fields in ask("SELECT id, fields FROM look ORDER BY id").fetchall():
-            self._looks[number] = KeptLook(number, strict_json(fields), _LookArrays(self, number))
+            self._looks[number] = KeptLook(
+                number, strict_json(fields), LookArrays(self._look_arrays, number)
+            )
 
     def _step(self, number: int, kind: str, label: str, fields: str, region: str) -> Step:
         where, patch = strict_json(region), None
         if where is not None:
             top, bottom, left, right = (int(edge) for edge in where)
-            patch = _KeptPatch((top, bottom, left, right), self, number)
+            patch = KeptPatch((top, bottom, left, right), partial(self._pixels, number))
         return Step(str(kind), str(label), strict_json(fields), patch)
 
-    def _pixels(self, number: int, region: Region) -> tuple[Pixels, Pixels]:
+    def _pixels(self, number: int) -> tuple[bytes, bytes]:
         with self._lock:
             blobs = self._blobs.get(number)
             if blobs is None:
@@ -227,9 +227,9 @@ class Store:
                 blobs = self._database.execute(found, (number,)).fetchone()
         if blobs is None:
             raise PaintError(f"a step that was cut off: {number}")
-        return unpacked_patch(region, *blobs)
+        return blobs
 
-    def _look_arrays(self, number: int) -> "_Packed":
+    def _look_arrays(self, number: int) -> PackedArrays:
         with self._lock:
             if number in self._arrays:
                 return self._arrays[number]
@@ -245,64 +245,9 @@ class MemoryStore(Store):
         super().__init__(None, identity)
 
 
-#: Arrays of a look by name: dtype, shape as JSON, data.
-_Packed = dict[str, tuple[str, str, bytes]]
-
-
-class _KeptPatch(Patch):
-    """A patch whose pixels are in the store."""
-
-    def __init__(self, region: Region, store: Store, number: int) -> None:
-        vars(self).update(region=region, _store=store, _number=number)
-
-    @property
-    def before(self) -> Pixels:
-        return self._pixels()[0]
-
-    @property
-    def after(self) -> Pixels:
-        return self._pixels()[1]
-
-    def _pixels(self) -> tuple[Pixels, Pixels]:
-        kept: Store = vars(self)["_store"]
-        return kept._pixels(vars(self)["_number"], self.region)
-
-
-class _LookArrays(Mapping[str, npt.NDArray[Any]]):
-    """Arrays of a look that are in the store."""
-
-    def __init__(self, store: Store, number: int) -> None:
-        self._store, self._number = store, number
-
-    def is_of(self, store: Store, number: int) -> bool:
-        """Whether these are of that look."""
-        return (self._store, self._number) == (store, number)
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        dtype, shape, data = self._store._look_arrays(self._number)[name]
-        if dtype not in DTYPES:
-            raise PaintError(f"a damaged look: {dtype}")
-        return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._store._look_arrays(self._number))
-
-    def __len__(self) -> int:
-        return len(self._store._look_arrays(self._number))
-
-
 def _text(fields: Mapping[str, Any]) -> str:
     """Fields as JSON. Raises PaintError for what JSON has no word for."""
     try:
         return json.dumps(dict(fields), ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise PaintError(f"this cannot be kept: {first_line(error)}") from None
-
-
-def _packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> _Packed:
-    found = {}
-    for name, array in arrays.items():
-        if array.dtype.name not in DTYPES:
-            raise PaintError(f"a look of {array.dtype.name}: expected {', '.join(DTYPES)}")
-        found[name] = (array.dtype.name, json.dumps(array.shape), packed(array))
-    return found

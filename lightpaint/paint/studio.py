@@ -19,9 +19,8 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.solution import Solution
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.exports import command_line, export, verified
+from lightpaint.paint.exports import PAINTING, export, verified
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
 from lightpaint.paint.protocol import Message
@@ -57,7 +56,7 @@ class Studio:
         self.pictures = Pictures()
         self._session: Session | None = None
         self._looks: Looks | None = None
-        self._solution: Solution | None = None
+        self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
         self._lock, self._bell = RLock(), Condition()
         self._unsettled, self._is_open, self._failed = False, True, ""
         self._render, self._renders = Lock(), False
@@ -108,9 +107,10 @@ class Studio:
                 return Message("waiting", {**about, "text": self._failed})
             basis = session.basis
             about |= self._of_basis(basis, session)
-            answer = {"lights_answer": lights_fields(basis, session.weights)}
+            known = self._known if self._known.get("version") == session.version else {}
+            answer = {"lights": lights_fields(basis, session.weights), **known}
             arrays = session.weights_array
-            return Message("state", {**about, **session.about, **answer}, arrays)
+            return Message("state", {**about, **session.about, "answer": answer}, arrays)
 
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
         """What comes of a message at once. Raises LightpaintError for what cannot be done."""
@@ -269,8 +269,13 @@ class Studio:
             "has_noise": basis.knows_noise,
             "first": not session.store.steps,
             "stroke": session.stroke,
-            "command": command_line(self.subject, session.wishes),
+            "command": self._command(session),
         }
+
+    def _command(self, session: Session) -> str:
+        """The command that answers the exported painting alike, where there are commands."""
+        subject = self.subject
+        return subject.command(str(subject.folder / PAINTING), session.wishes)
 
     def _clean(self) -> None:
         """Planes without their grain, one after the other."""
@@ -318,19 +323,15 @@ class Studio:
             moment = session.moment()
         solution = moment.solution()
         self._tell(lambda: session.settled(moment, solution))
-        with self._lock:
-            self._solution = solution if moment.version == session.version else self._solution
         if solution is None or moment.version != session.version:
             return
         [analysis] = analyse(solution)
-        with self._lock:
-            if moment.version == session.version:
-                self._solution = with_findings(solution, (analysis,))
         self._tell(lambda: session.settled(moment, solution, **analysis_fields(analysis)))
 
     def _tell(self, make: Callable[[], Message | None]) -> None:
         with self._lock:
             message = make()
+            self._known = message.fields if message is not None else self._known
         self._say(message)
 
     # Long work
@@ -351,7 +352,7 @@ class Studio:
         session, lighting = self._answer()
         with self._render:
             files = export(self.subject, session.moment(), lighting, message.what, self._hears)
-        command = command_line(self.subject, session.wishes)
+        command = self._command(session)
         self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
 
     def _verify(self, message: protocol.Verify) -> list[Message]:

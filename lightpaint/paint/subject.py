@@ -1,6 +1,6 @@
 """What is painted: a scene, a saved basis, or light groups; and how its lights come to be known."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint.wishes import Wishes
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality import samples
@@ -27,7 +28,8 @@ class Subject:
     source: as it was named, for people and for command lines. scene: on the film of the basis;
     None without a renderer. basis: where there is one already, as of light groups. settings,
     constraints: how paintings are answered. choice: of a view transform, to paint through. folder:
-    receives what is exported. options: of the command line, that `solve` needs too.
+    receives what is exported. command: that answers an exported painting, by its path, as a session
+    does in which this is wished; "" where there are no commands.
     """
 
     source: str
@@ -38,7 +40,7 @@ class Subject:
     settings: Settings = field(default_factory=Settings)
     constraints: Constraints = field(default_factory=Constraints)
     choice: TransformChoice = field(default_factory=TransformChoice)
-    options: tuple[str, ...] = ()
+    command: Callable[[str, Wishes], str] = lambda painting, wishes: ""
 
     @property
     def name(self) -> str:

@@ -52,6 +52,13 @@ MESSAGES = 2**32
 LIVE = ("target", "lighting", "constraints")
 
 
+class Live(traitlets.Any):  # type: ignore[misc]
+    """An object that is looked at when it is set, also where it is None."""
+
+    def _validate(self, obj: Any, value: Any) -> Any:
+        return value if obj._cross_validation_lock else self._cross_validate(obj, value)
+
+
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     """A painter in a notebook: paint light, and see the answer while the brush moves.
 
@@ -90,9 +97,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     _esm = widget_script()
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
     height = traitlets.Int(720).tag(sync=True)
-    target = traitlets.Any(None, allow_none=True)
-    lighting = traitlets.Any(None, allow_none=True)
-    constraints = traitlets.Any(None, allow_none=True)
+    target = Live(None)
+    lighting = Live(None)
+    constraints = Live(None)
 
     def __init__(
         self,
@@ -163,9 +170,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def close(self) -> None:
         """End it; a session with a file can be gone on with."""
-        self._studio.on_message = None
-        self._studio.close()
-        super().close()
+        if "_studio" in vars(self):  # else it has never begun
+            self._studio.on_message = None
+            self._studio.close()
+            super().close()
 
     # What is set from a cell
 

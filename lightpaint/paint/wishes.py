@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from shlex import quote
 from typing import Any
 
 from lightpaint.basis.basis import BasisLight
@@ -81,39 +80,3 @@ class Wishes:
         if "hold" in asked and given.unpainted:
             asked["unpainted"] = 0.0
         return replace(given, **asked)
-
-    def options(self) -> list[str]:
-        """The same as options of `lightpaint solve`."""
-        made = []
-        for name, asked in self.lights.items():
-            made += [option for key in asked for option in _options(name, key, asked)]
-        for names in self.ties:
-            made.append(f"--tie {quote(','.join(names))}")
-        for key, value in self.values.items():
-            option = f"--{key.replace('_', '-')}"
-            made.append(option if value is True else f"{option} {value}")
-        return made
-
-
-def _options(name: str, key: str, asked: Mapping[str, Any]) -> list[str]:
-    """One of the keys asked of a light, as options; duv goes with its kelvin."""
-    value = asked[key]
-    if key in ("off", "lock") and value is True:
-        return [f"--{key} {quote(name)}"]
-    if key == "limits":
-        ends = ":".join("" if end not in value else _said(value[end]) for end in ("min", "max"))
-        return [f"--limit {quote(f'{name}={ends}')}"]
-    if key == "kelvin":
-        duv = f",duv={asked['duv']:g}" if "duv" in asked else ""
-        kelvin = ":".join(map(_said, value)) if isinstance(value, list | tuple) else _said(value)
-        return [f"--kelvin {quote(f'{name}={kelvin}{duv}')}"]
-    if key == "duv":
-        return []
-    return [f"--{key} {quote(f'{name}={_said(value)}')}"]
-
-
-def _said(value: Any) -> str:
-    """A value of a lights file as an option has it, to its last digit."""
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return ",".join(map(_said, value))
-    return repr(float(value)) if isinstance(value, int | float) else str(value)

@@ -43,7 +43,7 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     shares = energy_shares(basis, solution.lighting)
     errors, spoken = relative_errors(uncertainty), spoken_errors(uncertainty, len(shares))
     solved, low, high = brightness(uncertainty)
-    effect = np.where(np.isfinite(errors), errors, 0) * shares
+    effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * shares
     # Those that are off and may be on come behind, by how bright they may be.
     order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
     rows = [
@@ -51,7 +51,7 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
             name_of(basis.names[k]),
             f"{solved[k]:.3g}",
             f"{low[k]:.3g} … {high[k]:.3g}",
-            spoken[k] if np.isfinite(errors[k]) else "–",
+            spoken[k] if np.isfinite(errors[k]) or uncertainty.untold[k] else "–",
             f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
         )
         for k in order

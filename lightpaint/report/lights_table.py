@@ -22,7 +22,13 @@ from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
 from lightpaint.report.looks import MOST_THUMBNAILS
 from lightpaint.report.measures import energy_shares, largest_shares, that_do_most
-from lightpaint.report.sentences import spoken_errors, spoken_percent, unreached_channels
+from lightpaint.report.sentences import (
+    UNTOLD,
+    UNTOLD_HERE,
+    spoken_errors,
+    spoken_percent,
+    unreached_channels,
+)
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (
@@ -96,7 +102,8 @@ def _rows(
     thumbnails = side_by_side(shown, basis.images)
     for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
         name, setting = escape(light.name), settings[light.name]
-        error = f" <small>{errors[k]}</small>" if errors[k] else ""
+        error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
+        error = f" <small>{error}</small>" if error else ""
         what = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
             f'<tr><td class="thumb"><img src="{uri}" '

@@ -30,6 +30,7 @@ from lightpaint.report.comparison import SURROUND, TEXT, fitted
 from lightpaint.report.figures import THUMBNAIL, data_uri, thumbnail
 from lightpaint.report.lights_table import change, hex_color
 from lightpaint.report.pictures import coverage, unpainted_look
+from lightpaint.report.sentences import UNTOLD_HERE
 from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
@@ -79,6 +80,7 @@ def lighting_html(lighting: Lighting) -> str:
         light = lighting.lights[k]
         seen = lighting.photometry(light)
         asked = "kept" if light.is_fixed else light.constraint
+        asked = ", ".join(filter(None, (asked, UNTOLD_HERE if light.untold else "")))
         colour, output = _swatch(light.emission, seen), " ".join(seen.amounts)
         if light.is_partly_reached:
             colour = _Html("")
@@ -98,6 +100,7 @@ def solution_html(solution: Solution) -> str:
         light, setting = basis.lights[k], lighting.lights[k]
         # What a page of the report stacks stands in a line here.
         told = change(light, setting).replace("<small>", " ").replace("</small>", "")
+        told += f", {UNTOLD_HERE}" if setting.untold else ""
         colour = _swatch(setting.emission, lighting.photometry(setting))
         colour = _Html("") if setting.is_partly_reached else colour
         now, new = _rgb(light.emission), _rgb(setting.emission)

@@ -33,7 +33,13 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.pictures import brighter_than_white, residual_of, transform_of
-from lightpaint.report.sentences import brightness, halving_spp, most_uncertain, relative_errors
+from lightpaint.report.sentences import (
+    UNTOLD_HERE,
+    brightness,
+    halving_spp,
+    most_uncertain,
+    relative_errors,
+)
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
@@ -177,6 +183,7 @@ def _lights(
         for k, its in enumerate(told.values()):
             its["interval"] = [float(end[k]) for end in ends]
             its["relative_error"] = float(errors[k])
+            its["untold"] = UNTOLD_HERE if uncertainty.untold[k] else None
             if solved[k] > 0:
                 its["relative_interval"] = [float(end[k] / solved[k]) - 1 for end in ends]
     return told

@@ -28,6 +28,10 @@ SMALLER = 0.01
 #: Characters of names in a sentence.
 NAMES = 120
 
+#: Of a light whose error says nothing, instead of one: in a table, and in a sentence.
+UNTOLD = "cannot be told"
+UNTOLD_HERE = f"{UNTOLD} at these samples"
+
 #: What the painting and the light there must differ by to be called another colour.
 SEEN = 0.06
 
@@ -58,11 +62,25 @@ def relative_errors(uncertainty: Uncertainty) -> Doubles:
 def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
     """`± 4 %` of each light; empty if nothing is known of it.
 
-    On one side only, `0 … +4 %`, of what is at a limit; `0 … 0.9`, in its unit, of what is off.
+    On one side only, `0 … +4 %`, of what is at a limit; `0 … 0.9`, in its unit, of what is off;
+    `cannot be told` of a light of which the samples show nothing but stray pixels.
     """
     if uncertainty is None:
         return [""] * count
-    return [_spoken_error(*ends) for ends in zip(*brightness(uncertainty), strict=True)]
+    told = zip(*brightness(uncertainty), uncertainty.untold, strict=True)
+    return [UNTOLD if untold else _spoken_error(*ends) for *ends, untold in told]
+
+
+def untold_lights(lighting: Lighting) -> str:
+    """A sentence on the lights that cannot be told; "" if there are none."""
+    names = [light.name for light in lighting.lights if light.untold]
+    if not names:
+        return ""
+    it = "it" if len(names) == 1 else "them"
+    return (
+        f"{spoken_lights(names, start=True)} {UNTOLD_HERE}: little but stray bright pixels is seen "
+        f"of {it}. Render more samples, or keep {it}."
+    )
 
 
 def _spoken_error(solved: float, low: float, high: float) -> str:
@@ -96,6 +114,9 @@ def unreached_channels(light: LightSetting) -> str:
 def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     """What more samples would change, of the light whose error changes the picture most."""
     k = most_uncertain(basis, solution, uncertainty)
+    untold = untold_lights(solution.lighting)
+    if k is None and untold:
+        return untold
     if k is None:
         has_noise = bool(basis.half_differences.any())
         why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
@@ -105,16 +126,19 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     name = solution.lighting.lights[k].name
     light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
-    return (
+    said = (
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
     )
+    return f"{untold} {said}" if untold else said
 
 
 def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:
-    """The light whose error changes the picture most; None where none does."""
+    """The light whose error changes the picture most, of those that can be told; None if none."""
     errors = relative_errors(uncertainty)
-    effect = np.where(np.isfinite(errors), errors, 0) * energy_shares(basis, solution.lighting)
+    effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * energy_shares(
+        basis, solution.lighting
+    )
     return int(np.argmax(effect)) if effect.any() else None
 
 

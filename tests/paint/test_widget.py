@@ -20,6 +20,9 @@ comm = pytest.importorskip("comm", reason="comm")
 SIZE = (12, 20)
 PAGE, OTHER = 7, 9
 
+#: The answer is what was painted, and nothing else.
+HOW = {"colors": "free", "hold": 0.0, "space": "linear"}
+
 
 class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
     """A line to a page that there is none of."""
@@ -51,7 +54,7 @@ def open_(basis: lp.Basis, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     made = []
 
     def make(**how: Any) -> Any:
-        made.append(lp.Painter(basis, folder=tmp_path, colors="free", hold=0.0, **how))
+        made.append(lp.Painter(basis, folder=tmp_path, **HOW, **how))
         made[-1].comm.messages = []
         return made[-1]
 

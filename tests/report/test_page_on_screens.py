@@ -71,7 +71,8 @@ def _errors(solution: Solution) -> Uncertainty:
     scatter = 0.1 * weights + 1e-3
     interval = (np.maximum(weights - 2 * scatter, 0), weights + 2 * scatter)
     norm2 = solution.equations.target_norm2
-    return Uncertainty(weights, scatter, scatter, interval, each, each, each, norm2)
+    told = np.zeros(len(weights), dtype=bool)
+    return Uncertainty(weights, scatter, scatter, interval, each, each, each, norm2, told)
 
 
 def _laid_out(folder: Path, page: str) -> dict[int, tuple[int, int]]:

@@ -144,7 +144,7 @@ def _at_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
             row[its] = coefficients if total >= cap.upper * (1 - AT_LIMIT) else -coefficients
             rows.append(row)
             room.append(cap.upper - cap.lower)
-    return np.array(rows).reshape(-1, x.size), np.array(room)
+    return np.array(rows).reshape(len(rows), x.size), np.array(room)
 
 
 def _keeping(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:

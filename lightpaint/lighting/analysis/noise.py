@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import mix
 from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.lighting.analysis.peaks import Peaks
 from lightpaint.lighting.normal_equations import BLOCK, FEW_LIGHTS, NormalEquations
 from lightpaint.lighting.solution import Solution
 
@@ -34,6 +35,7 @@ class Noise:
     power: (3, n, n), N_ij = Σ D h_i h_j, what the noise adds to M. drawn: (3, n), what the
     noise of the current look, where that is solved for, adds to b.
     gradient: (3, n, 3, n), covariance of the gradient. objective: as in `Uncertainty`.
+    hidden: (3, n), what few pixels may add to a light's own, that they do not show (peaks.py).
     """
 
     power: Doubles
@@ -41,6 +43,23 @@ class Noise:
     gradient: Doubles
     objective_error: Doubles
     objective_noise: Doubles
+    hidden: Doubles
+
+    @property
+    def is_hidden(self) -> Bools:
+        """(n, 3), whether most of what pushes a light is what few pixels may hide."""
+        return np.asarray(self.hidden > np.einsum("cici->ci", self.gradient)).T
+
+    @property
+    def whole(self) -> Doubles:
+        """(3, n, 3, n), covariance of the gradient with what is hidden."""
+        made, lights = self.gradient.copy(), np.arange(self.hidden.shape[1])
+        deviation = np.sqrt(self.hidden)
+        # Where channels are coupled, one path carries all three.
+        coupled = made.any(axis=(1, 3))
+        for c, d in zip(*np.nonzero(coupled), strict=True):
+            made[c, lights, d, lights] += deviation[c] * deviation[d]
+        return made
 
 
 def noise_sums(solution: Solution) -> Noise:
@@ -58,6 +77,7 @@ def noise_sums(solution: Solution) -> Noise:
     is_coupled = len(problem.full.channel_groups) < 3
     power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
     gradient = np.zeros((3, n, 3, n))
+    peaks = [Peaks.none(n) for _ in range(3)]
     # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
     # pixel it adds Φᵢ hᵢ times this.
     pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
@@ -74,10 +94,12 @@ def noise_sums(solution: Solution) -> Noise:
             for c in range(3):
                 D = weight[pixels, c % weight.shape[1]].astype(np.float64)
                 h = halves[:, pixels, c].astype(np.float64)
-                rows.append(D * (h * residual[pixels, c] - images[:, pixels, c] * mixed[pixels, c]))
+                lit = images[:, pixels, c].astype(np.float64)
+                rows.append(D * (h * residual[pixels, c] - lit * mixed[pixels, c]))
+                size = np.abs(residual[pixels, c]) + weights[:, c, None] * lit
+                peaks[c].see(D * lit * size, rows[c])
                 if pulled.any():
-                    lit = np.where(unseen[pixels], images[:, pixels, c], 0).astype(np.float64)
-                    rows[c] += pulled[:, c, None] * lit * h
+                    rows[c] += pulled[:, c, None] * np.where(unseen[pixels], lit, 0) * h
                 power[c] += (D * h) @ h.T
                 shared = D * share[pixels, c % share.shape[1]]
                 drawn[c] += h @ (shared * present[pixels, c])
@@ -94,6 +116,7 @@ def noise_sums(solution: Solution) -> Noise:
         gradient,
         objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
         objective_noise=(weight * np.square(mixed)).sum(axis=0),
+        hidden=np.array([its.hidden() for its in peaks]),
     )
 
 
@@ -129,16 +152,18 @@ def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles
     return weights, (1 - removed) * lack
 
 
-def without_noise(equations: NormalEquations, power: Doubles) -> Doubles:
+def without_noise(
+    equations: NormalEquations, power: Doubles, *, most: float = LARGEST_NOISE
+) -> Doubles:
     """M without the noise in it, (3, n, n), positive semidefinite.
 
-    power: (3, n, n), N. M − N, but in no direction less than 1 − LARGEST_NOISE of M.
+    power: (3, n, n), N. M − N, but in no direction less than 1 − `most` of M.
     """
     made = np.empty_like(equations.M)
     for c in range(3):
         root, inverse = _roots(equations.M[c])
         values, vectors = eigh(inverse @ power[c] @ inverse.T)
-        values = np.clip(values, 0, LARGEST_NOISE)
+        values = np.clip(values, 0, most)
         made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
     return made
 

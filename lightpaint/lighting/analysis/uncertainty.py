@@ -11,7 +11,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.arrays import Bools, Doubles, as_rgb
+from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.lighting.analysis.directions import (
     Room,
@@ -27,6 +28,7 @@ from lightpaint.lighting.analysis.noise import (
     pseudo_inverse,
     without_noise,
 )
+from lightpaint.lighting.analysis.outliers import doubt, weakest
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.lighting.solution import Solution
@@ -67,6 +69,8 @@ class Uncertainty:
         excess: (3,), by how much the objective of these weights, were they rendered without noise,
             may be expected to exceed the least possible.
         target_norm2: (3,), ‖Ψ‖², to hold it against.
+        untold: (n,), the lights that cannot be told at these samples: little but stray bright
+            pixels is seen of them, and their interval is wider than they are bright.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -83,6 +87,7 @@ class Uncertainty:
     objective_noise: Doubles
     excess: Doubles
     target_norm2: Doubles
+    untold: Bools
 
     __repr__ = shortly
 
@@ -127,16 +132,56 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     unbiased = NormalEquations(corrected, right, equations.target_norm2)
     bias = np.asarray(answer_to(solution, unbiased) - weights)
 
-    # How firmly lights are held, had there been no bias.
-    asked = problem.pulled(unbiased)
-    gradient = asked.gradient(weights + bias).T.ravel()
-    # A render of the mix shows all of an earlier error, of which a step by the noisy M leaves
-    # a part; the unbiased answer, on which the interval hangs, has the scatter of its own M.
-    scatters = problem.pulled(solved if problem.refinement is None else unbiased)
-    M, C = scatters.whole, noise.gradient.reshape(gradient.size, -1)
-    missed = equations.whole
+    # How firmly lights are held, had there been no bias. A render of the mix shows all of an
+    # earlier error, of which a step by the noisy M leaves a part; the unbiased answer, on which the
+    # interval hangs, has the scatter of its own M.
+    scatters = solved if problem.refinement is None else unbiased
+    *sides, excess = _scatter(solution, noise, scatters, unbiased, weights + bias)
+    doubts = doubt(solution, noise.power)
+    if doubts.any():
+        weak = weakest(solution, noise.power, doubts, corrected)
+        # A step from a render of the mix is asked of M alone.
+        if problem.refinement is not None:
+            right = np.einsum("cij,jc->ci", weak, before) + step
+        few = NormalEquations(weak, right, equations.target_norm2)
+        far = answer_to(solution, few)
+        *sides, _ = _scatter(solution, noise, few, few, far)
+        sides = [np.hypot(side, far - weights - bias) for side in sides]
+    by_channel = excess.reshape(3, -1).sum(axis=1)
+    by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
+    told = np.where(solution.reached, 1, np.nan)
+    interval = _interval(solution, bias * told, sides)
+    return Uncertainty(
+        weights,
+        np.maximum(*sides) * told,
+        bias * told,
+        interval,
+        noise.objective_error,
+        noise.objective_noise,
+        by_channel,
+        solution.norm2,
+        ((doubts >= 0.5) | noise.is_hidden).any(axis=1) & _is_wide(weights, interval),
+    )
+
+
+def _scatter(
+    solution: Solution,
+    noise: Noise,
+    scatters: NormalEquations,
+    unbiased: NormalEquations,
+    at: Doubles,
+) -> tuple[Doubles, Doubles, Doubles]:
+    """Standard deviations below and above the weights, (n, 3) each, and the excess, (3 n,).
+
+    scatters: the equations by which the noise of the gradient moves them. unbiased, at: those
+    whose gradient there, (n, 3), says how firmly they are held.
+    """
+    problem = solution.problem
+    gradient = problem.pulled(unbiased).gradient(at).T.ravel()
+    asked, missed = problem.pulled(scatters), problem.equations.whole
+    M, C = asked.whole, noise.whole.reshape(gradient.size, -1)
     below, above, excess = (np.zeros(gradient.size) for _ in range(3))
-    for room in rooms(solution, scatters):
+    for room in rooms(solution, asked):
         to, held = room.columns, room.held
         steps, covariance = _propagated(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
         excess += np.einsum("pq,qp->p", missed, to @ covariance @ to.T)
@@ -144,20 +189,8 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         own = room.emitted @ (held.own * steps)
         below += both + np.square(np.minimum(own, 0)).sum(axis=1)
         above += both + np.square(np.maximum(own, 0)).sum(axis=1)
-    sides = [np.sqrt(np.maximum(side, 0)).reshape(3, -1).T for side in (below, above)]
-    by_channel = excess.reshape(3, -1).sum(axis=1)
-    by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
-    told = np.where(solution.reached, 1, np.nan)
-    return Uncertainty(
-        weights,
-        np.maximum(*sides) * told,
-        bias * told,
-        _interval(solution, bias * told, sides),
-        noise.objective_error,
-        noise.objective_noise,
-        by_channel,
-        solution.norm2,
-    )
+    down, up = (np.sqrt(np.maximum(side, 0)).reshape(3, -1).T for side in (below, above))
+    return down, up, excess
 
 
 def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[Doubles, Doubles]:
@@ -169,6 +202,13 @@ def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[
         np.minimum(np.maximum(weights - below, low), weights),
         np.maximum(np.minimum(weights + above, high), weights),
     )
+
+
+def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
+    """(n,), whether a light may be more than its own luminance brighter or dimmer than it is."""
+    known = np.isfinite(interval[0])
+    solved, low, high = (np.where(known, x, 0) @ LUMINANCE for x in (weights, *interval))
+    return np.asarray(np.maximum(solved - low, high - solved) > solved)
 
 
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
@@ -236,9 +276,15 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
         return solution
     ends = np.stack(uncertainty.interval, axis=-1)
     lights = tuple(
-        light if light.is_fixed or not any(light.reached) else _with_errors(light, error, interval)
-        for light, error, interval in zip(
-            solution.lighting.lights, uncertainty.standard_error, ends, strict=True
+        light
+        if light.is_fixed or not any(light.reached)
+        else replace(_with_errors(light, error, interval), untold=bool(untold))
+        for light, error, interval, untold in zip(
+            solution.lighting.lights,
+            uncertainty.standard_error,
+            ends,
+            uncertainty.untold,
+            strict=True,
         )
     )
     lighting = replace(solution.lighting, lights=lights)

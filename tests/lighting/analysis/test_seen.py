@@ -9,6 +9,7 @@ import pytest
 from lightpaint.colour.difference import delta_e
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.objects import Objects
+from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.analysis.seen import CLOSE, Seen, what_is_seen
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import combine
@@ -257,3 +258,12 @@ def test_words_do_not_depend_on_how_finely_it_is_rendered(make_basis: Any):
     )
     assert isinstance(one, Seen)
     assert other.delta_e == pytest.approx(one.delta_e, rel=1e-3)
+
+
+def test_nothing_is_left_to_solve_where_all_is_held(make_basis: Any):
+    """Of a basis with noise, whose errors are asked for: no direction is left that they have."""
+    basis = _left_and_right(make_basis, noise=0.01)
+    target = _over(_look(basis), np.s_[:, :24], 0.5)
+    held = Constraints.of({"*": {"lock": 0.3}})
+    [analysis] = analyse(solve(basis, target, constraints=held))
+    np.testing.assert_allclose(analysis.solution.weights, 0.3)

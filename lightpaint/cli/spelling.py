@@ -1,0 +1,53 @@
+"""What is asked in a session of painting, in the words of the command line."""
+
+from collections.abc import Mapping, Sequence
+from shlex import quote
+from typing import Any
+
+from lightpaint.paint.wishes import Wishes
+
+
+def solve_command(source: str, painting: str, options: Sequence[str], wishes: Wishes) -> str:
+    """The command that answers an exported painting as its session does.
+
+    source, options: as they were given to the painter.
+    """
+    words = ["lightpaint solve", quote(source), quote(painting)]
+    return " ".join([*words, *options, *options_of(wishes)])
+
+
+def options_of(wishes: Wishes) -> list[str]:
+    """What is asked, as options of `lightpaint solve`."""
+    made = []
+    for name, asked in wishes.lights.items():
+        made += [option for key in asked for option in _options(name, key, asked)]
+    for names in wishes.ties:
+        made.append(f"--tie {quote(','.join(names))}")
+    for key, value in wishes.values.items():
+        option = f"--{key.replace('_', '-')}"
+        made.append(option if value is True else f"{option} {value}")
+    return made
+
+
+def _options(name: str, key: str, asked: Mapping[str, Any]) -> list[str]:
+    """One of the keys asked of a light, as options; duv goes with its kelvin."""
+    value = asked[key]
+    if key in ("off", "lock") and value is True:
+        return [f"--{key} {quote(name)}"]
+    if key == "limits":
+        ends = ":".join("" if end not in value else _said(value[end]) for end in ("min", "max"))
+        return [f"--limit {quote(f'{name}={ends}')}"]
+    if key == "kelvin":
+        duv = f",duv={asked['duv']:g}" if "duv" in asked else ""
+        kelvin = ":".join(map(_said, value)) if isinstance(value, list | tuple) else _said(value)
+        return [f"--kelvin {quote(f'{name}={kelvin}{duv}')}"]
+    if key == "duv":
+        return []
+    return [f"--{key} {quote(f'{name}={_said(value)}')}"]
+
+
+def _said(value: Any) -> str:
+    """A value of a lights file as an option has it, to its last digit."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ",".join(map(_said, value))
+    return repr(float(value)) if isinstance(value, int | float) else str(value)

@@ -1,0 +1,132 @@
+"""Lights that are little but stray bright pixels: intervals that hold, and what is said."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.lighting.analysis.peaks import PEAK, TWO_PATHS, WIDER, Peaks
+from lightpaint.lighting.analysis.uncertainty import error_bars, with_error_bars
+from lightpaint.lighting.solve import solve
+from lightpaint.report.lights_table import lights_table
+from lightpaint.report.notebook import html_of
+from lightpaint.report.sentences import UNTOLD_HERE, how_sure, spoken_errors, untold_lights
+from lightpaint.target.target import Target
+
+SIZE = (24, 24)
+SEEDS = 40
+SPP = 8
+
+
+def _hits(clean: Any, chance: float, rng: np.random.Generator) -> Any:
+    """Half of the samples of something that each meets with `chance` only, (h, w, 3)."""
+    met = rng.poisson(chance * SPP, clean.shape[:2])
+    return clean * (rng.gamma(3 * met + 1e-12) / 3 * (met > 0) / (chance * SPP))[..., None]
+
+
+def _lights() -> Any:
+    """Three pools of light, (3, h, w, 3)."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    places = ((0.2, 0.3), (0.8, 0.5), (0.5, 0.8))
+    return np.stack([np.exp(-((x - a) ** 2 + (y - b) ** 2) / 0.2) for a, b in places])[
+        ..., None
+    ] * np.ones(3)
+
+
+def _highlight(clean: Any) -> Any:
+    """One pixel with two thirds of the last light's energy, (h, w, 3)."""
+    spot = np.zeros(clean[2].shape)
+    spot[13, 9] = np.sqrt(2 * np.square(clean[2, ..., 0]).sum())
+    return spot
+
+
+def _halves(kind: str, rng: np.random.Generator) -> tuple[Any, list[Any]]:
+    """What the lights do, and two halves of their samples."""
+    clean = _lights()
+    halves = [clean * (1 + 0.1 * rng.normal(size=(*clean.shape[:3], 1))) for _ in range(2)]
+    if kind == "fireflies":
+        clean[2] = 0.05 * clean[2] + 0.01
+        for half in halves:
+            half[2] = _hits(clean[2], 0.01, rng)
+    if kind == "highlight":
+        spot = _highlight(clean)
+        clean[2] += spot
+        for half in halves:
+            half[2] += _hits(spot, 0.25, rng)
+    return clean, halves
+
+
+def _painted(kind: str, clean: Any) -> Target:
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 12 if kind == "fireflies" else 0.8], clean)
+    image[:, 12:] *= [0.7, 0.6, 0.5]
+    return Target("t", image.astype(np.float32), np.ones(SIZE, np.float32), everything=True)
+
+
+def _basis(make_basis: Any, kind: str, seed: int) -> Any:
+    _, (a, b) = _halves(kind, np.random.default_rng(seed))
+    return make_basis(images=(a + b) / 2, half_differences=(a - b) / 2, names="abc")
+
+
+@pytest.mark.parametrize(
+    ("kind", "untold"), [("plain", (0, 0)), ("fireflies", (0.95, 1)), ("highlight", (0.2, 1))]
+)
+def test_intervals_hold_what_few_pixels_show(
+    make_basis: Any, kind: str, untold: tuple[float, float]
+):
+    clean = _halves(kind, np.random.default_rng(0))[0]
+    target = _painted(kind, clean)
+    truth = solve(make_basis(images=clean), target).weights
+    held, said = [], []
+    for seed in range(SEEDS):
+        found = error_bars(solve(_basis(make_basis, kind, seed), target))
+        low, high = found.interval
+        held.append((low <= truth + 1e-9) & (truth <= high + 1e-9))
+        said.append(found.untold)
+    # Of 95 % of 40 seeds: a standard error is 0.034.
+    assert np.mean(held, axis=(0, 2)).min() > 0.9
+    assert untold[0] <= np.mean(said, axis=0)[2] <= untold[1]
+    # A highlight in its midst may leave another light open as well, now and then.
+    assert np.mean(said, axis=0)[:2].max() <= (0.25 if kind == "highlight" else 0)
+
+
+def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
+    target = _painted("fireflies", _halves("fireflies", np.random.default_rng(0))[0])
+    basis = _basis(make_basis, "fireflies", 1)
+    found = error_bars(solve(basis, target))
+    solution = with_error_bars(solve(basis, target), found)
+    assert [light.untold for light in solution.lighting.lights] == [False, False, True]
+    errors = spoken_errors(found, 3)
+    assert errors[2] == "cannot be told"
+    assert all(error.endswith(" %") for error in errors[:2])
+    assert untold_lights(solution.lighting).startswith(f"Light c {UNTOLD_HERE}: ")
+    assert untold_lights(solution.lighting) in how_sure(basis, solution, found)
+    for shown in (
+        lights_table(basis, solution, found),
+        html_of(solution),
+        html_of(solution.lighting),
+    ):
+        assert shown is not None
+        assert shown.count(UNTOLD_HERE) == 1
+
+
+def test_peaks_by_hand():
+    """A pixel with most of what could push, in which both halves agree by chance."""
+    could, push = np.full((1, 101), 1.0), np.full((1, 101), 0.1)
+    could[0, 50], push[0, 50] = 10, 0
+    # As if the pixels came in blocks: what was a peak of the first is none of all.
+    peaks = Peaks.none(1)
+    for its in np.array_split(np.arange(101), 4):
+        peaks.see(could[:, its], push[:, its])
+    # Half of 200: it says nothing, the others 0.01 each, and it may be twice as noisy.
+    assert peaks.total[0] == pytest.approx(200)
+    assert peaks.hidden()[0] == pytest.approx(4 * 0.01 * 100)
+    # It says 0.04 of itself, and alone it may be 42 times that: more than two paths have.
+    push[0, 50] = 2
+    peaks = Peaks.none(1)
+    peaks.see(could, push)
+    assert 0.04 * WIDER[0] ** 2 > TWO_PATHS
+    assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100 - 4)
+    # Of many alike none decides.
+    peaks = Peaks.none(1)
+    peaks.see(np.ones((1, int(1 / PEAK) + 1)), np.full((1, int(1 / PEAK) + 1), 0.1))
+    assert peaks.hidden()[0] == 0

@@ -1,0 +1,173 @@
+"""The painter in a real JupyterLab and in marimo: painted by hand, told to Python, set from a cell.
+
+Both are large and take half a minute each, so that they are no part of what tests install:
+
+    pip install jupyterlab marimo && pytest tests/paint/page/test_notebooks.py
+"""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+from renderer import REPOSITORY
+
+import lightpaint as lp
+
+PAINTER = """\
+import lightpaint as lp
+basis = lp.read_basis("made.basis.exr")
+painter = lp.Painter(basis, height=560)
+def told(change):
+    with open("told.txt", "a") as file:
+        print(change.name, painter.target is not None, file=file)
+painter.observe(told, "lighting")
+"""
+
+ASK = 'painter.constraints = lp.Constraints.of({"light 0": {"off": True}})'
+
+#: Seconds in which a server is there, and in which anything shows.
+START_S, SHOW_MS = 90, 60_000
+
+
+@pytest.fixture
+def folder(make_basis: Any, tmp_path: Path) -> Path:
+    """Where a notebook runs."""
+    lp.write_basis(tmp_path / "made.basis.exr", make_basis(3, (54, 96)))
+    return tmp_path
+
+
+@contextmanager
+def served(folder: Path, *command: str) -> Iterator[str]:
+    """A server on a port of its own, with settings of its own, until the end of the test."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    homes = ("JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR", "JUPYTERLAB_SETTINGS_DIR")
+    homes += ("JUPYTERLAB_WORKSPACES_DIR", "IPYTHONDIR", "XDG_CONFIG_HOME", "XDG_STATE_HOME")
+    env = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    env |= {name: str(folder / "home" / name) for name in homes}
+    url = f"http://127.0.0.1:{port}"
+    with (folder / "server.log").open("wb") as log:
+        server = subprocess.Popen(
+            [sys.executable, "-m", *command, "--port", str(port)],
+            cwd=folder,
+            env=env,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+    try:
+        wait_for(lambda: answers(url), START_S)
+        yield url
+    finally:
+        os.killpg(server.pid, signal.SIGTERM)
+        try:
+            server.wait(10)
+        except subprocess.TimeoutExpired:
+            os.killpg(server.pid, signal.SIGKILL)
+            server.wait()
+
+
+def answers(url: str) -> bool:
+    """Whether somebody is there."""
+    try:
+        with urllib.request.urlopen(url, timeout=5):
+            return True
+    except OSError:
+        return False
+
+
+def wait_for(what: Callable[[], Any], limit_s: float = SHOW_MS / 1000) -> Any:
+    """What it gives, once it does."""
+    end_s = time.monotonic() + limit_s
+    while not (found := what()):
+        assert time.monotonic() < end_s
+        time.sleep(0.1)
+    return found
+
+
+@contextmanager
+def tab(browser: Any) -> Iterator[Any]:
+    """A page on which nothing of the painter's goes wrong."""
+    context = browser.new_context(viewport={"width": 1400, "height": 950})
+    page, wrong = context.new_page(), []
+    page.set_default_timeout(SHOW_MS)
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    yield page
+    context.close()
+    assert wrong == []
+
+
+def paint(page: Any) -> None:
+    """A stroke over the painting, as soon as there is one."""
+    page.locator(".lightpaint .light").first.wait_for()
+    picture = page.locator(".lightpaint .pictures canvas").first
+    picture.wait_for()
+    wait_for(lambda: page.locator(".lightpaint .loading, .lightpaint .waiting").count() == 0)
+    box = picture.bounding_box()
+    x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.22 * box["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(6):
+        page.mouse.move(x + 12 * k, y)
+    page.mouse.up()
+
+
+def is_told(folder: Path) -> bool:
+    """Whether Python has heard of a painting."""
+    path = folder / "told.txt"
+    return path.exists() and "lighting True" in path.read_text()
+
+
+@pytest.mark.skipif(find_spec("jupyterlab") is None, reason="JupyterLab")
+def test_in_jupyterlab(browser: Any, folder: Path) -> None:
+    def cell(k: int, text: str) -> dict[str, Any]:
+        about = {"metadata": {}, "outputs": [], "execution_count": None}
+        return {"cell_type": "code", "id": f"c{k}", "source": text, **about}
+
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    notebook = {"metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
+    cells = [cell(0, PAINTER + "painter"), cell(1, ASK)]
+    (folder / "paint.ipynb").write_text(json.dumps({**notebook, "cells": cells}))
+    options = ["--no-browser", "--allow-root", "--ServerApp.token=", "--ServerApp.password="]
+    with served(folder, "jupyterlab", *options) as url, tab(browser) as page:
+        page.goto(f"{url}/lab/tree/paint.ipynb?reset")
+        first = page.locator(".jp-Cell .cm-content").first
+        first.click()
+        page.keyboard.press("Shift+Enter")
+        paint(page)
+        wait_for(lambda: is_told(folder))
+        # A key of the painter is none of the notebook's: `b` would put a cell below.
+        page.keyboard.press("b")
+        assert page.locator(".jp-CodeCell").count() == 2
+        row = page.locator('.lightpaint [data-light="light 0"]')
+        assert "is-dim" not in row.get_attribute("class")
+        page.locator(".jp-Cell .cm-content").nth(1).click()
+        page.keyboard.press("Shift+Enter")
+        wait_for(lambda: "is-dim" in row.get_attribute("class"))
+
+
+@pytest.mark.skipif(find_spec("marimo") is None, reason="marimo")
+def test_in_marimo(browser: Any, folder: Path) -> None:
+    lines = "".join(f"    {line}\n" for line in [*PAINTER.splitlines(), "painter"])
+    text = f"import marimo\napp = marimo.App()\n\n@app.cell\ndef _():\n{lines}    return\n"
+    (folder / "paint.py").write_text(text)
+    options = ["--headless", "--no-token", "--host", "127.0.0.1"]
+    with served(folder, "marimo", "run", "paint.py", *options) as url, tab(browser) as page:
+        page.goto(url)
+        paint(page)
+        wait_for(lambda: is_told(folder))
+        # The style of the page stays within: marimo shows it in a shadow root.
+        styled = page.locator(".lightpaint").evaluate("x => getComputedStyle(x).display")
+        assert styled == "grid"
