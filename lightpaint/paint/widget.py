@@ -87,7 +87,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     Examples:
         >>> painter = lp.Painter(basis, target=target)
-        >>> painter.observe(lambda change: print(change.new), "lighting")
+        >>> told = []
+        >>> painter.observe(lambda change: told.append(change.new), "lighting")
         >>> painter.constraints = lp.Constraints.of({"panel": {"lock": True}})
         >>> np.round(painter.solution.lighting.emission["panel"], 3).tolist()
         [4.0, 3.0, 2.0]
@@ -395,5 +396,5 @@ def _subject(
     else:
         kind = type(given).__name__
         raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
-    place = Path(f"{Path(name).stem}-painted") if folder is None else Path(folder)
+    place = Path(f"{Path(name).stem}.paint") if folder is None else Path(folder)
     return Subject(source=name, folder=place.absolute(), **about)
