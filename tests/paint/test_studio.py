@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.cli.spelling import solve_command
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.store import Store
@@ -22,7 +24,9 @@ class Heard:
     """A studio of a saved basis, and all that it says."""
 
     def __init__(self, basis: lp.Basis, folder: Path) -> None:
-        subject = Subject("room.basis.exr", folder, basis=basis)
+        command = partial(solve_command, "room.basis.exr")
+        how = {"basis": basis, "command": lambda path, wishes: command(path, (), wishes)}
+        subject = Subject("room.basis.exr", folder, **how)
         self.messages: list[Message] = []
         self.studio = Studio(subject, lambda its: Store.open(folder / "session.db", its))
         self.studio.on_message = self.messages.append

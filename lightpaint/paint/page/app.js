@@ -1,21 +1,20 @@
 /** The painter in an element: pictures, tools and panels over a host that has the session. */
 
-import { html, render, useEffect, useState } from "./vendor/preact.js";
-import { ColourPanel } from "./ui/colour.js";
-import { Fold } from "./ui/controls.js";
-import { Dialogs } from "./ui/dialogs.js";
-import { openEngine } from "./ui/engine.js";
-import { press } from "./ui/keys.js";
-import { LightsPanel } from "./ui/lights.js";
-import { Looks } from "./ui/looks.js";
-import { first } from "./ui/model.js";
-import { Banner, Tips, Toasts, Working } from "./ui/notices.js";
-import { Session } from "./ui/session.js";
-import { Stage } from "./ui/stage.js";
-import { Store } from "./ui/store.js";
-import { Ask, ToolBar, ToolOptions } from "./ui/toolbar.js";
-import { TopBar } from "./ui/topbar.js";
-import { AnswerLine, Here, TruthPanel } from "./ui/truth.js";
+import { html, render, useEffect, useState } from './vendor/preact.js';
+import { ColourPanel } from './ui/colour.js';
+import { Fold } from './ui/controls.js';
+import { Dialogs } from './ui/dialogs.js';
+import { press } from './ui/keys.js';
+import { LightsPanel } from './ui/lights.js';
+import { Looks } from './ui/looks.js';
+import { first } from './ui/model.js';
+import { Banner, Tips, Toasts, Working } from './ui/notices.js';
+import { Session } from './ui/session.js';
+import { Stage } from './ui/stage.js';
+import { Store } from './ui/store.js';
+import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
+import { TopBar } from './ui/topbar.js';
+import { AnswerLine, Here, TruthPanel } from './ui/truth.js';
 
 /** @typedef {import("./ui/engine.js").Host} Host */
 /** @typedef {import("./ui/engine.js").Engine} Engine */
@@ -26,30 +25,32 @@ import { AnswerLine, Here, TruthPanel } from "./ui/truth.js";
  * Show the painter in an element.
  *
  * `global`: keys work wherever the focus is, for a page that is nothing else. `readonly`: a mixer,
- * with nothing to paint on. `engine`: another picture engine than the one that ships.
+ * with nothing to paint on. `engine`: the picture engine over that host.
  * @param {HTMLElement} element @param {Host} host
- * @param {{global?: boolean, readonly?: boolean, engine?: Engine}} [options]
+ * @param {{global?: boolean, readonly?: boolean, engine: Engine}} options
  * @returns {Promise<{store: Store<Ui>, session: Session, close: () => void}>}
  */
-export async function mount(element, host, { global = false, readonly = false, engine } = {}) {
+export async function mount(element, host, { global = false, readonly = false, engine }) {
   const store = new Store({ ...first(), readonly, open: { ...first().open, ...remembered() } });
-  const root = document.createElement("div");
-  root.className = "lightpaint";
-  root.dataset.lmSuppressShortcuts = "true";
+  const root = document.createElement('div');
+  root.className = 'lightpaint';
+  root.dataset.lmSuppressShortcuts = 'true';
   element.append(root);
   const session = new Session(host, store);
-  const used = engine ?? await openEngine(host);
-  const hands = { store, session, engine: used };
+  const hands = { store, session, engine };
   listen(hands);
   const ends = new AbortController();
   const target = global ? window : root;
-  target.addEventListener("keydown", (event) => press(/** @type {KeyboardEvent} */ (event), hands),
-    { signal: ends.signal });
+  target.addEventListener(
+    'keydown',
+    (event) => press(/** @type {KeyboardEvent} */ (event), hands),
+    { signal: ends.signal },
+  );
   render(html`<${Painter} hands=${hands} root=${() => root} />`, root);
   const close = () => {
     ends.abort();
     render(null, root);
-    used.close();
+    engine.close();
     host.close();
     root.remove();
   };
@@ -58,20 +59,25 @@ export async function mount(element, host, { global = false, readonly = false, e
 
 /** @param {Hands} hands */
 function listen({ engine, session, store }) {
-  engine.on("message", (message) => session.receive(message));
-  engine.on("loading", (loading) => store.set({ loading }));
-  engine.on("asking", (asking) => store.set({ asking }));
-  engine.on("trouble", ({ text }) => session.toast(text, "warn"));
+  engine.on('message', (message) => session.receive(message));
+  engine.on('loading', (loading) => store.set({ loading }));
+  engine.on('asking', (asking) => store.set({ asking }));
+  engine.on('trouble', ({ text }) => session.toast(text, 'warn'));
   let isSized = false;
   let kept = store.value.open;
   store.listen(() => {
     const { state, show, open } = store.value;
-    if (open !== kept) remember(kept = open);
+    if (open !== kept) remember((kept = open));
     if (!state || isSized) return;
     isSized = true;
-    store.set({ size: Math.max(4, Math.round(0.09 * state.size[0])),
-      show: { ...show, transform: state.transform?.name ?? show.transform,
-        stops: state.transform?.stops ?? 0 } });
+    store.set({
+      size: Math.max(4, Math.round(0.09 * state.size[0])),
+      show: {
+        ...show,
+        transform: state.transform?.name ?? show.transform,
+        stops: state.transform?.stops ?? 0,
+      },
+    });
   });
 }
 
@@ -86,7 +92,7 @@ function Painter({ hands, root }) {
   return html`
     <${TopBar} ui=${ui} hands=${hands} />
     ${!ui.readonly && html`<${ToolBar} ui=${ui} hands=${hands} />`}
-    <main class=${`middle ${ui.side ? "" : "is-wide"}`} aria-label="Painter">
+    <main class=${`middle ${ui.side ? '' : 'is-wide'}`} aria-label="Painter">
       ${!ui.readonly && html`<${ToolOptions} ui=${ui} hands=${hands} />`}
       <${Banner} ui=${ui} hands=${hands} />
       <div class="view"><${Stage} ui=${ui} hands=${hands} />
@@ -107,20 +113,19 @@ function Side({ ui, hands }) {
     html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${made}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
-    ${!ui.readonly && fold("colour", "Colour",
-      html`<${ColourPanel} ui=${ui} hands=${hands} />`)}
-    ${!ui.readonly && fold("ask", "Ask in numbers", html`<${Ask} ui=${ui} hands=${hands} />`)}
-    ${fold("lights", "Lights", html`<${LightsPanel} ui=${ui} hands=${hands} />`)}
-    ${fold("truth", "How true?", html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
+    ${!ui.readonly && fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} hands=${hands} />`)}
+    ${!ui.readonly && fold('ask', 'Ask in numbers', html`<${Ask} ui=${ui} hands=${hands} />`)}
+    ${fold('lights', 'Lights', html`<${LightsPanel} ui=${ui} hands=${hands} />`)}
+    ${fold('truth', 'How true?', html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
   </aside>`;
 }
 
-const KEPT = "lightpaint.open";
+const KEPT = 'lightpaint.open';
 
 /** What was unfolded the last time, where a browser remembers. @returns {Record<string, boolean>} */
 function remembered() {
   try {
-    return JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    return JSON.parse(localStorage.getItem(KEPT) ?? '{}');
   } catch {
     return {};
   }

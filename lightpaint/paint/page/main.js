@@ -1,9 +1,10 @@
 /** The painter as a page of its own: its session is behind the server that the page came from. */
 
-import { mount } from "./app.js";
-import { openHost } from "./ui/engine.js";
+import { mount } from './app.js';
+import { openEngine, openHost } from './engine/painter.js';
 
-const element = document.getElementById("lightpaint");
+const element = document.getElementById('lightpaint');
 if (element) {
-  mount(element, await openHost(), { global: true });
+  const host = openHost();
+  await mount(element, host, { global: true, engine: openEngine(host) });
 }

@@ -1,23 +1,23 @@
 /** What the solve may do with one light: all that can be asked of it, in words of the trade. */
 
-import { html, useState } from "../vendor/preact.js";
-import { luminance, toHex, toKelvin } from "./colours.js";
-import { Button, Choice, Number_, Select } from "./controls.js";
+import { html, useState } from '../vendor/preact.js';
+import { luminance, toHex, toKelvin } from './colours.js';
+import { Button, Choice, Number_, Select } from './controls.js';
 
 /** @typedef {import("./model.js").Asked} Asked */
 /** @typedef {import("./engine.js").RGB} RGB */
 
 const MANNERS = [
-  { value: "free", label: "Free", tip: "The solve sets it" },
-  { value: "held", label: "Held", tip: "It stays at a level" },
-  { value: "present", label: "As now", tip: "It stays as the scene has it" },
-  { value: "off", label: "Off", tip: "It is off in every answer" },
+  { value: 'free', label: 'Free', tip: 'The solve sets it' },
+  { value: 'held', label: 'Held', tip: 'It stays at a level' },
+  { value: 'present', label: 'As now', tip: 'It stays as the scene has it' },
+  { value: 'off', label: 'Off', tip: 'It is off in every answer' },
 ];
 const COLOURS = [
-  { value: "any", label: "Any colour" },
-  { value: "color", label: "One colour" },
-  { value: "kelvin", label: "White, from – to" },
-  { value: "primaries", label: "Mix of LEDs" },
+  { value: 'any', label: 'Any colour' },
+  { value: 'color', label: 'One colour' },
+  { value: 'kelvin', label: 'White, from – to' },
+  { value: 'primaries', label: 'Mix of LEDs' },
 ];
 
 /** @param {import("./light.js").Props} props */
@@ -25,24 +25,34 @@ export function Asking(props) {
   const { k, light, hands, asked = {}, rgb, readonly } = props;
   const { session } = hands;
   if (readonly || light.is_fixed) {
-    return html`<p class="asking-light faint">${light.is_fixed
-      ? "This light is not adjusted." : ""}</p>`;
+    return html`<p class="asking-light faint">${
+      light.is_fixed ? 'This light is not adjusted.' : ''
+    }</p>`;
   }
-  const manner = asked.off ? "off" : asked.lock === true ? "present"
-    : asked.lock !== undefined ? "held" : "free";
+  const manner = asked.off
+    ? 'off'
+    : asked.lock === true
+      ? 'present'
+      : asked.lock !== undefined
+        ? 'held'
+        : 'free';
   const change = (/** @type {string} */ to) => {
-    if (to === "free") session.release(k);
-    if (to === "held") session.hold(k, rgb, true);
-    if (to === "present") session.ask(k, { lock: true });
-    if (to === "off") session.turn(k, true);
+    if (to === 'free') session.release(k);
+    if (to === 'held') session.hold(k, rgb, true);
+    if (to === 'present') session.ask(k, { lock: true });
+    if (to === 'off') session.turn(k, true);
   };
   return html`<div class="asking-light" role="group" aria-label=${`What the solve may do with ${
-    light.label}`}>
+    light.label
+  }`}>
     <h3>In the solve</h3>
     <${Choice} label="Level" value=${manner} choices=${MANNERS} change=${change} />
-    ${manner === "held" && html`<${Held} ...${props} />`}
-    ${manner === "free" && html`<${Limits} ...${props} />
-      ${!light.is_scalar && html`<${Colours} ...${props} />`}`}
+    ${manner === 'held' && html`<${Held} ...${props} />`}
+    ${
+      manner === 'free' &&
+      html`<${Limits} ...${props} />
+      ${!light.is_scalar && html`<${Colours} ...${props} />`}`
+    }
     <${Ties} ...${props} />
   </div>`;
 }
@@ -64,10 +74,13 @@ function Limits({ k, light, hands, asked = {} }) {
   const limits = asked.limits ?? {};
   const given = limits.max ?? limits.min;
   const canShare = luminance(light.present) > 0;
-  const [chosen, setUnit] = useState(typeof given === "number" || !canShare ? "value" : "share");
-  const unit = given === undefined ? chosen : typeof given === "number" ? "value" : "share";
+  const [chosen, setUnit] = useState(typeof given === 'number' || !canShare ? 'value' : 'share');
+  const unit = given === undefined ? chosen : typeof given === 'number' ? 'value' : 'share';
   const set = (/** @type {"min" | "max"} */ key, /** @type {number | null} */ value) => {
-    const made = { ...limits, [key]: value === null ? null : unit === "share" ? `${value}%` : value };
+    const made = {
+      ...limits,
+      [key]: value === null ? null : unit === 'share' ? `${value}%` : value,
+    };
     const kept = Object.fromEntries(Object.entries(made).filter(([, x]) => x !== null));
     const { limits: _, ...rest } = asked;
     hands.session.ask(k, Object.keys(kept).length ? { ...rest, limits: kept } : rest);
@@ -76,19 +89,30 @@ function Limits({ k, light, hands, asked = {} }) {
     setUnit(to);
     if (given === undefined || to === unit) return;
     const now = luminance(light.present);
-    const turned = Object.fromEntries(Object.entries(limits).map(([key, x]) => [key,
-      to === "share" ? `${Number((100 * amount(x) / now).toPrecision(4))}%`
-        : Number((amount(x) / 100 * now).toPrecision(4))]));
+    const turned = Object.fromEntries(
+      Object.entries(limits).map(([key, x]) => [
+        key,
+        to === 'share'
+          ? `${Number(((100 * amount(x)) / now).toPrecision(4))}%`
+          : Number(((amount(x) / 100) * now).toPrecision(4)),
+      ]),
+    );
     hands.session.ask(k, { ...asked, limits: turned });
   };
-  const units = [{ value: "share", label: "% of now" }, { value: "value", label: light.unit || "value" }];
+  const units = [
+    { value: 'share', label: '% of now' },
+    { value: 'value', label: light.unit || 'value' },
+  ];
   return html`<div class="ask-row">
     <${Number_} label="At least" value=${amount(limits.min)} least=${0} empty="–" step=${5}
-      change=${(/** @type {number | null} */ value) => set("min", value)} digits=${4} />
+      change=${(/** @type {number | null} */ value) => set('min', value)} digits=${4} />
     <${Number_} label="At most" value=${amount(limits.max)} least=${0} empty="–" step=${5}
-      change=${(/** @type {number | null} */ value) => set("max", value)} digits=${4} />
-    ${canShare && html`<${Select} label="Limits in" hidden value=${unit} choices=${units}
-      change=${into} />`}
+      change=${(/** @type {number | null} */ value) => set('max', value)} digits=${4} />
+    ${
+      canShare &&
+      html`<${Select} label="Limits in" hidden value=${unit} choices=${units}
+      change=${into} />`
+    }
   </div>`;
 }
 
@@ -101,20 +125,27 @@ function amount(level) {
 /** @param {import("./light.js").Props} props */
 function Colours(props) {
   const { k, hands, asked = {}, rgb } = props;
-  const kind = ["color", "kelvin", "primaries"].find((key) => asked[key] !== undefined) ?? "any";
+  const kind = ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any';
   const { color, kelvin, duv, primaries, ...rest } = asked;
   const change = (/** @type {string} */ to) => {
-    const made = { any: {}, color: { color: hexOf(rgb) }, kelvin: { kelvin: [2700, 6500] },
-      primaries: { primaries: ["#ff0000", "#00ff00", "#0000ff"] } }[to];
+    const made = {
+      any: {},
+      color: { color: hexOf(rgb) },
+      kelvin: { kelvin: [2700, 6500] },
+      primaries: { primaries: ['#ff0000', '#00ff00', '#0000ff'] },
+    }[to];
     hands.session.ask(k, { ...rest, ...made });
   };
   return html`<div class="ask-row">
       <${Select} label="Colour" value=${kind} choices=${COLOURS} change=${change} /></div>
-    ${kind === "color" && html`<${One} ...${props} rest=${rest} />`}
-    ${kind === "kelvin" && html`<${Whites} ...${props} rest=${rest} />`}
-    ${kind === "primaries" && html`<${Words} label="LEDs" value=${[...primaries].join(", ")}
-      take=${(/** @type {string} */ text) => hands.session.ask(k, { ...rest,
-        primaries: text.split(/[\s,]+/).filter(Boolean) })} />`}`;
+    ${kind === 'color' && html`<${One} ...${props} rest=${rest} />`}
+    ${kind === 'kelvin' && html`<${Whites} ...${props} rest=${rest} />`}
+    ${
+      kind === 'primaries' &&
+      html`<${Words} label="LEDs" value=${[...primaries].join(', ')}
+      take=${(/** @type {string} */ text) =>
+        hands.session.ask(k, { ...rest, primaries: text.split(/[\s,]+/).filter(Boolean) })} />`
+    }`;
 }
 
 /** @param {any} props */
@@ -124,9 +155,12 @@ function One({ k, hands, asked, rest, rgb }) {
   return html`<div class="ask-row">
     <${Words} label="Hex or kelvin" value=${text}
       take=${(/** @type {string} */ color) => hands.session.ask(k, { ...rest, color })} />
-    ${found && html`<${Button} label=${`${Math.round(found.kelvin / 50) * 50}K`}
+    ${
+      found &&
+      html`<${Button} label=${`${Math.round(found.kelvin / 50) * 50}K`}
       tip="The white that it is nearest to in the answer" act=${() =>
-        hands.session.ask(k, { ...rest, color: `${Math.round(found.kelvin / 50) * 50}K` })} />`}
+        hands.session.ask(k, { ...rest, color: `${Math.round(found.kelvin / 50) * 50}K` })} />`
+    }
   </div>`;
 }
 
@@ -135,8 +169,11 @@ function Whites({ k, hands, asked, rest }) {
   const ends = [asked.kelvin].flat();
   const [low, high] = [ends[0], ends.at(-1)];
   const set = (/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ duv) =>
-    hands.session.ask(k, { ...rest, kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
-      ...(duv ? { duv } : {}) });
+    hands.session.ask(k, {
+      ...rest,
+      kelvin: a === b ? a : [Math.min(a, b), Math.max(a, b)],
+      ...(duv ? { duv } : {}),
+    });
   const duv = asked.duv ?? 0;
   return html`<div class="ask-row">
     <${Number_} label="From" value=${low} least=${1000} most=${25000} step=${100} digits=${0}
@@ -150,16 +187,24 @@ function Whites({ k, hands, asked, rest }) {
 
 /** @param {import("./light.js").Props} props */
 function Ties({ light, hands, tied, others = [] }) {
-  const free = others.filter((one) => !one.is_fixed && one.name !== light.name
-    && !tied?.includes(one.name));
+  const free = others.filter(
+    (one) => !one.is_fixed && one.name !== light.name && !tied?.includes(one.name),
+  );
   const label = (/** @type {string} */ name) =>
     others.find((one) => one.name === name)?.label ?? name;
-  const choices = [{ value: "", label: "no other" },
-    ...free.map((one) => ({ value: one.name, label: one.label }))];
+  const choices = [
+    { value: '', label: 'no other' },
+    ...free.map((one) => ({ value: one.name, label: one.label })),
+  ];
   return html`<div class="ask-row">
-    ${tied && html`<span>On one dimmer with ${tied.filter((name) => name !== light.name).map(label)
-      .join(", ")}</span><${Button} label="Untie" act=${() => hands.session.untie(light.name)} />`}
-    <${Select} label=${tied ? "And with" : "On one dimmer with"} value="" choices=${choices}
+    ${
+      tied &&
+      html`<span>On one dimmer with ${tied
+        .filter((name) => name !== light.name)
+        .map(label)
+        .join(', ')}</span><${Button} label="Untie" act=${() => hands.session.untie(light.name)} />`
+    }
+    <${Select} label=${tied ? 'And with' : 'On one dimmer with'} value="" choices=${choices}
       change=${(/** @type {string} */ name) => name && hands.session.tie(light.name, name)} />
   </div>`;
 }
@@ -174,7 +219,7 @@ function Words({ label, value, take }) {
   return html`<label class="field words"><span class="name">${label}</span>
     <input type="text" value=${typed ?? value} spellcheck="false" autocomplete="off"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)} onBlur=${done}
-      onKeyDown=${(/** @type {any} */ event) => event.key === "Enter" && done()} /></label>`;
+      onKeyDown=${(/** @type {any} */ event) => event.key === 'Enter' && done()} /></label>`;
 }
 
 /** @param {RGB} rgb */

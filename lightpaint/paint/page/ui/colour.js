@@ -1,18 +1,28 @@
 /** The colour of the paint: as white and green, as HSV, as RGB, as hex; how bright; swatches. */
 
-import { html, useState } from "../vendor/preact.js";
-import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from "./colours.js";
-import { Choice, Slider } from "./controls.js";
+import { html, useState } from '../vendor/preact.js';
+import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './colours.js';
+import { Choice, Slider } from './controls.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").RGB} RGB */
 /** @typedef {import("./keys.js").Hands} Hands */
 
 const WHITES = [1900, 2700, 3200, 4300, 5600, 6500, 9000];
-const GELS = [["Red", "#ff2a1a"], ["Amber", "#ff9a1f"], ["Green", "#35d04a"], ["Cyan", "#2fd6e0"],
-  ["Blue", "#2a55ff"], ["Magenta", "#e02fd0"], ["Black: no light", "#000000"]];
-const MIXERS = [{ value: "white", label: "White" }, { value: "hsv", label: "HSV" },
-  { value: "rgb", label: "RGB" }];
+const GELS = [
+  ['Red', '#ff2a1a'],
+  ['Amber', '#ff9a1f'],
+  ['Green', '#35d04a'],
+  ['Cyan', '#2fd6e0'],
+  ['Blue', '#2a55ff'],
+  ['Magenta', '#e02fd0'],
+  ['Black: no light', '#000000'],
+];
+const MIXERS = [
+  { value: 'white', label: 'White' },
+  { value: 'hsv', label: 'HSV' },
+  { value: 'rgb', label: 'RGB' },
+];
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ColourPanel({ ui, hands }) {
@@ -48,24 +58,27 @@ function Hex({ colour, set }) {
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)}
       onKeyDown=${(/** @type {any} */ event) =>
-        event.key === "Enter" && take(event.currentTarget.value)} /></label>`;
+        event.key === 'Enter' && take(event.currentTarget.value)} /></label>`;
 }
 
 /** @param {RGB[]} colours */
-const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(", ")})`;
+const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(', ')})`;
 
 /** By the mired, in which equal steps look equal; warm is left. */
-const MIRED = { to: (/** @type {number} */ k) => -1e6 / k, of: (/** @type {number} */ t) =>
-  Math.round(-1e6 / t / 50) * 50 };
-const KELVIN_TRACK = gradient(Array.from({ length: 12 }, (_, i) =>
-  ofKelvin(MIRED.of(-667 + (i / 11) * (667 - 66.7)))));
+const MIRED = {
+  to: (/** @type {number} */ k) => -1e6 / k,
+  of: (/** @type {number} */ t) => Math.round(-1e6 / t / 50) * 50,
+};
+const KELVIN_TRACK = gradient(
+  Array.from({ length: 12 }, (_, i) => ofKelvin(MIRED.of(-667 + (i / 11) * (667 - 66.7)))),
+);
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function White({ colour, set }) {
   // Of what is no white, the last one stays on the dials; black keeps them, too.
   const [last, setLast] = useState({ kelvin: 3200, green: 0 });
   const found = toKelvin(colour);
-  const dials = same(ofKelvin(last.kelvin, last.green), colour) ? last : found ?? last;
+  const dials = same(ofKelvin(last.kelvin, last.green), colour) ? last : (found ?? last);
   const level = Math.max(...colour) || 1;
   const dial = (/** @type {{kelvin?: number, green?: number}} */ changed) => {
     const made = { ...dials, ...changed };
@@ -117,10 +130,12 @@ function Hsv({ colour, set }) {
 function Rgb({ colour, set }) {
   const to = (/** @type {number} */ at, /** @type {number} */ value) =>
     /** @type {RGB} */ (colour.map((x, c) => (c === at ? decode(value / 255) : x)));
-  return html`${["Red", "Green", "Blue"].map((label, c) => html`<${Slider} key=${label}
+  return html`${['Red', 'Green', 'Blue'].map(
+    (label, c) => html`<${Slider} key=${label}
     label=${label} value=${255 * encode(colour[c])} least=${0} most=${255}
     track=${gradient([to(c, 0), to(c, 255)])}
-    change=${(/** @type {number} */ value) => set(to(c, value))} />`)}`;
+    change=${(/** @type {number} */ value) => set(to(c, value))} />`,
+  )}`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -134,8 +149,12 @@ function Swatches({ ui, hands }) {
     ${WHITES.map((kelvin) => swatch(ofKelvin(kelvin), `${kelvin} K`, ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
   </div>
-  ${ui.recent.length > 0 && html`<div class="swatches" role="group" aria-label="Used lately">
+  ${
+    ui.recent.length > 0 &&
+    html`<div class="swatches" role="group" aria-label="Used lately">
     ${ui.recent.map(({ colour, stops }, k) =>
-      swatch(colour, `Used lately ${k + 1}: ${toHex(colour)}`, stops))}
-  </div>`}`;
+      swatch(colour, `Used lately ${k + 1}: ${toHex(colour)}`, stops),
+    )}
+  </div>`
+  }`;
 }

@@ -1,7 +1,7 @@
 /** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
 
-import { html, useEffect, useRef, useState } from "../vendor/preact.js";
-import { Icon } from "./icons.js";
+import { html, useEffect, useRef, useState } from '../vendor/preact.js';
+import { Icon } from './icons.js';
 
 let counter = 0;
 
@@ -17,9 +17,9 @@ export function useId() {
  *   disabled?: boolean, primary?: boolean, act: (event: MouseEvent) => void, class?: string}} props
  */
 export function Button({ icon, label, tip, keys, on, disabled, primary, act, class: name }) {
-  const kind = [
-    "button", icon && !label && "is-icon", on && "is-on", primary && "is-primary", name,
-  ].filter(Boolean).join(" ");
+  const kind = ['button', icon && !label && 'is-icon', on && 'is-on', primary && 'is-primary', name]
+    .filter(Boolean)
+    .join(' ');
   const hint = tip ?? (keys ? label : undefined);
   return html`<button type="button" class=${kind} disabled=${disabled} onClick=${act}
     aria-label=${label && label.length > 1 ? undefined : tip} aria-pressed=${on === undefined ? undefined : String(on)}
@@ -36,10 +36,12 @@ export function Button({ icon, label, tip, keys, on, disabled, primary, act, cla
  */
 export function Choice({ label, value, choices, change, icons }) {
   return html`<div class="choice" role="group" aria-label=${label}>
-    ${choices.map((one) => html`<${Button} key=${String(one.value)} icon=${one.icon}
+    ${choices.map(
+      (one) => html`<${Button} key=${String(one.value)} icon=${one.icon}
       label=${icons ? undefined : one.label} tip=${one.tip ?? (icons ? one.label : undefined)}
       keys=${one.keys} on=${one.value === value} disabled=${one.disabled}
-      act=${() => change(one.value)} />`)}
+      act=${() => change(one.value)} />`,
+    )}
   </div>`;
 }
 
@@ -50,11 +52,13 @@ export function Choice({ label, value, choices, change, icons }) {
  */
 export function Select({ label, value, choices, change, hidden, tip }) {
   return html`<label class="field" data-tip=${tip}>
-    <span class=${hidden ? "only-read" : "name"}>${label}</span>
+    <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <select value=${value}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.value)}>
-      ${choices.map((one) => html`<option key=${one.value} value=${one.value}
-        selected=${one.value === value}>${one.label}</option>`)}
+      ${choices.map(
+        (one) => html`<option key=${one.value} value=${one.value}
+        selected=${one.value === value}>${one.label}</option>`,
+      )}
     </select>
   </label>`;
 }
@@ -79,18 +83,21 @@ export function Number_(props) {
   const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
   const { least = -Infinity, most = Infinity } = props;
   const [typed, setTyped] = useState(/** @type {string | null} */ (null));
-  const shown = typed ?? (value === null ? "" : String(Number(value.toFixed(digits))));
+  const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))));
   const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, x));
   const take = (/** @type {string} */ text) => {
     setTyped(null);
-    const plain = text.trim().replace(/^\u2212/, "-").replace(",", ".");
+    const plain = text
+      .trim()
+      .replace(/^\u2212/, '-')
+      .replace(',', '.');
     const made = Number(plain);
     if (!plain && empty !== undefined) change(null);
     else if (plain && Number.isFinite(made)) change(within(made));
   };
   const press = (/** @type {any} */ event) => {
     const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
-    if (event.key === "Enter") take(event.currentTarget.value);
+    if (event.key === 'Enter') take(event.currentTarget.value);
     if (way) {
       event.preventDefault();
       setTyped(null);
@@ -99,7 +106,7 @@ export function Number_(props) {
     }
   };
   return html`<label class="field number">
-    <span class=${hidden ? "only-read" : "name"}>${label}</span>
+    <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
       disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
@@ -129,15 +136,18 @@ export function Slider(props) {
     ${!plain && html`<span class="name" aria-hidden="true">${label}</span>`}
     <input type="range" aria-label=${label} min=${low} max=${high}
       step=${curve ? (high - low) / 200 : step} value=${to(value)} disabled=${disabled}
-      aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ""}`.trim()}
-      class=${track ? "has-track" : ""}
-      style=${{ "--at": String(at), ...(track ? { "--track": track } : {}) }}
+      aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ''}`.trim()}
+      class=${track ? 'has-track' : ''}
+      style=${{ '--at': String(at), ...(track ? { '--track': track } : {}) }}
       onInput=${(/** @type {any} */ event) => moved(event, false)}
       onChange=${(/** @type {any} */ event) => moved(event, true)}
       onDblClick=${() => rest !== undefined && change(rest, true)} />
-    ${!plain && html`<${Number_} label=${label} hidden value=${value} least=${least} most=${most}
-      step=${step} digits=${digits} unit=${unit ?? ""} disabled=${disabled}
-      change=${(/** @type {number} */ made) => change(made, true)} />`}
+    ${
+      !plain &&
+      html`<${Number_} label=${label} hidden value=${value} least=${least} most=${most}
+      step=${step} digits=${digits} unit=${unit ?? ''} disabled=${disabled}
+      change=${(/** @type {number} */ made) => change(made, true)} />`
+    }
   </div>`;
 }
 
@@ -148,7 +158,7 @@ export function Slider(props) {
  */
 export function Fold({ title, open, toggle, children, extra, class: name }) {
   const id = useId();
-  return html`<section class=${`fold ${name ?? ""} ${open ? "is-open" : ""}`} aria-label=${title}>
+  return html`<section class=${`fold ${name ?? ''} ${open ? 'is-open' : ''}`} aria-label=${title}>
     <div class="fold-head">
       <h2><button type="button" aria-expanded=${String(open)} aria-controls=${id} onClick=${toggle}>
         <${Icon} name="fold" /><span>${title}</span></button></h2>
@@ -168,11 +178,12 @@ export function Dialog({ title, close, children, class: name }) {
   useEffect(() => {
     const element = ref.current;
     const before = /** @type {HTMLElement | null} */ (
-      /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement);
+      /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement
+    );
     if (element && !element.open) element.showModal();
     return () => before?.focus?.();
   }, []);
-  return html`<dialog class=${`dialog ${name ?? ""}`} ref=${ref} aria-labelledby=${id}
+  return html`<dialog class=${`dialog ${name ?? ''}`} ref=${ref} aria-labelledby=${id}
     onClose=${close} onClick=${(/** @type {any} */ event) => event.target === ref.current && close()}>
     <div class="dialog-head">
       <h2 id=${id}>${title}</h2>

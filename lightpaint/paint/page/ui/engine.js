@@ -1,6 +1,6 @@
 /**
- * What the interface wants of the picture engine and of its host: all that crosses between the two
- * goes through here.
+ * What the interface wants of the picture engine and of its host: all that crosses between them.
+ * Whoever mounts the painter brings both.
  */
 
 /** @typedef {[number, number, number]} RGB */
@@ -85,17 +85,4 @@
  * @property {() => void} close
  */
 
-/** @param {string} path @returns {Promise<any>} */
-const load = (path) => import(path);
-
-/** @returns {Promise<Host>} the session behind the server that the page came from */
-export async function openHost() {
-  const { openHost: open } = await load("../engine/painter.js");
-  return open();
-}
-
-/** @param {Host} host @returns {Promise<Engine>} */
-export async function openEngine(host) {
-  const { openEngine: open } = await load("../engine/painter.js");
-  return open(host);
-}
+export {};

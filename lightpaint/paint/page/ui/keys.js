@@ -1,6 +1,6 @@
 /** All keys: one table, for the keyboard and for the overlay that shows them. */
 
-import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from "./tools.js";
+import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from './tools.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./session.js").Session} Session */
@@ -8,88 +8,161 @@ import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } fr
 /** @typedef {{store: UiStore, session: Session, engine: Engine}} Hands */
 /** @typedef {{keys: string, shown: string[], does: string, act?: (hands: Hands) => void}} Key */
 
-const zoomBy = (/** @type {number} */ factor) => (/** @type {Hands} */ { store, engine }) => {
-  const { width, height } = engine.element.getBoundingClientRect();
-  const pane = engine.panes()[0] ?? { x: 0, y: 0, width, height };
-  look(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
-};
+const zoomBy =
+  (/** @type {number} */ factor) =>
+  (/** @type {Hands} */ { store, engine }) => {
+    const { width, height } = engine.element.getBoundingClientRect();
+    const pane = engine.panes()[0] ?? { x: 0, y: 0, width, height };
+    look(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
+  };
 
 /** @param {number} by */
-const expose = (by) => (/** @type {Hands} */ { store }) =>
-  look(store, { stops: Math.min(10, Math.max(-10, store.value.show.stops + by)) });
+const expose =
+  (by) =>
+  (/** @type {Hands} */ { store }) =>
+    look(store, { stops: Math.min(10, Math.max(-10, store.value.show.stops + by)) });
 
 /** Named by what they do; `keys` as the browser says them, Shift and Mod (Ctrl or ⌘) in front. */
 /** @type {{title: string, keys: Key[]}[]} */
 export const KEYS = [
-  { title: "Tools", keys: TOOLS.map(({ tool, keys, label }) => ({
-    keys: keys.toLowerCase(), shown: [keys], does: label,
-    act: ({ store }) => choose(store, tool),
-  })) },
-  { title: "Work", keys: [
-    { keys: "mod+s", shown: ["Ctrl", "S"], does: "keep this look",
-      act: ({ session, store }) =>
-        void session.send("save_look", { name: `Look ${store.value.looks.length + 1}` }) },
-    { keys: "p", shown: ["P"], does: "panels away, and back",
-      act: ({ store }) => store.set({ side: !store.value.side }) },
-    { keys: "?", shown: ["?"], does: "these keys", act: ({ store }) => store.set({ dialog: "keys" }) },
-    { keys: "", shown: ["Tab"], does: "from control to control" },
-    { keys: "", shown: ["← ↑ ↓ →"], does: "on the pictures: the brush, Enter paints" },
-  ] },
-  { title: "Brush", keys: [
-    { keys: "[", shown: ["["], does: "smaller", act: ({ store }) => resize(store, -1) },
-    { keys: "]", shown: ["]"], does: "larger", act: ({ store }) => resize(store, 1) },
-    { keys: "{", shown: ["Shift", "["], does: "softer", act: ({ store }) => harden(store, -1) },
-    { keys: "}", shown: ["Shift", "]"], does: "harder", act: ({ store }) => harden(store, 1) },
-    { keys: "digit", shown: ["1", "…", "9", "0"], does: "flow 10 % to 100 %" },
-    { keys: "x", shown: ["X"], does: "other colour", act: ({ store }) => swap(store) },
-    { keys: "", shown: ["Alt", "click"], does: "take light from the picture" },
-    { keys: "", shown: ["Shift", "click"], does: "line from the last stroke" },
-    { keys: "escape", shown: ["Esc"], does: "leave the stroke",
-      act: ({ engine, store }) => { engine.cancel(); store.set({ asking: null, hovered: null }); } },
-    { keys: "mod+z", shown: ["Ctrl", "Z"], does: "undo",
-      act: ({ session }) => void session.send("undo") },
-    { keys: "mod+shift+z", shown: ["Ctrl", "Shift", "Z"], does: "redo",
-      act: ({ session }) => void session.send("redo") },
-  ] },
-  { title: "Pictures", keys: [
-    { keys: "", shown: ["Space", "drag"], does: "move the pictures" },
-    { keys: "", shown: ["Ctrl", "wheel"], does: "zoom" },
-    { keys: "+", shown: ["+"], does: "zoom in", act: zoomBy(1.25) },
-    { keys: "-", shown: ["−"], does: "zoom out", act: zoomBy(0.8) },
-    { keys: "f", shown: ["F"], does: "fit", act: ({ store }) => look(store, { zoom: 1, pan: [0, 0] }) },
-    { keys: "v", shown: ["V"], does: "side by side, wipe, blink",
-      act: ({ store }) => look(store, { layout: next(LAYOUTS, store.value.show.layout) }) },
-    { keys: "k", shown: ["K"], does: "the other picture, in blink",
-      act: ({ store }) => look(store, { layout: "blink",
-        blink: store.value.show.blink === "left" ? "right" : "left" }) },
-    { keys: ",", shown: [","], does: "display darker", act: expose(-0.5) },
-    { keys: ".", shown: ["."], does: "display brighter", act: expose(0.5) },
-    { keys: "c", shown: ["C"], does: "clean or raw",
-      act: ({ store }) => look(store, { clean: !store.value.show.clean }) },
-    { keys: "o", shown: ["O"], does: "next overlay",
-      act: ({ store }) => look(store, { overlay: next(OVERLAYS, store.value.show.overlay) }) },
-  ] },
+  {
+    title: 'Tools',
+    keys: TOOLS.map(({ tool, keys, label }) => ({
+      keys: keys.toLowerCase(),
+      shown: [keys],
+      does: label,
+      act: ({ store }) => choose(store, tool),
+    })),
+  },
+  {
+    title: 'Work',
+    keys: [
+      {
+        keys: 'mod+s',
+        shown: ['Ctrl', 'S'],
+        does: 'keep this look',
+        act: ({ session, store }) =>
+          void session.send('save_look', { name: `Look ${store.value.looks.length + 1}` }),
+      },
+      {
+        keys: 'p',
+        shown: ['P'],
+        does: 'panels away, and back',
+        act: ({ store }) => store.set({ side: !store.value.side }),
+      },
+      {
+        keys: '?',
+        shown: ['?'],
+        does: 'these keys',
+        act: ({ store }) => store.set({ dialog: 'keys' }),
+      },
+      { keys: '', shown: ['Tab'], does: 'from control to control' },
+      { keys: '', shown: ['← ↑ ↓ →'], does: 'on the pictures: the brush, Enter paints' },
+    ],
+  },
+  {
+    title: 'Brush',
+    keys: [
+      { keys: '[', shown: ['['], does: 'smaller', act: ({ store }) => resize(store, -1) },
+      { keys: ']', shown: [']'], does: 'larger', act: ({ store }) => resize(store, 1) },
+      { keys: '{', shown: ['Shift', '['], does: 'softer', act: ({ store }) => harden(store, -1) },
+      { keys: '}', shown: ['Shift', ']'], does: 'harder', act: ({ store }) => harden(store, 1) },
+      { keys: 'digit', shown: ['1', '…', '9', '0'], does: 'flow 10 % to 100 %' },
+      { keys: 'x', shown: ['X'], does: 'other colour', act: ({ store }) => swap(store) },
+      { keys: '', shown: ['Alt', 'click'], does: 'take light from the picture' },
+      { keys: '', shown: ['Shift', 'click'], does: 'line from the last stroke' },
+      {
+        keys: 'escape',
+        shown: ['Esc'],
+        does: 'leave the stroke',
+        act: ({ engine, store }) => {
+          engine.cancel();
+          store.set({ asking: null, hovered: null });
+        },
+      },
+      {
+        keys: 'mod+z',
+        shown: ['Ctrl', 'Z'],
+        does: 'undo',
+        act: ({ session }) => void session.send('undo'),
+      },
+      {
+        keys: 'mod+shift+z',
+        shown: ['Ctrl', 'Shift', 'Z'],
+        does: 'redo',
+        act: ({ session }) => void session.send('redo'),
+      },
+    ],
+  },
+  {
+    title: 'Pictures',
+    keys: [
+      { keys: '', shown: ['Space', 'drag'], does: 'move the pictures' },
+      { keys: '', shown: ['Ctrl', 'wheel'], does: 'zoom' },
+      { keys: '+', shown: ['+'], does: 'zoom in', act: zoomBy(1.25) },
+      { keys: '-', shown: ['−'], does: 'zoom out', act: zoomBy(0.8) },
+      {
+        keys: 'f',
+        shown: ['F'],
+        does: 'fit',
+        act: ({ store }) => look(store, { zoom: 1, pan: [0, 0] }),
+      },
+      {
+        keys: 'v',
+        shown: ['V'],
+        does: 'side by side, wipe, blink',
+        act: ({ store }) => look(store, { layout: next(LAYOUTS, store.value.show.layout) }),
+      },
+      {
+        keys: 'k',
+        shown: ['K'],
+        does: 'the other picture, in blink',
+        act: ({ store }) =>
+          look(store, {
+            layout: 'blink',
+            blink: store.value.show.blink === 'left' ? 'right' : 'left',
+          }),
+      },
+      { keys: ',', shown: [','], does: 'display darker', act: expose(-0.5) },
+      { keys: '.', shown: ['.'], does: 'display brighter', act: expose(0.5) },
+      {
+        keys: 'c',
+        shown: ['C'],
+        does: 'clean or raw',
+        act: ({ store }) => look(store, { clean: !store.value.show.clean }),
+      },
+      {
+        keys: 'o',
+        shown: ['O'],
+        does: 'next overlay',
+        act: ({ store }) => look(store, { overlay: next(OVERLAYS, store.value.show.overlay) }),
+      },
+    ],
+  },
 ];
 
-const BY_KEY = new Map(KEYS.flatMap(({ keys }) => keys).filter((one) => one.act)
-  .map((one) => [one.keys, one]));
+const BY_KEY = new Map(
+  KEYS.flatMap(({ keys }) => keys)
+    .filter((one) => one.act)
+    .map((one) => [one.keys, one]),
+);
 
 /** @param {KeyboardEvent} event @returns {string} */
 function named(event) {
   const key = event.key.toLowerCase();
   // Some keyboards have [ and ] behind AltGr, which is Ctrl and Alt on some systems.
-  const isMod = (event.ctrlKey || event.metaKey) && !event.getModifierState("AltGraph");
-  if (isMod) return `mod+${event.shiftKey ? "shift+" : ""}${key}`;
-  return key === "=" ? "+" : key;
+  const isMod = (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
+  if (isMod) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
+  return key === '=' ? '+' : key;
 }
 
 /** @param {KeyboardEvent} event @returns {boolean} whether it belongs to what is typed in */
 function isTyping(event) {
   const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
   const { tagName } = element;
-  if (tagName === "INPUT") return !["range", "checkbox", "radio"].includes(
-    /** @type {HTMLInputElement} */ (element).type);
-  return ["TEXTAREA", "SELECT"].includes(tagName) || element.isContentEditable;
+  if (tagName === 'INPUT')
+    return !['range', 'checkbox', 'radio'].includes(/** @type {HTMLInputElement} */ (element).type);
+  return ['TEXTAREA', 'SELECT'].includes(tagName) || element.isContentEditable;
 }
 
 /**
@@ -97,7 +170,7 @@ function isTyping(event) {
  * @param {KeyboardEvent} event @param {Hands} hands
  */
 export function press(event, hands) {
-  const isAlt = event.altKey && !event.getModifierState("AltGraph");
+  const isAlt = event.altKey && !event.getModifierState('AltGraph');
   if (event.defaultPrevented || isAlt || isTyping(event)) return;
   if (hands.store.value.dialog || hands.store.value.readonly) return;
   const name = named(event);
@@ -106,5 +179,5 @@ export function press(event, hands) {
   if (digit) hands.store.set({ flow: (Number(event.key) || 10) / 10 });
   else if (found) /** @type {any} */ (found).act(hands);
   else return;
-  if (name !== "escape") event.preventDefault();
+  if (name !== 'escape') event.preventDefault();
 }

@@ -1,12 +1,12 @@
 /** One light: what it is in the answer, whether it is shown, and its dimmer. */
 
-import { Component, html } from "../vendor/preact.js";
-import { luminance, toHex, toKelvin } from "./colours.js";
-import { Asking } from "./asking.js";
-import { Button, Slider } from "./controls.js";
-import { kelvinText, number, percent, stopsText } from "./format.js";
-import { Icon } from "./icons.js";
-import { Thumb } from "./thumb.js";
+import { Component, html } from '../vendor/preact.js';
+import { luminance, toHex, toKelvin } from './colours.js';
+import { Asking } from './asking.js';
+import { Button, Slider } from './controls.js';
+import { kelvinText, number, percent, stopsText } from './format.js';
+import { Icon } from './icons.js';
+import { Thumb } from './thumb.js';
 
 /** @typedef {import("./model.js").Light} Light */
 /** @typedef {import("./model.js").Lit} Lit */
@@ -27,17 +27,17 @@ export class LightRow extends Component {
   /** A pointer that moves over the picture changes few of many rows. @param {Props} next */
   shouldComponentUpdate(next) {
     const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
-    return keys.some((key) => (key === "here"
-      ? heard(this.props.here) !== heard(next.here)
-      : next[key] !== this.props[key]));
+    return keys.some((key) =>
+      key === 'here' ? heard(this.props.here) !== heard(next.here) : next[key] !== this.props[key],
+    );
   }
 
   render() {
     const { k, light, hands, isOpen, readonly, hasSlider, here, isMute, asked } = this.props;
     const { store } = hands;
-    const dim = isMute || asked?.off ? "is-dim" : "";
+    const dim = isMute || asked?.off ? 'is-dim' : '';
     const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
-    return html`<div class=${`light ${dim} ${isOpen ? "is-open" : ""}`} role="group"
+    return html`<div class=${`light ${dim} ${isOpen ? 'is-open' : ''}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
       <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
         <${Thumb} name=${`thumb/${k}`} generation=${this.props.thumb} hands=${hands} />
@@ -46,8 +46,11 @@ export class LightRow extends Component {
       <div class="light-main">
         <div class="light-head">
           <button type="button" class="light-name" aria-expanded=${String(isOpen)}
-            onClick=${() => unfold(store, k)} data-tip=${light.members.length > 1
-              ? `${light.label}: ${light.members.join(", ")}` : `${light.label}, ${light.plugin}`}>
+            onClick=${() => unfold(store, k)} data-tip=${
+              light.members.length > 1
+                ? `${light.label}: ${light.members.join(', ')}`
+                : `${light.label}, ${light.plugin}`
+            }>
             <${Icon} name="fold" /><span>${light.label}</span></button>
           ${this.marks()}
         </div>
@@ -67,16 +70,23 @@ export class LightRow extends Component {
     const isHeld = asked.lock !== undefined || Boolean(asked.off);
     const lock = () => (isHeld ? session.release(k) : session.hold(k, this.props.rgb, true));
     return html`<span class="marks" role="group" aria-label="Shown">
-      <${Button} label="S" class="letter" on=${isSolo} act=${() => turn("solo", isSolo)}
+      <${Button} label="S" class="letter" on=${isSolo} act=${() => turn('solo', isSolo)}
         tip=${`Solo: show ${light.label} alone. The answer stays.`} />
-      <${Button} label="M" class="letter" on=${isMute} act=${() => turn("mute", isMute)}
+      <${Button} label="M" class="letter" on=${isMute} act=${() => turn('mute', isMute)}
         tip=${`Mute: show the picture without ${light.label}. The answer stays.`} />
     </span>
-    ${!readonly && !light.is_fixed && html`<span class="marks is-solve" role="group"
+    ${
+      !readonly &&
+      !light.is_fixed &&
+      html`<span class="marks is-solve" role="group"
       aria-label="Solve">
-      <${Button} icon="lock" on=${isHeld} act=${lock} tip=${isHeld
-        ? `Let the solve have ${light.label} again` : `Hold ${light.label} as it is in the answer`} />
-    </span>`}`;
+      <${Button} icon="lock" on=${isHeld} act=${lock} tip=${
+        isHeld
+          ? `Let the solve have ${light.label} again`
+          : `Hold ${light.label} as it is in the answer`
+      } />
+    </span>`
+    }`;
   }
 
   numbers() {
@@ -84,18 +94,23 @@ export class LightRow extends Component {
     const level = luminance(rgb);
     const said = notes({ light, lit, asked, tied });
     const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
-    const hue = white ? kelvinText(white) : lit?.hue ?? "";
+    const hue = white ? kelvinText(white) : (lit?.hue ?? '');
     const parts = [
-      hue, [number(level), !isLive && lit?.error, light.unit].filter(Boolean).join(" "),
+      hue,
+      [number(level), !isLive && lit?.error, light.unit].filter(Boolean).join(' '),
     ].filter(Boolean);
     return html`<div class="light-numbers">
-      <span class=${`dot ${level > 0 ? "" : "is-off"}`} aria-hidden="true"
-        style=${{ background: level > 0 ? toHex(scaled(rgb)) : "none" }}></span>
-      <span class="values">${level > 0 ? parts.join(" · ") : "off"}</span>
+      <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
+        style=${{ background: level > 0 ? toHex(scaled(rgb)) : 'none' }}></span>
+      <span class="values">${level > 0 ? parts.join(' · ') : 'off'}</span>
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
     </div>
-    ${said.length > 0 && html`<div class="badges">${said.map((note) =>
-      html`<span class="badge" key=${note}>${note}</span>`)}</div>`}`;
+    ${
+      said.length > 0 &&
+      html`<div class="badges">${said.map(
+        (note) => html`<span class="badge" key=${note}>${note}</span>`,
+      )}</div>`
+    }`;
   }
 
   dimmer() {
@@ -103,8 +118,8 @@ export class LightRow extends Component {
     const stops = stopsOf(rgb, light) ?? DARKEST;
     const move = (/** @type {number} */ to, /** @type {boolean} */ done) =>
       hands.session.hold(k, moved(rgb, light, to), done);
-    const text = luminance(rgb) > 0 ? stopsText(stops) : "off";
-    return html`<div class=${`dimmer ${asked?.lock !== undefined ? "is-held" : ""}`}>
+    const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
+    return html`<div class=${`dimmer ${asked?.lock !== undefined ? 'is-held' : ''}`}>
       <${Slider} plain label=${`${light.label}, stops from now`} value=${clamp(stops)}
         least=${DARKEST} most=${BRIGHTEST} step=${0.05} rest=${0} text=${text}
         disabled=${Boolean(asked?.off)} change=${move} />
@@ -114,15 +129,15 @@ export class LightRow extends Component {
 }
 
 /** @param {number | undefined} share */
-const heard = (share) => (share === undefined ? "" : percent(share));
+const heard = (share) => (share === undefined ? '' : percent(share));
 
 /** @param {{share: number, here?: number}} props */
 function Share({ share, here }) {
   const isHere = here !== undefined;
   const value = isHere ? here : share;
-  return html`<span class=${`share ${isHere ? "is-here" : ""}`}
-    data-tip=${isHere ? "Share of the light here" : "Share of the picture's light"}>
-    <i style=${{ "--share": String(value) }}></i><span>${percent(value)}</span></span>`;
+  return html`<span class=${`share ${isHere ? 'is-here' : ''}`}
+    data-tip=${isHere ? 'Share of the light here' : "Share of the picture's light"}>
+    <i style=${{ '--share': String(value) }}></i><span>${percent(value)}</span></span>`;
 }
 
 /** @param {import("./model.js").UiStore} store @param {number} k */
@@ -136,10 +151,17 @@ function unfold(store, k) {
  * @returns {string[]} */
 function notes({ light, lit, asked = {}, tied }) {
   return [
-    light.is_fixed && "stays as it is", asked.off && "off", asked.lock !== undefined && "held",
-    asked.limits && "limits", (asked.color ?? asked.kelvin ?? asked.primaries) && "colour",
-    tied && "tied", lit?.unreached && "not in the picture", lit?.held && "at its limit",
-  ].filter(Boolean).map(String);
+    light.is_fixed && 'stays as it is',
+    asked.off && 'off',
+    asked.lock !== undefined && 'held',
+    asked.limits && 'limits',
+    (asked.color ?? asked.kelvin ?? asked.primaries) && 'colour',
+    tied && 'tied',
+    lit?.unreached && 'not in the picture',
+    lit?.held && asked.lock === undefined && !asked.off && 'held back',
+  ]
+    .filter(Boolean)
+    .map(String);
 }
 
 /** @param {RGB} rgb @returns {RGB} */

@@ -1,18 +1,22 @@
 /** The list of lights: search, sort, groups that fold, a row for each light. */
 
-import { html } from "../vendor/preact.js";
-import { luminance } from "./colours.js";
-import { Button, Select } from "./controls.js";
-import { counted, percent } from "./format.js";
-import { Icon } from "./icons.js";
-import { LightRow } from "./light.js";
+import { html } from '../vendor/preact.js';
+import { luminance } from './colours.js';
+import { Button, Select } from './controls.js';
+import { counted, percent } from './format.js';
+import { Icon } from './icons.js';
+import { LightRow } from './light.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").UiStore} UiStore */
 /** @typedef {import("./keys.js").Hands} Hands */
 
-const SORTS = [{ value: "scene", label: "As in the scene" }, { value: "name", label: "Name" },
-  { value: "share", label: "Share of the picture" }, { value: "change", label: "Change" }];
+const SORTS = [
+  { value: 'scene', label: 'As in the scene' },
+  { value: 'name', label: 'Name' },
+  { value: 'share', label: 'Share of the picture' },
+  { value: 'change', label: 'Change' },
+];
 
 /** With more lights than these, only rows that are unfolded have their slider. */
 const MANY = 16;
@@ -25,21 +29,29 @@ export function LightsPanel({ ui, hands }) {
   const isMuted = ui.solo.length + ui.mute.length > 0;
   const isMany = ui.lights.length > MANY;
   return html`<div class="lights">
-    ${ui.lights.length > 5 && html`<div class="lights-tools">
+    ${
+      ui.lights.length > 5 &&
+      html`<div class="lights-tools">
       <label class="field search"><span class="only-read">Search lights</span>
         <${Icon} name="search" /><input type="search" value=${ui.search} placeholder="Search"
           onInput=${(/** @type {any} */ event) =>
             store.set({ search: event.currentTarget.value })} /></label>
       <${Select} label="Sort by" hidden value=${ui.sort} choices=${SORTS} tip="Sort by"
         change=${(/** @type {any} */ sort) => store.set({ sort })} />
-    </div>`}
-    ${isMuted && html`<p class="note"><span>Some lights are not shown. The answer has them
-      all.</span> <${Button} label="Show all" act=${() => store.set({ solo: [], mute: [] })} /></p>`}
+    </div>`
+    }
+    ${
+      isMuted &&
+      html`<p class="note"><span>Some lights are not shown. The answer has them
+      all.</span> <${Button} label="Show all" act=${() => store.set({ solo: [], mute: [] })} /></p>`
+    }
     ${!found.length && html`<p class="faint">No light is called so.</p>`}
-    ${groups.map(({ name, members }) => (name === null
-      ? members.map((k) => row(ui, hands, k, isMany))
-      : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} hands=${hands}
-          members=${members} isMany=${isMany} />`))}
+    ${groups.map(({ name, members }) =>
+      name === null
+        ? members.map((k) => row(ui, hands, k, isMany))
+        : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} hands=${hands}
+          members=${members} isMany=${isMany} />`,
+    )}
   </div>`;
 }
 
@@ -68,7 +80,7 @@ function Group({ name, ui, hands, members, isMany }) {
       <button type="button" class="group-name" aria-expanded=${String(open)}
         onClick=${() => store.set({ open: { ...ui.open, [key]: !open } })}>
         <${Icon} name="fold" /><strong>${name}</strong>
-        <span class="faint">${counted(members.length, "light")} · ${percent(share)}</span></button>
+        <span class="faint">${counted(members.length, 'light')} · ${percent(share)}</span></button>
       <${Button} label="S" class="letter" on=${isSolo} tip=${`Show ${name} alone`}
         act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />
     </div>
@@ -79,11 +91,13 @@ function Group({ name, ui, hands, members, isMany }) {
 /** @param {Ui} ui @returns {number[]} */
 function matching(ui) {
   const words = ui.search.toLowerCase().split(/\s+/).filter(Boolean);
-  return ui.lights.map((_, k) => k).filter((k) => {
-    const { name, label, group, members } = ui.lights[k];
-    const text = [name, label, group, ...members].join(" ").toLowerCase();
-    return words.every((word) => text.includes(word));
-  });
+  return ui.lights
+    .map((_, k) => k)
+    .filter((k) => {
+      const { name, label, group, members } = ui.lights[k];
+      const text = [name, label, group, ...members].join(' ').toLowerCase();
+      return words.every((word) => text.includes(word));
+    });
 }
 
 /** @param {Ui} ui @param {number[]} found @returns {number[]} */
@@ -91,16 +105,18 @@ function sorted(ui, found) {
   const name = (/** @type {number} */ k) => ui.lights[k].label;
   const share = (/** @type {number} */ k) => ui.lit[k]?.share ?? 0;
   const change = (/** @type {number} */ k) => {
-    const [a, b] = [luminance(ui.lit[k]?.emission ?? ui.lights[k].present),
-      luminance(ui.lights[k].present)];
+    const [a, b] = [
+      luminance(ui.lit[k]?.emission ?? ui.lights[k].present),
+      luminance(ui.lights[k].present),
+    ];
     return Math.abs(Math.log2((a + 1e-9) / (b + 1e-9)));
   };
   const made = [...found];
-  if (ui.sort === "name") {
+  if (ui.sort === 'name') {
     made.sort((a, b) => name(a).localeCompare(name(b), undefined, { numeric: true }));
   }
-  if (ui.sort === "share") made.sort((a, b) => share(b) - share(a));
-  if (ui.sort === "change") made.sort((a, b) => change(b) - change(a));
+  if (ui.sort === 'share') made.sort((a, b) => share(b) - share(a));
+  if (ui.sort === 'change') made.sort((a, b) => change(b) - change(a));
   return made;
 }
 
@@ -110,7 +126,9 @@ function grouped(ui, found) {
   /** @type {{name: string | null, members: number[]}[]} */
   const made = [];
   for (const k of found) {
-    const name = ui.lights[k].group ?? null;
+    const group = ui.lights[k].group ?? null;
+    const isMany = ui.lights.filter((one) => one.group === group).length > 1;
+    const name = isMany ? group : null;
     const same = name === null ? undefined : made.find((one) => one.name === name);
     if (same) same.members.push(k);
     else made.push({ name, members: [k] });

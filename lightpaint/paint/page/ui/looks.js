@@ -1,11 +1,11 @@
 /** Looks that were kept: pictures with names, to go on from, to compare and to mix. */
 
-import { html, useEffect, useRef, useState } from "../vendor/preact.js";
-import { Button, Select, Slider } from "./controls.js";
-import { mixOf } from "./model.js";
-import { number } from "./format.js";
-import { Thumb } from "./thumb.js";
-import { look } from "./tools.js";
+import { html, useEffect, useRef, useState } from '../vendor/preact.js';
+import { Button, Select, Slider } from './controls.js';
+import { mixOf } from './model.js';
+import { number } from './format.js';
+import { Thumb } from './thumb.js';
+import { look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").Look} Look */
@@ -26,22 +26,25 @@ function Kept({ one, ui, hands }) {
   const { session } = hands;
   const [isNaming, setNaming] = useState(false);
   const [isSure, setSure] = useState(false);
-  const drop = () => (isSure ? session.send("drop_look", { look: one.id }) : setSure(true));
+  const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
   const about = one.delta_e === null ? one.name : `${one.name}, ΔE ${number(one.delta_e, 2)}`;
   return html`<li class="look" onPointerLeave=${() => setSure(false)}>
     <button type="button" class="look-picture" aria-label=${`Go on from ${about}`}
       data-tip="Go on from this look; undo comes back"
-      onClick=${() => session.send("load_look", { look: one.id })}>
+      onClick=${() => session.send('load_look', { look: one.id })}>
       <${Thumb} name=${one.thumbnail} generation=${ui.resources[one.thumbnail] ?? 0}
         hands=${hands} />
     </button>
-    ${isNaming ? html`<${Naming} one=${one} hands=${hands} done=${() => setNaming(false)} />`
-      : html`<button type="button" class="look-name" data-tip="Rename"
-          onClick=${() => setNaming(true)}>${one.name}</button>`}
+    ${
+      isNaming
+        ? html`<${Naming} one=${one} hands=${hands} done=${() => setNaming(false)} />`
+        : html`<button type="button" class="look-name" data-tip="Rename"
+          onClick=${() => setNaming(true)}>${one.name}</button>`
+    }
     <span class="look-tools">
       <${Button} icon="copy" tip=${`Duplicate ${one.name}`}
-        act=${() => session.send("copy_look", { look: one.id })} />
-      <${Button} icon=${isSure ? "check" : "trash"} class=${isSure ? "is-sure" : ""}
+        act=${() => session.send('copy_look', { look: one.id })} />
+      <${Button} icon=${isSure ? 'check' : 'trash'} class=${isSure ? 'is-sure' : ''}
         tip=${isSure ? `Delete ${one.name}: press again` : `Delete ${one.name}`} act=${drop} />
     </span>
   </li>`;
@@ -53,12 +56,12 @@ function Naming({ one, hands, done }) {
   useEffect(() => ref.current?.select(), []);
   const take = () => {
     const name = ref.current?.value.trim();
-    if (name && name !== one.name) hands.session.send("rename_look", { look: one.id, name });
+    if (name && name !== one.name) hands.session.send('rename_look', { look: one.id, name });
     done();
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
-    if (event.key === "Enter") take();
-    if (event.key === "Escape") done();
+    if (event.key === 'Enter') take();
+    if (event.key === 'Escape') done();
     event.stopPropagation();
   };
   return html`<input class="naming" ref=${ref} type="text" aria-label=${`Name of ${one.name}`}
@@ -74,20 +77,23 @@ function Mix({ ui, hands }) {
   const set = (/** @type {{a?: number, b?: number, share?: number}} */ changed) => {
     const mix = { a, b, share: ui.mix?.share ?? 1, ...changed };
     store.set({ mix });
-    look(store, { left: "solution", right: "other", instead: mixOf(ui, { ...mix, share: 0 }) });
+    look(store, { left: 'solution', right: 'other', instead: mixOf(ui, { ...mix, share: 0 }) });
   };
   const end = () => {
     store.set({ mix: null });
-    look(store, { left: "painting", right: "solution", instead: null, other: null });
+    look(store, { left: 'painting', right: 'solution', instead: null, other: null });
   };
   return html`<div class="mix" role="group" aria-label="Compare two looks">
-    <${Button} label=${ui.mix ? "Back to the painting" : "Compare looks"} on=${Boolean(ui.mix)}
+    <${Button} label=${ui.mix ? 'Back to the painting' : 'Compare looks'} on=${Boolean(ui.mix)}
       act=${() => (ui.mix ? end() : set({}))} />
     <div class="row"><${Select} label="First look" hidden value=${String(a)} choices=${choices}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
       <${Select} label="Second look" hidden value=${String(b)} choices=${choices}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} /></div>
-    ${ui.mix && html`<${Slider} label="Between" value=${100 * ui.mix.share} least=${0} most=${100}
-      unit="%" change=${(/** @type {number} */ share) => set({ share: share / 100 })} />`}
+    ${
+      ui.mix &&
+      html`<${Slider} label="Between" value=${100 * ui.mix.share} least=${0} most=${100}
+      unit="%" change=${(/** @type {number} */ share) => set({ share: share / 100 })} />`
+    }
   </div>`;
 }

@@ -19,6 +19,8 @@
  * @typedef {object} Ui
  * @property {boolean} ready whether the session has said what there is
  * @property {boolean} readonly
+ * @property {string} waiting why there is nothing yet, if something went wrong
+ * @property {boolean} isWriting files
  * @property {any} state as the session said it last
  * @property {Light[]} lights
  * @property {Lit[]} lit the last exact answer
@@ -75,23 +77,79 @@
 
 /** @type {Show} */
 const SHOW = {
-  left: "painting", right: "solution", layout: "side", wipe: 0.5, blink: "left", zoom: 1,
-  pan: [0, 0], stops: 0, transform: "srgb", clean: true, overlay: null, gains: null,
-  instead: null, other: null,
+  left: 'painting',
+  right: 'solution',
+  layout: 'side',
+  wipe: 0.5,
+  blink: 'left',
+  zoom: 1,
+  pan: [0, 0],
+  stops: 0,
+  transform: 'srgb',
+  clean: true,
+  overlay: null,
+  gains: null,
+  instead: null,
+  other: null,
 };
 
 /** @returns {Ui} */
 export function first() {
   return {
-    ready: false, readonly: false, state: null, lights: [], lit: [], weights: [], headline: "",
-    deltaE: null, sentences: [], isLive: false, asked: {}, ties: [], settings: {}, meant: {},
-    history: { undo: [], redo: [] }, looks: [], basis: null, verifying: null, loading: null,
-    verified: null, explained: [], exported: null, connection: "wait", closed: null, toasts: [],
-    resources: {}, hint: false, tool: "brush", size: 60, hardness: 0.5, flow: 1, importance: 1,
-    as: "light", about: "spot", colour: [1, 0.45, 0.13], stops: 0, second: { colour: [0.2, 0.4, 1], stops: 0 },
-    recent: [], mixer: "white", asking: null, show: SHOW, solo: [], mute: [], hovered: null,
-    pointed: null, mix: null, open: { colour: true, lights: true, truth: false }, side: true,
-    dialog: null, search: "", sort: "scene", unfolded: [],
+    ready: false,
+    readonly: false,
+    waiting: '',
+    isWriting: false,
+    state: null,
+    lights: [],
+    lit: [],
+    weights: [],
+    headline: '',
+    deltaE: null,
+    sentences: [],
+    isLive: false,
+    asked: {},
+    ties: [],
+    settings: {},
+    meant: {},
+    history: { undo: [], redo: [] },
+    looks: [],
+    basis: null,
+    verifying: null,
+    loading: null,
+    verified: null,
+    explained: [],
+    exported: null,
+    connection: 'wait',
+    closed: null,
+    toasts: [],
+    resources: {},
+    hint: false,
+    tool: 'brush',
+    size: 60,
+    hardness: 0.5,
+    flow: 1,
+    importance: 1,
+    as: 'light',
+    about: 'spot',
+    colour: [1, 0.45, 0.13],
+    stops: 0,
+    second: { colour: [0.2, 0.4, 1], stops: 0 },
+    recent: [],
+    mixer: 'white',
+    asking: null,
+    show: SHOW,
+    solo: [],
+    mute: [],
+    hovered: null,
+    pointed: null,
+    mix: null,
+    open: { colour: true, lights: true, truth: false },
+    side: true,
+    dialog: null,
+    search: '',
+    sort: 'scene',
+    unfolded: [],
   };
 }
 
@@ -112,7 +170,7 @@ export function shown(ui) {
     const gain = gainOf(ui, k);
     const rgb = alone(ui.weights[k], ui.lights[k]).map((x) => x * gain);
     show.other = ui.weights.map((_, i) => (i === k ? /** @type {RGB} */ (rgb) : [0, 0, 0]));
-    show.right = "other";
+    show.right = 'other';
     show.gains = null;
   }
   return show;
@@ -136,8 +194,9 @@ function alone(rgb, light) {
 export function mixOf(ui, { a, b, share }) {
   const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);
   if (!from || !to) return null;
-  return from.map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * to[k][c])
-    ).map((rgb) => /** @type {RGB} */ (rgb));
+  return from
+    .map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * to[k][c]))
+    .map((rgb) => /** @type {RGB} */ (rgb));
 }
 
 /** Linear light of the paint in the hand. @param {Ui} ui @returns {RGB} */

@@ -3,7 +3,7 @@
  * middle button pan; Ctrl and the wheel zoom.
  */
 
-import { look, remember, take } from "./tools.js";
+import { look, remember, take } from './tools.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./engine.js").Point} Point */
@@ -13,11 +13,13 @@ import { look, remember, take } from "./tools.js";
 const SECOND_FINGER = { ms: 250, px: 24 };
 
 export class Pointer {
-  /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved */
-  constructor(engine, store, moved) {
+  /** @param {Engine} engine @param {UiStore} store @param {(x: number, y: number) => void} moved
+   * @param {(text: string) => void} say */
+  constructor(engine, store, moved, say) {
     this.engine = engine;
     this.store = store;
     this.moved = moved;
+    this.say = say;
     /** @type {Map<number, {x: number, y: number}>} */
     this.fingers = new Map();
     /** @type {null | "stroke" | "pan" | "pinch"} */
@@ -43,7 +45,7 @@ export class Pointer {
     const { x, y } = this.place(event);
     const pane = this.pane ?? paneAt(this.engine, x, y);
     if (!pane) return null;
-    const pressure = event.pointerType === "pen" ? event.pressure : 1;
+    const pressure = event.pointerType === 'pen' ? event.pressure : 1;
     const [px, py] = [(x - pane.left) / pane.scale, (y - pane.top) / pane.scale];
     return { x: px, y: py, pressure, kind: pane.kind };
   }
@@ -54,10 +56,10 @@ export class Pointer {
     const place = this.place(event);
     this.fingers.set(event.pointerId, place);
     capture(event);
-    if (event.pointerType === "touch" && this.fingers.size === 2) return this.pinch(event);
+    if (event.pointerType === 'touch' && this.fingers.size === 2) return this.pinch(event);
     if (this.fingers.size > 1) return;
     if (event.button === 1 || this.isSpace) {
-      this.doing = "pan";
+      this.doing = 'pan';
     } else if (event.button === 0) {
       this.pane = paneAt(this.engine, place.x, place.y);
       this.press(event);
@@ -71,19 +73,20 @@ export class Pointer {
     const point = this.point(event);
     const { tool, readonly } = this.store.value;
     if (!point) return;
-    if (event.altKey || tool === "pick" || readonly) {
+    if (event.altKey || tool === 'pick' || readonly) {
       if (!readonly) take(this.store, this.engine.lightAt(point.kind, point.x, point.y));
       this.pane = null;
       return;
     }
+    if (!this.canPaint()) return;
     remember(this.store);
     this.store.set({ hint: false });
-    if (event.shiftKey && this.last && tool !== "ask") {
+    if (event.shiftKey && this.last && tool !== 'ask') {
       this.engine.line(this.last, point);
       this.last = point;
       return;
     }
-    this.doing = "stroke";
+    this.doing = 'stroke';
     this.began = event.timeStamp;
     this.way = 0;
     this.engine.begin(point);
@@ -94,12 +97,12 @@ export class Pointer {
   move(event) {
     const place = this.place(event);
     const before = this.fingers.get(event.pointerId);
-    if (this.doing === "pinch") this.spread(event.pointerId, place);
+    if (this.doing === 'pinch') this.spread(event.pointerId, place);
     if (before) this.fingers.set(event.pointerId, place);
     this.moved(place.x, place.y);
-    if (this.doing === "pan" && before) {
+    if (this.doing === 'pan' && before) {
       this.pan(place.x - before.x, place.y - before.y);
-    } else if (this.doing === "stroke" && before) {
+    } else if (this.doing === 'stroke' && before) {
       const all = event.getCoalescedEvents?.() ?? [];
       const points = (all.length ? all : [event]).map((one) => this.point(one));
       const found = /** @type {Point[]} */ (points.filter(Boolean));
@@ -112,13 +115,22 @@ export class Pointer {
   /** @param {PointerEvent} event */
   up(event) {
     this.fingers.delete(event.pointerId);
-    if (this.doing === "stroke" && event.type === "pointercancel") this.engine.cancel();
-    else if (this.doing === "stroke") this.engine.end();
-    if (this.doing === "stroke" || this.fingers.size === 0) {
+    if (this.doing === 'stroke' && event.type === 'pointercancel') this.engine.cancel();
+    else if (this.doing === 'stroke') this.engine.end();
+    if (this.doing === 'stroke' || this.fingers.size === 0) {
       this.doing = null;
       this.pane = null;
       this.store.set({ asking: null });
     }
+  }
+
+  /** Nobody paints on what they do not see. */
+  canPaint() {
+    const { left, right } = this.store.value.show;
+    const isShown = left === 'painting' || right === 'painting';
+    if (!isShown)
+      this.say('The painting is not shown: compare Painting | Answer to go on with it.');
+    return isShown;
   }
 
   /** A stroke of one place, by keys. @param {number} x @param {number} y in CSS pixels */
@@ -127,7 +139,8 @@ export class Pointer {
     const { closed, readonly, tool } = this.store.value;
     if (!pane || closed || readonly) return;
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
-    if (tool === "pick") return take(this.store, this.engine.lightAt(pane.kind, point.x, point.y));
+    if (tool === 'pick') return take(this.store, this.engine.lightAt(pane.kind, point.x, point.y));
+    if (!this.canPaint()) return;
     remember(this.store);
     this.store.set({ hint: false });
     this.engine.begin(point);
@@ -138,13 +151,13 @@ export class Pointer {
   /** The second finger: what the first began is forgotten, or ended if it is a stroke by now.
    * @param {PointerEvent} event */
   pinch(event) {
-    if (this.doing === "stroke") {
+    if (this.doing === 'stroke') {
       const { ms, px } = SECOND_FINGER;
       if (event.timeStamp - this.began < ms || this.way < px) this.engine.cancel();
       else this.engine.end();
     }
     this.pane = null;
-    this.doing = "pinch";
+    this.doing = 'pinch';
   }
 
   /** @param {number} id @param {{x: number, y: number}} place */
@@ -152,7 +165,8 @@ export class Pointer {
     const own = this.fingers.get(id);
     const other = [...this.fingers].find(([key]) => key !== id)?.[1];
     if (!own || !other) return;
-    const far = (/** @type {{x: number, y: number}} */ a) => Math.hypot(a.x - other.x, a.y - other.y);
+    const far = (/** @type {{x: number, y: number}} */ a) =>
+      Math.hypot(a.x - other.x, a.y - other.y);
     const factor = far(place) / Math.max(1, far(own));
     look(this.store, this.engine.zoomAt((place.x + other.x) / 2, (place.y + other.y) / 2, factor));
     this.pan((place.x - own.x) / 2, (place.y - own.y) / 2);
@@ -185,8 +199,13 @@ export class Pointer {
 
 /** @param {Engine} engine @param {number} x @param {number} y */
 export function paneAt(engine, x, y) {
-  return [...engine.panes()].reverse().find((pane) =>
-    x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height) ?? null;
+  return (
+    [...engine.panes()]
+      .reverse()
+      .find(
+        (pane) => x >= pane.x && x < pane.x + pane.width && y >= pane.y && y < pane.y + pane.height,
+      ) ?? null
+  );
 }
 
 /** @param {PointerEvent} event */

@@ -6,8 +6,22 @@
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").Asked} Asked */
 
-const HEARD = ["state", "answer", "patch", "renewed", "progress", "say", "failed", "looks",
-  "exported", "verified", "explained", "closed", "connection"];
+const HEARD = [
+  'state',
+  'waiting',
+  'answer',
+  'patch',
+  'renewed',
+  'progress',
+  'say',
+  'failed',
+  'looks',
+  'exported',
+  'verified',
+  'explained',
+  'closed',
+  'connection',
+];
 
 export class Session {
   /** @param {Host} host @param {import("./model.js").UiStore} store */
@@ -21,7 +35,8 @@ export class Session {
     this.isMoving = false;
     /** What was asked of a light before a hand moved it. @type {Map<number, Asked>} */
     this.before = new Map();
-    for (const kind of HEARD) host.on(kind, (message) => this.receive({ ...message, kind }, message));
+    for (const kind of HEARD)
+      host.on(kind, (message) => this.receive({ ...message, kind }, message));
   }
 
   /**
@@ -34,7 +49,7 @@ export class Session {
       this.receive(reply, reply);
       return reply;
     } catch (error) {
-      this.toast(error instanceof Error ? error.message : String(error), "warn");
+      this.toast(error instanceof Error ? error.message : String(error), 'warn');
       return null;
     }
   }
@@ -45,15 +60,20 @@ export class Session {
     this.done.add(origin);
     const told = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
       state: stateOf,
+      waiting: (/** @type {any} */ m) => ({ ready: false, state: null, waiting: m.text ?? '' }),
       answer: (/** @type {any} */ m) => answerOf(m, this.store.value),
       patch: (/** @type {any} */ m) => answerOf(m, this.store.value),
-      renewed: (/** @type {any} */ m) =>
-        ({ resources: { ...this.store.value.resources, ...m.resources } }),
+      renewed: (/** @type {any} */ m) => ({
+        resources: { ...this.store.value.resources, ...m.resources },
+      }),
       progress: progressOf,
-      say: (/** @type {any} */ m) => this.toast(m.text, m.tone),
+      say: (/** @type {any} */ m) => this.say(m.text, m.tone),
       failed: (/** @type {any} */ m) => this.failed(m.text),
-      looks: (/** @type {any} */ m) => ({ looks: m.looks }),
-      exported: (/** @type {any} */ m) => ({ exported: m }),
+      looks: (/** @type {any} */ m) => ({
+        looks: m.looks,
+        resources: { ...this.store.value.resources, ...m.resources },
+      }),
+      exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false }),
       verified: (/** @type {any} */ m) => ({ verified: m, verifying: null }),
       explained: (/** @type {any} */ m) => ({ explained: m.sentences }),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
@@ -75,17 +95,24 @@ export class Session {
 
   /** @param {string} text */
   failed(text) {
-    this.store.set({ verifying: null });
-    this.toast(text, "warn");
+    this.store.set({ verifying: null, isWriting: false });
+    this.toast(text, 'warn');
   }
 
-  /** @param {string} text @param {"info" | "warn"} [tone] */
-  toast(text, tone = "info") {
+  /** What goes wrong beside the painting comes so, too. @param {string} text
+   * @param {'info' | 'warn'} tone */
+  say(text, tone) {
+    if (tone === 'warn') this.store.set({ isWriting: false });
+    this.toast(text, tone);
+  }
+
+  /** @param {string} text @param {'info' | 'warn'} [tone] */
+  toast(text, tone = 'info') {
     const id = Date.now() + Math.random();
     const others = this.store.value.toasts.filter((one) => one.text !== text).slice(-2);
     this.store.set({ toasts: [...others, { id, text, tone }] });
     const stays = Math.min(15000, 4000 + 60 * text.length);
-    setTimeout(() => this.dismiss(id), tone === "warn" ? 2 * stays : stays);
+    setTimeout(() => this.dismiss(id), tone === 'warn' ? 2 * stays : stays);
   }
 
   /** @param {number} id */
@@ -98,10 +125,13 @@ export class Session {
    * @param {number} light @param {Asked} asked @param {boolean} [done] false while a slider moves
    */
   ask(light, asked, done = true) {
-    const kept = Object.fromEntries(Object.entries(asked).filter(
-      ([, value]) => value !== null && value !== undefined && value !== false));
+    const kept = Object.fromEntries(
+      Object.entries(asked).filter(
+        ([, value]) => value !== null && value !== undefined && value !== false,
+      ),
+    );
     this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }));
-    return this.send("ask", { light, asked: kept, done });
+    return this.send('ask', { light, asked: kept, done });
   }
 
   /**
@@ -172,20 +202,20 @@ export class Session {
   /** @param {string[][]} ties */
   tieAll(ties) {
     this.store.set({ ties });
-    return this.send("tie", { ties });
+    return this.send('tie', { ties });
   }
 
   /** @param {string} key @param {any} value null for what follows from the painting */
   setting(key, value) {
     this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }));
-    return this.send("set", { values: { ...this.store.value.settings } });
+    return this.send('set', { values: { [key]: value } });
   }
 
   verify(run = true) {
     this.store.set({
-      verifying: run ? { what: "verify", done: 0, total: 0, unit: "" } : null,
+      verifying: run ? { what: 'verify', done: 0, total: 0, unit: '' } : null,
     });
-    return this.send("verify", { run });
+    return this.send('verify', { run });
   }
 }
 
@@ -198,22 +228,46 @@ function withoutLevel({ lock, off, ...rest }) {
 function stateOf(message) {
   const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
   return {
-    ready: true, state: message, lights, asked: asked ?? {}, ties: ties ?? [],
-    settings: settings ?? {}, meant: meant ?? {}, history, looks: looks ?? [],
-    resources: resources ?? {}, hint: Boolean(message.first), connection: "open", closed: null,
-    basis: basis && !basis.done ? { what: "basis", done: basis.spp, total: basis.wanted,
-      unit: "samples" } : null,
-    ...(message.answer ? answerFields(message.answer) : {}),
+    ready: true,
+    state: message,
+    lights,
+    asked: asked ?? {},
+    ties: ties ?? [],
+    settings: settings ?? {},
+    meant: meant ?? {},
+    history,
+    looks: looks ?? [],
+    resources: resources ?? {},
+    hint: Boolean(message.first),
+    connection: 'open',
+    closed: null,
+    basis:
+      basis && !basis.done
+        ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
+        : null,
+    ...answerFields(message.answer ?? { lights: message.lights_answer }, []),
     ...weightsOf(message),
   };
 }
 
-/** @param {any} answer @returns {Partial<Ui>} */
-function answerFields({ headline, delta_e: deltaE, sentences, lights }) {
-  return {
-    headline: headline ?? "", deltaE: deltaE ?? null, sentences: sentences ?? [],
-    ...(lights ? { lit: lights } : {}), isLive: false,
-  };
+/**
+ * What an exact answer says. The sentences come after the lights, when they have been found; until
+ * then those of the last answer stay.
+ * @param {any} answer @param {import('./model.js').Lit[]} before @returns {Partial<Ui>}
+ */
+function answerFields({ headline, delta_e: deltaE, sentences, lights }, before) {
+  /** @type {Partial<Ui>} */
+  const made = { isLive: false };
+  if (headline !== undefined) {
+    Object.assign(made, { headline, deltaE: deltaE ?? null, sentences: sentences ?? [] });
+  }
+  if (lights) {
+    made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
+      ...before[k],
+      ...one,
+    }));
+  }
+  return made;
 }
 
 /** @param {Message} message @returns {Partial<Ui>} */
@@ -229,18 +283,21 @@ function weightsOf(message) {
 /** Of an answer, and of a patch. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 function answerOf(message, ui) {
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
-  if (message.kind === "answer" && !message.exact) return { ...made, isLive: true };
-  for (const key of /** @type {const} */ (["history", "asked", "ties", "settings", "meant"])) {
+  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant'])) {
     if (message[key]) made[key] = message[key];
   }
-  if (message.lights) Object.assign(made, answerFields(message));
-  if (ui.verified && message.lights) made.verified = { ...ui.verified, isOld: true };
+  if (message.lights) Object.assign(made, answerFields(message, ui.lit));
+  else if (!message.exact) made.isLive = true;
+  if (ui.verified && made.weights) made.verified = { ...ui.verified, isOld: true };
+  // The reasons were those of the answer before.
+  if (made.isLive && ui.explained.length) made.explained = [];
   return made;
 }
 
 /** @param {any} message @returns {Partial<Ui>} */
 function progressOf({ what, done, total, unit }) {
   const made = { what, done, total, unit };
+  if (!what) return { basis: null, verifying: null };
   if (/verif/i.test(what)) return { verifying: made };
   return { basis: total && done >= total ? null : made };
 }

@@ -1,11 +1,12 @@
 /** The pictures, and what lies over them: names, the brush, the wipe, a hint for the first stroke. */
 
-import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../vendor/preact.js";
-import { toHex } from "./colours.js";
-import { counted } from "./format.js";
-import { gainOf, paintOf, shown } from "./model.js";
-import { paneAt, Pointer } from "./pointer.js";
-import { look } from "./tools.js";
+import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
+import { toHex } from './colours.js';
+import { counted } from './format.js';
+import { gainOf, paintOf, shown } from './model.js';
+import { paneAt, Pointer } from './pointer.js';
+import { look } from './tools.js';
+import { Bar } from './bar.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./engine.js").Pane} Pane */
@@ -14,23 +15,28 @@ import { look } from "./tools.js";
 /** @typedef {import("./keys.js").Hands} Hands */
 
 /** @type {Record<string, string>} */
-const NAMES = { painting: "Painting", solution: "Answer", other: "Other look", verified: "Render",
-  present: "Now" };
+const NAMES = {
+  painting: 'Painting',
+  solution: 'Answer',
+  other: 'Other look',
+  verified: 'Render',
+  present: 'Now',
+};
 
 /** @param {Ui} ui @param {string} kind @returns {string} */
 function nameOf(ui, kind) {
-  if (kind === "other" && ui.hovered !== null) {
+  if (kind === 'other' && ui.hovered !== null) {
     const stops = Math.round(Math.log2(gainOf(ui, ui.hovered)));
-    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, "stop")} brighter` : ""}`;
+    return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, 'stop')} brighter` : ''}`;
   }
-  if (kind === "other" && ui.mix) {
+  if (kind === 'other' && ui.mix) {
     const [a, b] = [ui.mix.a, ui.mix.b].map((id) => ui.looks.find((one) => one.id === id)?.name);
     return ui.mix.share === 1 ? `${b}` : `${a} → ${b}, ${Math.round(100 * ui.mix.share)} %`;
   }
-  if (kind === "solution" && ui.show.instead && ui.mix) {
+  if (kind === 'solution' && ui.show.instead && ui.mix) {
     return ui.looks.find((one) => one.id === ui.mix?.a)?.name ?? NAMES.solution;
   }
-  if (kind === "verified" && ui.verified?.isOld) return "Render of an earlier answer";
+  if (kind === 'verified' && ui.verified?.isOld) return 'Render of an earlier answer';
   return NAMES[kind] ?? kind;
 }
 
@@ -40,53 +46,99 @@ export function Stage({ ui, hands }) {
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
   const rings = useRef(/** @type {HTMLElement | null} */ (null));
   const [, resized] = useState(0);
-  const [pointer] = useState(() => new Pointer(engine, store, (x, y) => {
-    ring(rings.current, engine, store.value, x, y);
-    point(engine, store, x, y);
-  }));
+  const [pointer] = useState(
+    () =>
+      new Pointer(
+        engine,
+        store,
+        (x, y) => {
+          ring(rings.current, engine, store.value, x, y);
+          point(engine, store, x, y);
+        },
+        (text) => hands.session.toast(text),
+      ),
+  );
   useLayoutEffect(() => frame.current?.prepend(engine.element), []);
-  useEffect(() => watch(frame.current, (width, height) => {
-    engine.resize(width, height);
-    resized((count) => count + 1);
-  }), []);
+  useEffect(
+    () =>
+      watch(frame.current, (width, height) => {
+        engine.resize(width, height);
+        resized((count) => count + 1);
+      }),
+    [],
+  );
   // At once, so that names lie where the pictures will.
-  useMemo(() => engine.show(shown(ui)),
-    [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights]);
+  useMemo(
+    () => engine.show(shown(ui)),
+    [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights],
+  );
   const hasAlbedo = ui.resources.albedo !== undefined;
-  useEffect(() => engine.use({
-    tool: ui.tool, rgb: paintOf(ui), as: hasAlbedo ? ui.as : "look", size: ui.size, hardness: ui.hardness,
-    flow: ui.flow, importance: ui.importance, about: ui.about,
-  }), [ui.tool, ui.colour, ui.stops, ui.as, ui.size, ui.hardness, ui.flow, ui.importance, ui.about,
-    hasAlbedo]);
+  useEffect(
+    () =>
+      engine.use({
+        tool: ui.tool,
+        rgb: paintOf(ui),
+        as: hasAlbedo ? ui.as : 'look',
+        size: ui.size,
+        hardness: ui.hardness,
+        flow: ui.flow,
+        importance: ui.importance,
+        about: ui.about,
+      }),
+    [
+      ui.tool,
+      ui.colour,
+      ui.stops,
+      ui.as,
+      ui.size,
+      ui.hardness,
+      ui.flow,
+      ui.importance,
+      ui.about,
+      hasAlbedo,
+    ],
+  );
   useEffect(() => ring(rings.current, engine, ui), [ui.size, ui.tool, ui.hardness, ui.show]);
   useSurface(frame, pointer, hands);
   const panes = ui.ready ? engine.panes() : [];
   return html`<div class=${`stage is-${ui.tool}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints." aria-describedby="lp-status">
     <div class="rings" ref=${rings} hidden aria-hidden="true">
-      <i class="ring" style=${{ "--paint": toHex(ui.colour) }}></i><i class="ring is-twin"></i>
+      <i class="ring" style=${{ '--paint': toHex(ui.colour) }}></i><i class="ring is-twin"></i>
     </div>
     ${panes.map((pane, k) => html`<${Tag} key=${k} ui=${ui} pane=${pane} panes=${panes} />`)}
-    ${ui.show.layout === "wipe" && ui.ready && html`<${Wipe} ui=${ui} hands=${hands} />`}
+    ${ui.show.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} hands=${hands} />`}
     ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} />`}
     ${ui.asking && html`<div class="asking" role="status">${asked(ui.asking)}</div>`}
-    ${!ui.ready && html`<div class="waiting" role="status">
-      ${ui.connection === "wait" ? "Opening the scene …" : "Waiting for the session …"}</div>`}
+    ${!ui.ready && html`<${Waiting} ui=${ui} />`}
+  </div>`;
+}
+
+/** Before there is anything to see. @param {{ui: Ui}} props */
+function Waiting({ ui }) {
+  const { basis } = ui;
+  const text = ui.waiting || (basis ? 'Rendering the first picture …' : 'Opening the scene …');
+  return html`<div class="waiting" role="status"><span>${text}</span>
+    ${!ui.waiting && html`<${Bar} progress=${basis ?? { done: 0, total: 0 }} label=${text} />`}
   </div>`;
 }
 
 /** @param {{stops: number, mired: number}} asking */
 function asked({ stops, mired }) {
-  const bright = Math.abs(stops) < 0.05 ? "as bright" :
-    `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? "brighter" : "darker"}`;
-  const warm = Math.abs(mired) < 3 ? "" :
-    `, ${Math.abs(Math.round(mired))} mired ${mired > 0 ? "warmer" : "cooler"}`;
+  const bright =
+    Math.abs(stops) < 0.05
+      ? 'as bright'
+      : `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
+  const warm =
+    Math.abs(mired) < 3
+      ? ''
+      : `, ${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
   return bright + warm;
 }
 
 /** @param {{ui: Ui, pane: Pane, panes: Pane[]}} props */
 function Tag({ ui, pane, panes }) {
-  const isRight = ui.show.layout === "wipe" && pane === panes[0] && panes.length > 1;
+  const isRight = ui.show.layout === 'wipe' && pane === panes[0] && panes.length > 1;
   const size = /** @type {[number, number]} */ ([...ui.state.size].reverse());
   if (pane.width < 90) return null;
   const [w] = size;
@@ -94,17 +146,20 @@ function Tag({ ui, pane, panes }) {
   const style = {
     top: `${Math.min(Math.max(pane.y, pane.top), pane.y + pane.height - 30) + 8}px`,
     left: `${(isRight ? right : Math.max(pane.x, pane.left)) + (isRight ? -8 : 8)}px`,
-    transform: isRight ? "translateX(-100%)" : "",
+    transform: isRight ? 'translateX(-100%)' : '',
   };
   return html`<span class="tag" style=${style}>${nameOf(ui, pane.kind)}</span>`;
 }
 
 /** @param {{panes: Pane[]}} props */
 function Hint({ panes }) {
-  const pane = panes.find((one) => one.kind === "painting") ;
+  const pane = panes.find((one) => one.kind === 'painting');
   if (!pane) return null;
-  return html`<div class="hint" style=${{ left: `${pane.x + pane.width / 2}px`,
-    top: `${pane.y + pane.height / 2}px`, maxWidth: `${Math.min(320, pane.width - 24)}px` }}>
+  return html`<div class="hint" style=${{
+    left: `${pane.x + pane.width / 2}px`,
+    top: `${pane.y + pane.height / 2}px`,
+    maxWidth: `${Math.min(320, pane.width - 24)}px`,
+  }}>
     <strong>Paint how it should look</strong>
     <span>Choose a colour, drag over this picture. The lights follow on the other one.</span>
   </div>`;
@@ -157,16 +212,17 @@ function ring(rings, engine, ui, x = Number(rings?.dataset.x), y = Number(rings?
   rings.dataset.x = String(x);
   rings.dataset.y = String(y);
   const pane = paneAt(engine, x, y);
-  const others = engine.panes().filter((one) => one !== pane && ui.show.layout === "side");
+  const others = engine.panes().filter((one) => one !== pane && ui.show.layout === 'side');
   const [own, twin] = /** @type {HTMLElement[]} */ ([...rings.children]);
   rings.hidden = !pane;
   if (!pane) return;
-  const isPoint = ["pick", "fill"].includes(ui.tool)
-    || (ui.tool === "ask" && ui.about === "object");
+  const isPoint =
+    ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'ask' && ui.about === 'object');
   const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale);
   place(own, x, y, size, ui.hardness);
   twin.hidden = !others.length;
-  if (others.length) place(twin, x - pane.left + others[0].left, y - pane.top + others[0].top, size, 1);
+  if (others.length)
+    place(twin, x - pane.left + others[0].left, y - pane.top + others[0].top, size, 1);
 }
 
 /** @param {HTMLElement} element @param {number} x @param {number} y @param {number} size
@@ -174,7 +230,7 @@ function ring(rings, engine, ui, x = Number(rings?.dataset.x), y = Number(rings?
 function place(element, x, y, size, hardness) {
   element.style.width = element.style.height = `${size}px`;
   element.style.transform = `translate(${x - size / 2}px, ${y - size / 2}px)`;
-  element.style.setProperty("--hard", String(hardness));
+  element.style.setProperty('--hard', String(hardness));
 }
 
 /** @type {WeakMap<UiStore, number>} */
@@ -184,12 +240,16 @@ const waiting = new WeakMap();
  * @param {number} x @param {number} y */
 function point(engine, store, x, y) {
   if (waiting.has(store)) return;
-  waiting.set(store, requestAnimationFrame(() => {
-    waiting.delete(store);
-    const pane = paneAt(engine, x, y);
-    const found = pane && engine.pointed((x - pane.left) / pane.scale, (y - pane.top) / pane.scale);
-    if (found || store.value.pointed) store.set({ pointed: found });
-  }));
+  waiting.set(
+    store,
+    requestAnimationFrame(() => {
+      waiting.delete(store);
+      const pane = paneAt(engine, x, y);
+      const found =
+        pane && engine.pointed((x - pane.left) / pane.scale, (y - pane.top) / pane.scale);
+      if (found || store.value.pointed) store.set({ pointed: found });
+    }),
+  );
 }
 
 /** @param {import("../vendor/preact.js").Ref<HTMLElement | null>} frame @param {Pointer} pointer
@@ -203,32 +263,32 @@ function useSurface(frame, pointer, hands) {
     const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
       element.addEventListener(name, hear, { signal: ends.signal, passive: false });
     // Whoever came by a pointer sees where they are; the outline is for the keyboard.
-    on("pointerdown", (event) => {
-      element.dataset.by = "pointer";
+    on('pointerdown', (event) => {
+      element.dataset.by = 'pointer';
       pointer.down(event);
     });
-    on("blur", () => delete element.dataset.by);
-    on("pointermove", (event) => pointer.move(event));
-    on("pointerup", (event) => pointer.up(event));
-    on("pointercancel", (event) => pointer.up(event));
-    on("wheel", (event) => pointer.wheel(event));
-    on("contextmenu", (event) => event.preventDefault());
-    on("pointerleave", () => {
+    on('blur', () => delete element.dataset.by);
+    on('pointermove', (event) => pointer.move(event));
+    on('pointerup', (event) => pointer.up(event));
+    on('pointercancel', (event) => pointer.up(event));
+    on('wheel', (event) => pointer.wheel(event));
+    on('contextmenu', (event) => event.preventDefault());
+    on('pointerleave', () => {
       store.set({ pointed: null });
-      const rings = /** @type {HTMLElement | null} */ (element.querySelector(".rings"));
+      const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'));
       if (rings && !pointer.doing) rings.hidden = true;
     });
-    on("keydown", (event) => byKeys(event, pointer, engine, store));
+    on('keydown', (event) => byKeys(event, pointer, engine, store));
     const over = (/** @type {KeyboardEvent} */ event) => {
       const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
-      if (event.code !== "Space" || inner.matches?.("input[type=text], textarea")) return;
-      const isHere = element.matches(":hover") || inner === element;
-      pointer.isSpace = event.type === "keydown" && isHere;
-      element.classList.toggle("is-panning", pointer.isSpace);
+      if (event.code !== 'Space' || inner.matches?.('input[type=text], textarea')) return;
+      const isHere = element.matches(':hover') || inner === element;
+      pointer.isSpace = event.type === 'keydown' && isHere;
+      element.classList.toggle('is-panning', pointer.isSpace);
       if (isHere) event.preventDefault();
     };
-    window.addEventListener("keydown", over, { signal: ends.signal });
-    window.addEventListener("keyup", over, { signal: ends.signal });
+    window.addEventListener('keydown', over, { signal: ends.signal });
+    window.addEventListener('keyup', over, { signal: ends.signal });
     return () => ends.abort();
   }, []);
 }
@@ -236,16 +296,20 @@ function useSurface(frame, pointer, hands) {
 /** The brush by keys: arrows move it, Enter paints a dab. @param {KeyboardEvent} event
  * @param {Pointer} pointer @param {Engine} engine @param {UiStore} store */
 function byKeys(event, pointer, engine, store) {
-  const way = /** @type {Record<string, [number, number]>} */ ({ ArrowLeft: [-1, 0],
-    ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] })[event.key];
-  if ((!way && event.key !== "Enter") || event.target !== event.currentTarget) return;
+  const way = /** @type {Record<string, [number, number]>} */ ({
+    ArrowLeft: [-1, 0],
+    ArrowRight: [1, 0],
+    ArrowUp: [0, -1],
+    ArrowDown: [0, 1],
+  })[event.key];
+  if ((!way && event.key !== 'Enter') || event.target !== event.currentTarget) return;
   event.preventDefault();
   const element = /** @type {HTMLElement} */ (event.currentTarget);
-  const rings = /** @type {HTMLElement} */ (element.querySelector(".rings"));
+  const rings = /** @type {HTMLElement} */ (element.querySelector('.rings'));
   const pane = engine.panes()[0];
   const step = event.shiftKey ? 1 : 12;
   const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
   const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
   pointer.moved(x, y);
-  if (event.key === "Enter") pointer.dab(x, y);
+  if (event.key === 'Enter') pointer.dab(x, y);
 }

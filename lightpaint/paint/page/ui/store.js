@@ -18,7 +18,7 @@ export class Store {
    * @param {Partial<T> | ((value: T) => Partial<T>)} changes
    */
   set(changes) {
-    const made = typeof changes === "function" ? changes(this.value) : changes;
+    const made = typeof changes === 'function' ? changes(this.value) : changes;
     this.value = { ...this.value, ...made };
     if (!this.waiting) {
       this.waiting = true;

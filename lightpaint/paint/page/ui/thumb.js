@@ -1,6 +1,6 @@
 /** A small picture of the session on a canvas of its own. */
 
-import { html, useEffect, useRef } from "../vendor/preact.js";
+import { html, useEffect, useRef } from '../vendor/preact.js';
 
 /** @typedef {import("./keys.js").Hands} Hands */
 
@@ -17,10 +17,12 @@ export function Thumb({ name, generation, hands, label }) {
       (picture) => !isGone && ref.current && put(ref.current, picture),
       () => undefined, // A thumbnail is not worth an error.
     );
-    return () => { isGone = true; };
+    return () => {
+      isGone = true;
+    };
   }, [name, generation]);
-  return html`<canvas class="thumb" ref=${ref} width="1" height="1" role=${label ? "img" : undefined}
-    aria-label=${label} aria-hidden=${label ? undefined : "true"}></canvas>`;
+  return html`<canvas class="thumb" ref=${ref} width="1" height="1" role=${label ? 'img' : undefined}
+    aria-label=${label} aria-hidden=${label ? undefined : 'true'}></canvas>`;
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./engine.js").Picture} picture (h, w, 3) */
@@ -32,5 +34,5 @@ function put(canvas, { data, shape: [height, width] }) {
     for (let c = 0; c < 3; c += 1) pixels.data[4 * at + c] = data[3 * at + c];
     pixels.data[4 * at + 3] = 255;
   }
-  canvas.getContext("2d")?.putImageData(pixels, 0, 0);
+  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
 }

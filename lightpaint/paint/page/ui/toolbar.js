@@ -1,34 +1,38 @@
 /** The tools at the side, and above the pictures what the one in the hand can be set to. */
 
-import { html, useState } from "../vendor/preact.js";
-import { toHex } from "./colours.js";
-import { Button, Choice, Number_, Select, Slider } from "./controls.js";
-import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from "./tools.js";
+import { html, useState } from '../vendor/preact.js';
+import { toHex } from './colours.js';
+import { Button, Choice, Number_, Select, Slider } from './controls.js';
+import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
 
 /** Sizes are felt as ratios. */
-const RATIO = { to: (/** @type {number} */ x) => Math.log2(x), of: (/** @type {number} */ t) =>
-  Math.round(2 ** t) };
+const RATIO = {
+  to: (/** @type {number} */ x) => Math.log2(x),
+  of: (/** @type {number} */ t) => Math.round(2 ** t),
+};
 
 const ABOUT = [
-  { value: "spot", label: "Spot", tip: "A soft spot where the drag begins" },
-  { value: "object", label: "Object", tip: "The whole object under the pointer" },
+  { value: 'spot', label: 'Spot', tip: 'A soft spot where the drag begins' },
+  { value: 'object', label: 'Object', tip: 'The whole object under the pointer' },
 ];
 const PAINT_AS = [
-  { value: "light", label: "Light", tip: "Paint light: what the surface is made of stays visible" },
-  { value: "look", label: "Look", tip: "Paint the look: the colour itself, as it is to appear" },
+  { value: 'light', label: 'Light', tip: 'Paint light: what the surface is made of stays visible' },
+  { value: 'look', label: 'Look', tip: 'Paint the look: the colour itself, as it is to appear' },
 ];
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ToolBar({ ui, hands }) {
   const { store } = hands;
-  const style = { "--first": toHex(ui.colour), "--second": toHex(ui.second.colour) };
+  const style = { '--first': toHex(ui.colour), '--second': toHex(ui.second.colour) };
   return html`<nav class="tools" aria-label="Tools">
-    ${TOOLS.map(({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
+    ${TOOLS.map(
+      ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
       keys=${keys} on=${ui.tool === tool} act=${() => choose(store, tool)}
-      disabled=${tool === "fill" && !ui.state?.objects?.length} />`)}
+      disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
+    )}
     <div class="spring"></div>
     <button type="button" class="two-colours" style=${style} data-tip="Other colour" data-keys="X"
       aria-keyshortcuts="X" aria-label=${`Swap colours: ${toHex(ui.colour)} in the hand`}
@@ -39,28 +43,48 @@ export function ToolBar({ ui, hands }) {
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ToolOptions({ ui, hands }) {
   const { store } = hands;
-  const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? "";
-  const strokes = ["brush", "eraser", "weight", "line"].includes(ui.tool);
-  const paints = ["brush", "fill", "line"].includes(ui.tool);
+  const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? '';
+  const strokes = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
+  const paints = ['brush', 'fill', 'line'].includes(ui.tool);
   return html`<div class="options" role="group" aria-label=${`${label} settings`}>
     <strong>${label}</strong>
-    ${paints && ui.resources.albedo !== undefined && html`<${Choice} label="Paint as"
-      value=${ui.as} choices=${PAINT_AS} change=${(/** @type {any} */ as) => store.set({ as })} />`}
-    ${ui.tool === "weight" && html`<${Slider} label="Importance" value=${ui.importance} least=${0}
+    ${
+      paints &&
+      ui.resources.albedo !== undefined &&
+      html`<${Choice} label="Paint as"
+      value=${ui.as} choices=${PAINT_AS} change=${(/** @type {any} */ as) => store.set({ as })} />`
+    }
+    ${
+      ui.tool === 'weight' &&
+      html`<${Slider} label="Importance" value=${ui.importance} least=${0}
       most=${1} step=${0.05} digits=${2} rest=${1}
-      change=${(/** @type {number} */ importance) => store.set({ importance })} />`}
-    ${ui.tool === "ask" && ui.state?.objects?.length > 0 && html`<${Choice} label="Ask about"
+      change=${(/** @type {number} */ importance) => store.set({ importance })} />`
+    }
+    ${
+      ui.tool === 'ask' &&
+      ui.state?.objects?.length > 0 &&
+      html`<${Choice} label="Ask about"
       value=${ui.about} choices=${ABOUT} change=${(/** @type {any} */ about) =>
-        store.set({ about })} />`}
-    ${(strokes || (ui.tool === "ask" && ui.about === "spot")) && html`<${Slider} label="Size"
+        store.set({ about })} />`
+    }
+    ${
+      (strokes || (ui.tool === 'ask' && ui.about === 'spot')) &&
+      html`<${Slider} label="Size"
       value=${ui.size} least=${LEAST_SIZE} curve=${RATIO} most=${MOST_SIZE} unit="px" keys="[ ]"
-      tip="Size" change=${(/** @type {number} */ size) => store.set({ size })} />`}
-    ${strokes && html`<${Slider} label="Hardness" value=${100 * ui.hardness} least=${0} most=${100} unit="%"
+      tip="Size" change=${(/** @type {number} */ size) => store.set({ size })} />`
+    }
+    ${
+      strokes &&
+      html`<${Slider} label="Hardness" value=${100 * ui.hardness} least=${0} most=${100} unit="%"
         keys="Shift [ ]" tip="Hardness of the edge"
-        change=${(/** @type {number} */ hard) => store.set({ hardness: hard / 100 })} />`}
-    ${(strokes || ui.tool === "fill") && html`<${Slider} label="Flow" value=${100 * ui.flow}
+        change=${(/** @type {number} */ hard) => store.set({ hardness: hard / 100 })} />`
+    }
+    ${
+      (strokes || ui.tool === 'fill') &&
+      html`<${Slider} label="Flow" value=${100 * ui.flow}
       least=${1} most=${100} unit="%" keys="1 … 0" tip="Flow: how much paint each touch leaves"
-      change=${(/** @type {number} */ flow) => store.set({ flow: flow / 100 })} />`}
+      change=${(/** @type {number} */ flow) => store.set({ flow: flow / 100 })} />`
+    }
   </div>`;
 }
 
@@ -69,14 +93,17 @@ export function ToolOptions({ ui, hands }) {
 export function Ask({ ui, hands }) {
   const [stops, setStops] = useState(0.5);
   const [mired, setMired] = useState(0);
-  const [object, setObject] = useState("all");
+  const [object, setObject] = useState('all');
   const objects = /** @type {string[]} */ (ui.state?.objects ?? []);
-  const choices = [{ value: "all", label: "Whole picture" },
-    ...objects.map((name, k) => ({ value: String(k), label: name }))
-      .sort((a, b) => a.label.localeCompare(b.label))];
+  const choices = [
+    { value: 'all', label: 'Whole picture' },
+    ...objects
+      .map((name, k) => ({ value: String(k), label: name }))
+      .sort((a, b) => a.label.localeCompare(b.label)),
+  ];
   const ask = () => {
     hands.store.set({ hint: false });
-    hands.engine.ask({ stops, mired, object: object === "all" ? null : Number(object) });
+    hands.engine.ask({ stops, mired, object: object === 'all' ? null : Number(object) });
   };
   return html`<div class="ask">
     <${Select} label="Where" value=${object} choices=${choices} change=${setObject} />

@@ -1,6 +1,6 @@
 /** The tools, and what a person does with them that is no stroke: colours, sizes, looks of it. */
 
-import { toHex } from "./colours.js";
+import { toHex } from './colours.js';
 
 /** @typedef {import("./engine.js").Tool} Tool */
 /** @typedef {import("./engine.js").RGB} RGB */
@@ -8,26 +8,47 @@ import { toHex } from "./colours.js";
 
 /** @type {{tool: Tool, label: string, icon: string, keys: string, tip: string}[]} */
 export const TOOLS = [
-  { tool: "brush", label: "Brush", icon: "brush", keys: "B", tip: "Brush: paint light" },
-  { tool: "eraser", label: "Eraser", icon: "eraser", keys: "E",
-    tip: "Eraser: take paint away; what is not painted stays near the present look" },
-  { tool: "weight", label: "Importance", icon: "weight", keys: "W",
-    tip: "Importance: where the answer has to fit best" },
-  { tool: "pick", label: "Picker", icon: "pick", keys: "I", tip: "Picker: take light from a picture" },
-  { tool: "fill", label: "Fill", icon: "fill", keys: "G", tip: "Fill: one object" },
-  { tool: "line", label: "Line", icon: "line", keys: "L", tip: "Straight line" },
-  { tool: "ask", label: "Ask", icon: "ask", keys: "A",
-    tip: "Ask by dragging: up is brighter, right is warmer" },
+  { tool: 'brush', label: 'Brush', icon: 'brush', keys: 'B', tip: 'Brush: paint light' },
+  {
+    tool: 'eraser',
+    label: 'Eraser',
+    icon: 'eraser',
+    keys: 'E',
+    tip: 'Eraser: take paint away; what is not painted stays near the present look',
+  },
+  {
+    tool: 'weight',
+    label: 'Importance',
+    icon: 'weight',
+    keys: 'W',
+    tip: 'Importance: where the answer has to fit best',
+  },
+  {
+    tool: 'pick',
+    label: 'Picker',
+    icon: 'pick',
+    keys: 'I',
+    tip: 'Picker: take light from a picture',
+  },
+  { tool: 'fill', label: 'Fill', icon: 'fill', keys: 'G', tip: 'Fill: one object' },
+  { tool: 'line', label: 'Line', icon: 'line', keys: 'L', tip: 'Straight line' },
+  {
+    tool: 'ask',
+    label: 'Ask',
+    icon: 'ask',
+    keys: 'A',
+    tip: 'Ask by dragging: up is brighter, right is warmer',
+  },
 ];
 
 export const HINTS = /** @type {Record<Tool, string>} */ ({
-  brush: "Drag on the painting. Shift-click draws a line, Alt-click takes a colour.",
-  eraser: "Erased places are free again, and held near the present look.",
-  weight: "Paint where it matters most. At 0 a place does not count.",
-  pick: "Click on either picture: the light there becomes the paint.",
-  fill: "Click on an object to paint all of it.",
-  line: "Drag from one end of the line to the other.",
-  ask: "Drag on a place: up brighter, down darker, right warmer, left cooler.",
+  brush: 'Drag on the painting. Shift-click draws a line, Alt-click takes a colour.',
+  eraser: 'Erased places are free again, and held near the present look.',
+  weight: 'Paint where it matters most. At 0 a place does not count.',
+  pick: 'Click on either picture: the light there becomes the paint.',
+  fill: 'Click on an object to paint all of it.',
+  line: 'Drag from one end of the line to the other.',
+  ask: 'Drag on a place: up brighter, down darker, right warmer, left cooler.',
 });
 
 export const LEAST_SIZE = 2;
@@ -36,13 +57,15 @@ export const MOST_SIZE = 1000;
 /** @param {UiStore} store @param {Tool} tool */
 export function choose(store, tool) {
   // Who asks by a drag may want to do it in numbers.
-  store.set(({ open }) => ({ tool, open: tool === "ask" ? { ...open, ask: true } : open }));
+  store.set(({ open }) => ({ tool, open: tool === 'ask' ? { ...open, ask: true } : open }));
 }
 
 /** @param {UiStore} store */
 export function swap(store) {
   store.set(({ colour, stops, second }) => ({
-    colour: second.colour, stops: second.stops, second: { colour, stops },
+    colour: second.colour,
+    stops: second.stops,
+    second: { colour, stops },
   }));
 }
 
@@ -60,7 +83,7 @@ export function take(store, light) {
 /** Remember what was painted with. @param {UiStore} store */
 export function remember(store) {
   const { colour, stops, recent, tool } = store.value;
-  if (!["brush", "fill", "line"].includes(tool)) return;
+  if (!['brush', 'fill', 'line'].includes(tool)) return;
   const same = (/** @type {{colour: RGB, stops: number}} */ one) =>
     toHex(one.colour) === toHex(colour) && Math.abs(one.stops - stops) < 0.01;
   if (recent.length && same(recent[0])) return;
@@ -87,5 +110,11 @@ export function look(store, changes) {
 /** The next of some values. @template T @param {readonly T[]} values @param {T} now @returns {T} */
 export const next = (values, now) => values[(values.indexOf(now) + 1) % values.length];
 
-export const LAYOUTS = /** @type {const} */ (["side", "wipe", "blink"]);
-export const OVERLAYS = /** @type {const} */ ([null, "missed", "beyond", "falsecolor", "importance"]);
+export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink']);
+export const OVERLAYS = /** @type {const} */ ([
+  null,
+  'missed',
+  'beyond',
+  'falsecolor',
+  'importance',
+]);

@@ -1,17 +1,17 @@
 /** Above the pictures: what is open, undo, how the pictures are looked at. */
 
-import { html } from "../vendor/preact.js";
-import { Button, Check, Choice, Select, Slider } from "./controls.js";
-import { signed } from "./format.js";
-import { look } from "./tools.js";
+import { html } from '../vendor/preact.js';
+import { Button, Check, Choice, Select, Slider } from './controls.js';
+import { signed } from './format.js';
+import { look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
 
 const LAYOUTS = [
-  { value: "side", label: "Side by side", icon: "side", keys: "V" },
-  { value: "wipe", label: "Wipe", icon: "wipe", keys: "V" },
-  { value: "blink", label: "Blink", icon: "blink", keys: "V" },
+  { value: 'side', label: 'Side by side', icon: 'side', keys: 'V' },
+  { value: 'wipe', label: 'Wipe', icon: 'wipe', keys: 'V' },
+  { value: 'blink', label: 'Blink', icon: 'blink', keys: 'V' },
 ];
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -20,16 +20,20 @@ export function TopBar({ ui, hands }) {
   const { show, history } = ui;
   const undo = history.undo.at(-1);
   const redo = history.redo.at(-1);
-  const [scene, name] = [ui.state?.scene ?? "", ui.state?.session ?? ""];
+  const [scene, name] = [ui.state?.scene ?? '', ui.state?.session ?? ''];
   return html`<header class="top">
-    <div class="title"><strong>${scene || "lightpaint"}</strong>${name && name !== scene
-      && html`<span>${name}</span>`}</div>
-    ${!ui.readonly && html`<div class="group" role="group" aria-label="History">
-      <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : "Undo"} keys="Control+Z"
-        disabled=${!undo} act=${() => session.send("undo")} />
-      <${Button} icon="redo" tip=${redo ? `Redo: ${redo}` : "Redo"} keys="Control+Shift+Z"
-        disabled=${!redo} act=${() => session.send("redo")} />
-    </div>`}
+    <div class="title"><strong>${scene || 'lightpaint'}</strong>${
+      name && name !== scene && html`<span>${name}</span>`
+    }</div>
+    ${
+      !ui.readonly &&
+      html`<div class="group" role="group" aria-label="History">
+      <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : 'Undo'} keys="Control+Z"
+        disabled=${!undo} act=${() => session.send('undo')} />
+      <${Button} icon="redo" tip=${redo ? `Redo: ${redo}` : 'Redo'} keys="Control+Shift+Z"
+        disabled=${!redo} act=${() => session.send('redo')} />
+    </div>`
+    }
     <div class="spring"></div>
     <${Choice} label="Pictures" icons value=${show.layout} choices=${LAYOUTS}
       change=${(/** @type {any} */ layout) => look(store, { layout })} />
@@ -45,11 +49,17 @@ export function TopBar({ ui, hands }) {
         act=${() => look(store, { zoom: 1, pan: [0, 0] })} />
     </div>
     <div class="group" role="group" aria-label="Painter">
-      ${!ui.readonly && html`<${Button} icon="settings" tip="How the painting is answered"
-        act=${() => store.set({ dialog: "settings" })} />`}
-      ${!ui.readonly && html`<${Button} icon="export" tip="Write files"
-        act=${() => store.set({ dialog: "export" })} />`}
-      <${Button} icon="keys" tip="All keys" keys="?" act=${() => store.set({ dialog: "keys" })} />
+      ${
+        !ui.readonly &&
+        html`<${Button} icon="settings" tip="How the painting is answered"
+        act=${() => store.set({ dialog: 'settings' })} />`
+      }
+      ${
+        !ui.readonly &&
+        html`<${Button} icon="export" tip="Write files"
+        act=${() => store.set({ dialog: 'export' })} />`
+      }
+      <${Button} icon="keys" tip="All keys" keys="?" act=${() => store.set({ dialog: 'keys' })} />
       <${Button} icon="panel" tip="Panels" keys="P" on=${ui.side}
         act=${() => store.set({ side: !ui.side })} />
     </div>
@@ -70,27 +80,31 @@ function ViewChoice({ ui, hands }) {
 
 /** @param {string} name */
 function spoken(name) {
-  const known = /** @type {Record<string, string>} */ ({ srgb: "sRGB", linear: "Linear",
-    filmic: "Filmic", agx: "AgX" });
-  return known[name] ?? name.replace(/^ocio:/, "").replace("/", " · ");
+  const known = /** @type {Record<string, string>} */ ({
+    srgb: 'sRGB',
+    linear: 'Linear',
+    filmic: 'Filmic',
+    agx: 'AgX',
+  });
+  return known[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
 }
 
 /** Which two pictures are compared. @param {{ui: Ui, hands: Hands}} props */
 function Compare({ ui, hands }) {
   const { store } = hands;
   const { show } = ui;
-  const value = ui.mix ? "looks" : `${show.left} ${show.right}`;
+  const value = ui.mix ? 'looks' : `${show.left} ${show.right}`;
   const choices = [
-    { value: "painting solution", label: "Painting | Answer" },
-    { value: "present solution", label: "Now | Answer" },
-    { value: "present painting", label: "Now | Painting" },
-    ...(ui.verified ? [{ value: "solution verified", label: "Answer | Render" }] : []),
-    ...(ui.mix ? [{ value: "looks", label: "Two looks" }] : []),
+    { value: 'painting solution', label: 'Painting | Answer' },
+    { value: 'present solution', label: 'Now | Answer' },
+    { value: 'present painting', label: 'Now | Painting' },
+    ...(ui.verified ? [{ value: 'solution verified', label: 'Answer | Render' }] : []),
+    ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
   ];
   return html`<${Select} label="Compare" hidden value=${value} choices=${choices}
     tip="Which two pictures" change=${(/** @type {string} */ pair) => {
-      if (pair === "looks") return;
-      const [left, right] = /** @type {any} */ (pair.split(" "));
+      if (pair === 'looks') return;
+      const [left, right] = /** @type {any} */ (pair.split(' '));
       store.set({ mix: null });
       look(store, { left, right, instead: null, other: null });
     }} />`;

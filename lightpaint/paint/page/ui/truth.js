@@ -1,28 +1,29 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
-import { html } from "../vendor/preact.js";
-import { Button, Choice } from "./controls.js";
-import { number } from "./format.js";
-import { Icon } from "./icons.js";
-import { HINTS, look } from "./tools.js";
+import { html } from '../vendor/preact.js';
+import { Bar } from './bar.js';
+import { Button, Choice } from './controls.js';
+import { number } from './format.js';
+import { Icon } from './icons.js';
+import { HINTS, look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
 
 const OVERLAYS = [
-  { value: null, label: "None" },
-  { value: "missed", label: "Missed", tip: "Where the answer is not what was painted" },
-  { value: "beyond", label: "Out of reach", tip: "What no setting of these lights can do" },
-  { value: "falsecolor", label: "False colour", tip: "How bright, in stops" },
-  { value: "importance", label: "Painted", tip: "What counts, and how much" },
+  { value: null, label: 'None' },
+  { value: 'missed', label: 'Missed', tip: 'Where the answer is not what was painted' },
+  { value: 'beyond', label: 'Out of reach', tip: 'What no setting of these lights can do' },
+  { value: 'falsecolor', label: 'False colour', tip: 'How bright, in stops' },
+  { value: 'importance', label: 'Painted', tip: 'What counts, and how much' },
 ];
 
 /** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
 const LEGENDS = {
-  missed: ["too dark", "fits", "too bright"],
-  beyond: ["in reach", "out of reach"],
-  falsecolor: ["−6 stops", "grey", "+6"],
-  importance: ["free", "counts"],
+  missed: ['too dark', 'fits', 'too bright'],
+  beyond: ['in reach', 'out of reach'],
+  falsecolor: ['−6 stops', 'grey', '+6'],
+  importance: ['free', 'counts'],
 };
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -32,19 +33,25 @@ export function TruthPanel({ ui, hands }) {
   const legend = overlay && LEGENDS[overlay];
   const choose = (/** @type {any} */ value) => {
     look(store, { overlay: value });
-    if (value === "beyond" && ui.resources.beyond === undefined) session.send("explain");
+    if (value === 'beyond' && ui.resources.beyond === undefined) session.send('explain');
   };
   const sentences = ui.explained.length ? ui.explained : ui.sentences;
   return html`<div class="truth">
     <${Choice} label="Over the pictures" value=${overlay} choices=${OVERLAYS} change=${choose} />
-    ${legend && html`<div class="legend"><i class=${`is-${overlay}`}></i>
-      ${legend.map((text) => html`<span key=${text}>${text}</span>`)}</div>`}
+    ${
+      legend &&
+      html`<div class="legend"><i class=${`is-${overlay}`}></i>
+      ${legend.map((text) => html`<span key=${text}>${text}</span>`)}</div>`
+    }
     ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
-    ${!ui.readonly && html`<div class="row">
-      <${Button} label="Why not closer?" act=${() => session.send("explain")}
+    ${
+      !ui.readonly &&
+      html`<div class="row">
+      <${Button} label="Why not closer?" act=${() => session.send('explain')}
         tip="What keeps the lights from what was painted" />
       ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
-    </div>`}
+    </div>`
+    }
     ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
   </div>`;
 }
@@ -64,27 +71,22 @@ function Verify({ ui, hands }) {
 function Verified({ ui, hands }) {
   const { verified, show } = ui;
   if (!verified) return null;
-  const isShown = show.left === "solution" && show.right === "verified";
+  const isShown = show.left === 'solution' && show.right === 'verified';
   const compare = () => {
     hands.store.set({ mix: null });
-    look(hands.store, isShown ? { left: "painting", right: "solution", layout: "side" }
-      : { left: "solution", right: "verified", layout: "wipe", instead: null });
+    look(
+      hands.store,
+      isShown
+        ? { left: 'painting', right: 'solution', layout: 'side' }
+        : { left: 'solution', right: 'verified', layout: 'wipe', instead: null },
+    );
   };
-  return html`<div class=${`verified ${verified.agrees ? "is-good" : "is-bad"}`}>
-    <p><${Icon} name=${verified.agrees ? "check" : "warn"} /><span>${verified.text}${
-      verified.isOld ? " (of an earlier answer)" : ""}</span></p>
+  return html`<div class=${`verified ${verified.agrees ? 'is-good' : 'is-bad'}`}>
+    <p><${Icon} name=${verified.agrees ? 'check' : 'warn'} /><span>${verified.text}${
+      verified.isOld ? ' (of an earlier answer)' : ''
+    }</span></p>
     <${Button} label="Answer | Render" icon="wipe" on=${isShown} act=${compare} />
   </div>`;
-}
-
-/** @param {{progress: {done: number, total: number, unit?: string}, label: string}} props */
-export function Bar({ progress, label }) {
-  const { done, total } = progress;
-  const isKnown = total > 0;
-  return html`<span class=${`bar ${isKnown ? "" : "is-endless"}`} role="progressbar"
-    aria-label=${label} aria-valuemin="0" aria-valuemax=${isKnown ? total : undefined}
-    aria-valuenow=${isKnown ? done : undefined}>
-    <i style=${{ "--share": String(isKnown ? Math.min(1, done / total) : 1) }}></i></span>`;
 }
 
 /** Below the pictures, in one sentence: how close the answer comes.
@@ -92,22 +94,32 @@ export function Bar({ progress, label }) {
 export function AnswerLine({ ui, hands }) {
   const { store, session } = hands;
   const first = ui.state?.first && !ui.history.undo.length;
-  const text = first ? "Nothing is painted yet: the answer is the present lighting." : ui.headline;
+  const text = first ? 'Nothing is painted yet: the answer is the present lighting.' : ui.headline;
   return html`<div class="answer">
     <p class="headline" role="status">
-      ${ui.isLive ? html`<span class="live" data-tip=${
-        "A quick answer while you paint, without what takes longer; the exact one follows"
-        }>live</span>` : null}
-      <span>${text}</span>
-      ${!first && ui.deltaE !== null && html`<span class="faint" data-tip=${
-        "Mean difference to what was painted, as seen: 1 is just visible, 5 is clear"
-        }>ΔE ${number(ui.deltaE, 2)}</span>`}
+      ${
+        ui.isLive
+          ? html`<span class="live" data-tip=${'A quick answer while you paint, without what takes longer; the exact one follows'}>live</span>`
+          : null
+      }
+      <span class="said">${text}</span>
+      ${
+        !first &&
+        ui.deltaE !== null &&
+        html`<span class="faint" data-tip=${'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear'}>ΔE ${number(ui.deltaE, 2)}</span>`
+      }
     </p>
-    ${!ui.readonly && html`<${Button} label="Keep look" icon="plus" keys="Control+S"
+    ${
+      !ui.readonly &&
+      html`<${Button} label="Keep look" icon="plus" keys="Control+S"
       tip="Keep painting and answer under a name"
-      act=${() => session.send("save_look", { name: `Look ${ui.looks.length + 1}` })} />`}
-    ${!ui.open.truth && html`<${Button} label="How true?" act=${() =>
-      store.set({ side: true, open: { ...ui.open, truth: true } })} />`}
+      act=${() => session.send('save_look', { name: `Look ${ui.looks.length + 1}` })} />`
+    }
+    ${
+      !ui.open.truth &&
+      html`<${Button} label="How true?" act=${() =>
+        store.set({ side: true, open: { ...ui.open, truth: true } })} />`
+    }
   </div>`;
 }
 
@@ -115,13 +127,18 @@ export function AnswerLine({ ui, hands }) {
  * props */
 export function Here({ ui }) {
   if (!ui.pointed) {
-    const text = ui.readonly ? "" : HINTS[ui.tool];
+    const text = ui.readonly ? '' : HINTS[ui.tool];
     return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
   }
   const { object, shares } = ui.pointed;
-  const most = shares.map((share, k) => ({ share, k })).filter(({ share }) => share >= 0.01)
-    .sort((a, b) => b.share - a.share).slice(0, 5);
+  const most = shares
+    .map((share, k) => ({ share, k }))
+    .filter(({ share }) => share >= 0.01)
+    .sort((a, b) => b.share - a.share)
+    .slice(0, 5);
   return html`<p class="here" id="lp-status">${object && html`<span class="object">${object}</span>`}
-    ${most.map(({ share, k }) => html`<span key=${k}>${ui.lights[k]?.label}
-      <b>${Math.round(100 * share)} %</b></span>`)}</p>`;
+    ${most.map(
+      ({ share, k }) => html`<span key=${k}>${ui.lights[k]?.label}
+      <b>${Math.round(100 * share)} %</b></span>`,
+    )}</p>`;
 }

@@ -1,28 +1,46 @@
 /** A picture engine of a few lines, on a 2D canvas: enough to look at the interface, and to test it. */
 
-const encode = (x) => 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.min(1, x) ** (1 / 2.4) - 0.055);
+const encode = (x) =>
+  255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.min(1, x) ** (1 / 2.4) - 0.055);
 
 export class FakeEngine {
   constructor(host, room) {
-    Object.assign(this, { host, room, hearers: {}, calls: [], strokes: 0, size: [1, 1], image: null });
-    this.element = document.createElement("canvas");
+    Object.assign(this, {
+      host,
+      room,
+      hearers: {},
+      calls: [],
+      strokes: 0,
+      size: [1, 1],
+      image: null,
+    });
+    this.element = document.createElement('canvas');
     this.weights = room.lights.map(({ present }) => present);
     this.image = this.mix(this.weights);
     this.original = this.image.slice();
-    for (const kind of ["state", "answer", "patch"]) host.on(kind, (message) => this.hear(message));
+    for (const kind of ['state', 'answer', 'patch']) host.on(kind, (message) => this.hear(message));
   }
 
-  on(name, hear) { (this.hearers[name] ??= []).push(hear); }
-  tell(name, event) { for (const hear of this.hearers[name] ?? []) hear(event); }
+  on(name, hear) {
+    (this.hearers[name] ??= []).push(hear);
+  }
+  tell(name, event) {
+    for (const hear of this.hearers[name] ?? []) hear(event);
+  }
   close() {}
-  use(use) { this.hand = use; }
+  use(use) {
+    this.hand = use;
+  }
   resize(width, height) {
     this.size = [width, height];
     this.element.width = width * devicePixelRatio;
     this.element.height = height * devicePixelRatio;
     this.draw();
   }
-  show(show) { this.shown = show; this.draw(); }
+  show(show) {
+    this.shown = show;
+    this.draw();
+  }
 
   hear(message) {
     const data = message.arrays?.weights?.data;
@@ -34,7 +52,8 @@ export class FakeEngine {
     const made = new Float32Array(this.room.w * this.room.h * 3);
     this.room.planes.forEach((plane, k) => {
       const rgb = gains && !gains[k] ? [0, 0, 0] : weights[k];
-      if (rgb[0] + rgb[1] + rgb[2]) for (let i = 0; i < made.length; i += 1) made[i] += plane[i] * rgb[i % 3];
+      if (rgb[0] + rgb[1] + rgb[2])
+        for (let i = 0; i < made.length; i += 1) made[i] += plane[i] * rgb[i % 3];
     });
     return made;
   }
@@ -45,14 +64,25 @@ export class FakeEngine {
     const [width, height] = this.size;
     const placed = (kind, x, y, across, down, area = [x, y, across, down]) => {
       const scale = Math.min(area[2] / w, area[3] / h) * zoom;
-      return { kind, x, y, width: across, height: down, scale, left: area[0] + area[2] / 2 - (w / 2 + pan[0]) * scale,
-        top: area[1] + area[3] / 2 - (h / 2 + pan[1]) * scale };
+      return {
+        kind,
+        x,
+        y,
+        width: across,
+        height: down,
+        scale,
+        left: area[0] + area[2] / 2 - (w / 2 + pan[0]) * scale,
+        top: area[1] + area[3] / 2 - (h / 2 + pan[1]) * scale,
+      };
     };
-    if (layout === "blink") return [placed(blink === "left" ? left : right, 0, 0, width, height)];
-    if (layout === "wipe") {
+    if (layout === 'blink') return [placed(blink === 'left' ? left : right, 0, 0, width, height)];
+    if (layout === 'wipe') {
       const cut = width * wipe;
       const all = [0, 0, width, height];
-      return [placed(right, cut, 0, width - cut, height, all), placed(left, 0, 0, cut, height, all)];
+      return [
+        placed(right, cut, 0, width - cut, height, all),
+        placed(left, 0, 0, cut, height, all),
+      ];
     }
     const [half, low] = [(width - 4) / 2, (height - 4) / 2];
     if (Math.min(half / w, height / h) >= Math.min(width / w, low / h)) {
@@ -63,36 +93,49 @@ export class FakeEngine {
 
   zoomAt(x, y, factor) {
     const { zoom, pan } = this.shown;
-    const pane = this.panes().find((one) => x >= one.x && x < one.x + one.width && y >= one.y) ?? this.panes()[0];
+    const pane =
+      this.panes().find((one) => x >= one.x && x < one.x + one.width && y >= one.y) ??
+      this.panes()[0];
     const made = Math.min(64, Math.max(0.25, zoom * factor));
     const kept = (1 - zoom / made) / pane.scale;
-    const mid = [pane.left + (this.room.w / 2 + pan[0]) * pane.scale, pane.top + (this.room.h / 2 + pan[1]) * pane.scale];
+    const mid = [
+      pane.left + (this.room.w / 2 + pan[0]) * pane.scale,
+      pane.top + (this.room.h / 2 + pan[1]) * pane.scale,
+    ];
     return { zoom: made, pan: [pan[0] + (x - mid[0]) * kept, pan[1] + (y - mid[1]) * kept] };
   }
 
   picture(kind) {
     const { gains, instead, other } = this.shown;
-    if (kind === "painting") return this.image;
-    if (kind === "present") return this.original;
-    return this.mix((kind === "other" ? other : kind === "solution" ? instead : null) ?? this.weights, kind === "verified" ? null : gains);
+    if (kind === 'painting') return this.image;
+    if (kind === 'present') return this.original;
+    return this.mix(
+      (kind === 'other' ? other : kind === 'solution' ? instead : null) ?? this.weights,
+      kind === 'verified' ? null : gains,
+    );
   }
 
   draw() {
     if (this.waiting || !this.shown) return;
     this.waiting = requestAnimationFrame(() => {
       this.waiting = 0;
-      const context = this.element.getContext("2d");
+      const context = this.element.getContext('2d');
       const ratio = devicePixelRatio;
-      context.fillStyle = "#18181a";
+      context.fillStyle = '#18181a';
       context.fillRect(0, 0, this.element.width, this.element.height);
       for (const pane of this.panes()) {
         context.save();
         context.beginPath();
         context.rect(pane.x * ratio, pane.y * ratio, pane.width * ratio, pane.height * ratio);
         context.clip();
-        context.imageSmoothingQuality = "high";
-        context.drawImage(this.toCanvas(this.picture(pane.kind)), pane.left * ratio, pane.top * ratio,
-          this.room.w * pane.scale * ratio, this.room.h * pane.scale * ratio);
+        context.imageSmoothingQuality = 'high';
+        context.drawImage(
+          this.toCanvas(this.picture(pane.kind)),
+          pane.left * ratio,
+          pane.top * ratio,
+          this.room.w * pane.scale * ratio,
+          this.room.h * pane.scale * ratio,
+        );
         context.restore();
       }
     });
@@ -107,12 +150,12 @@ export class FakeEngine {
       for (let c = 0; c < 3; c += 1) pixels.data[4 * at + c] = encode(image[3 * at + c] * gain);
       pixels.data[4 * at + 3] = 255;
     }
-    canvas.getContext("2d").putImageData(pixels, 0, 0);
+    canvas.getContext('2d').putImageData(pixels, 0, 0);
     return canvas;
   }
 
   begin(point) {
-    this.calls.push(["begin", this.hand.tool, point]);
+    this.calls.push(['begin', this.hand.tool, point]);
     this.strokes += 1;
     this.drawn = 0;
     this.before = this.image.slice();
@@ -122,10 +165,13 @@ export class FakeEngine {
 
   move(points) {
     if (!this.before) return;
-    this.calls.push(["move", points.length]);
+    this.calls.push(['move', points.length]);
     const last = points.at(-1);
-    if (this.hand.tool === "ask") {
-      return this.tell("asking", { stops: (this.started.y - last.y) / 30, mired: last.x - this.started.x });
+    if (this.hand.tool === 'ask') {
+      return this.tell('asking', {
+        stops: (this.started.y - last.y) / 30,
+        mired: last.x - this.started.x,
+      });
     }
     for (const point of points) this.stamp(point);
     this.send(false);
@@ -144,8 +190,12 @@ export class FakeEngine {
         const amount = t * t * (3 - 2 * t) * flow * pressure * 0.5;
         const at = j * w + i;
         for (let c = 0; c < 3; c += 1) {
-          const to = tool === "eraser" ? this.original[3 * at + c]
-            : tool === "weight" ? this.image[3 * at + c] : rgb[c] * (as === "light" ? surfaces[at].albedo[c] : 1);
+          const to =
+            tool === 'eraser'
+              ? this.original[3 * at + c]
+              : tool === 'weight'
+                ? this.image[3 * at + c]
+                : rgb[c] * (as === 'light' ? surfaces[at].albedo[c] : 1);
           this.image[3 * at + c] += amount * (to - this.image[3 * at + c]);
         }
       }
@@ -155,43 +205,69 @@ export class FakeEngine {
   async send(done) {
     if (this.busy && !done) return;
     this.busy = true;
-    await this.host.send("paint", { stroke: this.strokes, region: [0, this.room.h, 0, this.room.w], done, label: this.hand.tool },
-      { image: { data: this.image, shape: [this.room.h, this.room.w, 3] } });
+    await this.host.send(
+      'paint',
+      {
+        stroke: this.strokes,
+        region: [0, this.room.h, 0, this.room.w],
+        done,
+        label: this.hand.tool,
+      },
+      { image: { data: this.image, shape: [this.room.h, this.room.w, 3] } },
+    );
     this.busy = false;
   }
 
   end() {
     if (!this.before) return;
-    this.calls.push(["end"]);
+    this.calls.push(['end']);
     this.before = null;
     this.send(true);
   }
 
   cancel() {
     if (!this.before) return;
-    this.calls.push(["cancel"]);
+    this.calls.push(['cancel']);
     this.image = this.before;
     this.before = null;
-    this.host.send("drop", { stroke: this.strokes });
+    this.host.send('drop', { stroke: this.strokes });
     this.draw();
   }
 
   line(from, to) {
-    this.calls.push(["line", from, to]);
+    this.calls.push(['line', from, to]);
     this.strokes += 1;
-    for (let t = 0; t <= 1; t += 0.02) this.stamp({ x: from.x + t * (to.x - from.x), y: from.y + t * (to.y - from.y), pressure: 1 });
+    for (let t = 0; t <= 1; t += 0.02)
+      this.stamp({ x: from.x + t * (to.x - from.x), y: from.y + t * (to.y - from.y), pressure: 1 });
     this.send(true);
   }
 
-  ask(asked) { this.calls.push(["ask", asked]); this.strokes += 1; this.send(true); }
-  at(x, y) { return Math.min(this.room.h - 1, Math.max(0, Math.floor(y))) * this.room.w + Math.min(this.room.w - 1, Math.max(0, Math.floor(x))); }
-  lightAt(kind, x, y) { const at = this.at(x, y); return [...this.picture(kind).slice(3 * at, 3 * at + 3)]; }
+  ask(asked) {
+    this.calls.push(['ask', asked]);
+    this.strokes += 1;
+    this.send(true);
+  }
+  at(x, y) {
+    return (
+      Math.min(this.room.h - 1, Math.max(0, Math.floor(y))) * this.room.w +
+      Math.min(this.room.w - 1, Math.max(0, Math.floor(x)))
+    );
+  }
+  lightAt(kind, x, y) {
+    const at = this.at(x, y);
+    return [...this.picture(kind).slice(3 * at, 3 * at + 3)];
+  }
 
   pointed(x, y) {
     if (x < 0 || y < 0 || x >= this.room.w || y >= this.room.h) return null;
     const at = this.at(x, y);
-    const each = this.room.planes.map((plane, k) => this.weights[k].reduce((sum, rgb, c) => sum + rgb * plane[3 * at + c], 0));
+    const each = this.room.planes.map((plane, k) =>
+      this.weights[k].reduce((sum, rgb, c) => sum + rgb * plane[3 * at + c], 0),
+    );
     const total = each.reduce((a, b) => a + b, 1e-9);
-    return { object: this.room.objects[this.room.surfaces[at].object], shares: each.map((one) => one / total) };
+    return {
+      object: this.room.objects[this.room.surfaces[at].object],
+      shares: each.map((one) => one / total),
+    };
   }
 }

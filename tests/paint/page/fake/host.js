@@ -1,6 +1,8 @@
 /** A session that is made up: it answers as the protocol says, by a few steps towards the paint. */
 
-const flat = (weights) => ({ weights: { data: Float64Array.from(weights.flat()), shape: [weights.length, 3] } });
+const flat = (weights) => ({
+  weights: { data: Float64Array.from(weights.flat()), shape: [weights.length, 3] },
+});
 
 /** As halves: sign, five bits of exponent, ten of mantissa; rounded down. */
 function halves(floats) {
@@ -17,18 +19,39 @@ export class FakeHost {
     this.weights = room.lights.map(({ present }) => [...present]);
     this.asked = {};
     this.ties = [];
-    this.settings = { hold: null, space: null, colors: null, literal: false, prefer_current: 0, sparse: null };
+    this.settings = {
+      hold: null,
+      space: null,
+      colors: null,
+      literal: false,
+      prefer_current: 0,
+      sparse: null,
+    };
     this.steps = [];
     this.undone = [];
     this.resources = Object.fromEntries(room.lights.map((_, k) => [`thumb/${k}`, 1]));
-    Object.assign(this.resources, { albedo: 1, objects: 1, present: 1, painting: 1, importance: 1 });
-    room.lights.forEach((_, k) => { this.resources[`plane/${k}`] = 1; });
+    Object.assign(this.resources, {
+      albedo: 1,
+      objects: 1,
+      present: 1,
+      painting: 1,
+      importance: 1,
+    });
+    room.lights.forEach((_, k) => {
+      this.resources[`plane/${k}`] = 1;
+    });
     this.original = this.mixed();
   }
 
-  on(kind, hear) { (this.hearers[kind] ??= []).push(hear); }
-  tell(message) { for (const hear of this.hearers[message.kind] ?? []) hear(message); }
-  open() { this.tell(this.state()); }
+  on(kind, hear) {
+    (this.hearers[kind] ??= []).push(hear);
+  }
+  tell(message) {
+    for (const hear of this.hearers[message.kind] ?? []) hear(message);
+  }
+  open() {
+    this.tell(this.state());
+  }
   close() {}
 
   /** Every message is answered, a little later; tests may have it fail, or wait. */
@@ -36,8 +59,10 @@ export class FakeHost {
     this.said.push({ kind, ...fields });
     this.busy = (this.busy ?? 0) + 1;
     await new Promise((done) => setTimeout(done, 1));
-    const failed = (text) => ({ kind: "failed", text });
-    const made = this.fails ? failed(this.fails) : this[kind]?.(fields, arrays) ?? failed(`no ${kind}`);
+    const failed = (text) => ({ kind: 'failed', text });
+    const made = this.fails
+      ? failed(this.fails)
+      : (this[kind]?.(fields, arrays) ?? failed(`no ${kind}`));
     this.fails = null;
     const reply = { arrays: {}, ...made, reply: this.said.length };
     this.tell(reply);
@@ -47,37 +72,107 @@ export class FakeHost {
 
   state() {
     const { room } = this;
-    return { kind: "state", version: 1, generation: 1, size: [room.h, room.w], scene: "gallery", session: "evening",
-      lights: room.lights.map(({ name, present }, k) => ({ name, label: name, unit: "W/(m² sr)", parameter: "radiance",
-        plugin: "area", form: "rgb", members: [name], present, scale: 1, is_fixed: false, is_scalar: false,
-        group: room.n > 12 && k >= 8 ? `Row ${"ABCDEFG"[Math.floor((k - 8) / 8)]}` : null })),
-      objects: room.objects, transforms: ["srgb", "filmic", "agx", "linear"].map((name) => ({ name })),
-      transform: { name: "srgb", stops: 0 }, resources: this.resources, can_render: true, has_noise: true, stroke: 0,
-      looks: this.looks, basis: this.isFirst ? { spp: 4, wanted: 64, done: false, method: "one pass" } : { spp: 64, wanted: 64, done: true, method: "" },
-      first: !this.steps.length, folder: "gallery-evening", answer: this.exact(), ...this.asks(), arrays: flat(this.weights) };
+    return {
+      kind: 'state',
+      version: 1,
+      generation: 1,
+      size: [room.h, room.w],
+      scene: 'gallery',
+      session: 'evening',
+      lights: room.lights.map(({ name, present }, k) => ({
+        name,
+        label: name,
+        unit: 'W/(m² sr)',
+        parameter: 'radiance',
+        plugin: 'area',
+        form: 'rgb',
+        members: [name],
+        present,
+        scale: 1,
+        is_fixed: false,
+        is_scalar: false,
+        group: room.n > 12 && k >= 8 ? `Row ${'ABCDEFG'[Math.floor((k - 8) / 8)]}` : null,
+      })),
+      objects: room.objects,
+      transforms: ['srgb', 'filmic', 'agx', 'linear'].map((name) => ({ name })),
+      transform: { name: 'srgb', stops: 0 },
+      resources: this.resources,
+      can_render: true,
+      has_noise: true,
+      stroke: 0,
+      looks: this.looks,
+      basis: this.isFirst
+        ? { spp: 4, wanted: 64, done: false, method: 'one pass' }
+        : { spp: 64, wanted: 64, done: true, method: '' },
+      first: !this.steps.length,
+      folder: 'gallery-evening',
+      answer: this.exact(),
+      ...this.asks(),
+      arrays: flat(this.weights),
+    };
   }
 
   asks() {
-    return { asked: this.asked, ties: this.ties, settings: this.settings, meant: { space: "display", hold: 1, colors: "gentle" },
-      history: { undo: this.steps.map(({ label }) => label), redo: this.undone.map(({ label }) => label) } };
+    return {
+      asked: this.asked,
+      ties: this.ties,
+      settings: this.settings,
+      meant: { space: 'display', hold: 1, colors: 'gentle' },
+      history: {
+        undo: this.steps.map(({ label }) => label),
+        redo: this.undone.map(({ label }) => label),
+      },
+    };
   }
 
   exact() {
     const level = (rgb) => 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
     const total = this.weights.reduce((sum, rgb) => sum + level(rgb), 1e-9);
-    return { headline: this.steps.length ? "Close to what was painted; the floor stays too dark." : "The present lighting.",
-      delta_e: this.steps.length ? 2.31 : 0, sentences: ["3 lights changed by more than a stop.", "The key light does most of it."],
-      lights: this.weights.map((rgb, k) => ({ emission: rgb, stops: null, kelvin: 2400 + 377 * k, hue: null, swatch: "#ffcc88",
-        share: level(rgb) / total, error: "±4 %", held: false, unreached: k === 11 })) };
+    return {
+      headline: this.steps.length
+        ? 'Close to what was painted; the floor stays too dark.'
+        : 'The present lighting.',
+      delta_e: this.steps.length ? 2.31 : 0,
+      sentences: ['3 lights changed by more than a stop.', 'The key light does most of it.'],
+      lights: this.weights.map((rgb, k) => ({
+        emission: rgb,
+        stops: null,
+        kelvin: 2400 + 377 * k,
+        hue: null,
+        swatch: '#ffcc88',
+        share: level(rgb) / total,
+        error: '±4 %',
+        held: false,
+        unreached: k === 11,
+      })),
+    };
   }
 
   answer(isExact = true) {
-    return { kind: "answer", stroke: this.stroke, exact: isExact, mode: "linear", version: (this.version = (this.version ?? 0) + 1),
-      ...(isExact ? { ...this.exact(), ...this.asks() } : {}), arrays: flat(this.weights) };
+    return {
+      kind: 'answer',
+      stroke: this.stroke,
+      exact: isExact,
+      mode: 'linear',
+      version: (this.version = (this.version ?? 0) + 1),
+      ...(isExact ? { ...this.exact(), ...this.asks() } : {}),
+      arrays: flat(this.weights),
+    };
   }
 
-  patch() { return { kind: "patch", region: [0, 0, 0, 0], ...this.exact(), ...this.asks(), arrays: flat(this.weights) }; }
-  step(label, undo) { this.steps.push({ label, undo }); this.undone = []; }
+  patch() {
+    return {
+      kind: 'patch',
+      region: [0, 0, 0, 0],
+      ...this.exact(),
+      ...this.asks(),
+      arrays: flat(this.weights),
+    };
+  }
+  step(label, undo) {
+    this.steps.push({ label, undo });
+    this.undone = [];
+  }
 
   /** A step towards the paint: each light by how far it looks like what was painted since. */
   paint({ stroke, region: [top, , left], done, label }, { image }) {
@@ -85,16 +180,19 @@ export class FakeHost {
     const { w, planes, lights } = this.room;
     const [rows, columns] = image.shape;
     const mixed = this.mixed();
-    this.weights = this.weights.map((rgb, k) => rgb.map((x, c) => {
-      if (this.asked[lights[k].name]?.lock) return x;
-      let [up, own] = [0, 1e-9];
-      for (let i = 0; i < rows * columns; i += 5) {
-        const at = 3 * ((top + Math.floor(i / columns)) * w + left + (i % columns)) + c;
-        if (Math.abs(image.data[3 * i + c] - this.original[at]) > 1e-3) up += (image.data[3 * i + c] - mixed[at]) * planes[k][at];
-        own += planes[k][at] ** 2;
-      }
-      return Math.max(0, x + 0.3 * up / own);
-    }));
+    this.weights = this.weights.map((rgb, k) =>
+      rgb.map((x, c) => {
+        if (this.asked[lights[k].name]?.lock) return x;
+        let [up, own] = [0, 1e-9];
+        for (let i = 0; i < rows * columns; i += 5) {
+          const at = 3 * ((top + Math.floor(i / columns)) * w + left + (i % columns)) + c;
+          if (Math.abs(image.data[3 * i + c] - this.original[at]) > 1e-3)
+            up += (image.data[3 * i + c] - mixed[at]) * planes[k][at];
+          own += planes[k][at] ** 2;
+        }
+        return Math.max(0, x + (0.3 * up) / own);
+      }),
+    );
     if (done) this.step(label);
     return this.answer(Boolean(done));
   }
@@ -107,51 +205,121 @@ export class FakeHost {
     return made;
   }
 
-  drop() { return this.patch(); }
-  undo() { const step = this.steps.pop(); if (step) this.undone.push(step); return this.patch(); }
-  redo() { const step = this.undone.pop(); if (step) this.steps.push(step); return this.patch(); }
+  drop() {
+    return this.patch();
+  }
+  undo() {
+    const step = this.steps.pop();
+    if (step) this.undone.push(step);
+    return this.patch();
+  }
+  redo() {
+    const step = this.undone.pop();
+    if (step) this.steps.push(step);
+    return this.patch();
+  }
   ask({ light, asked, done }) {
     this.asked = { ...this.asked, [this.room.lights[light].name]: asked };
     if (Array.isArray(asked.lock)) this.weights[light] = [...asked.lock];
     if (asked.off) this.weights[light] = [0, 0, 0];
-    if (done) this.step("ask");
+    if (done) this.step('ask');
     return this.answer(done);
   }
-  tie({ ties }) { this.ties = ties; return this.answer(); }
-  set({ values }) { this.settings = values; return this.answer(); }
-  kept() { return { kind: "looks", looks: [...this.looks] }; }
+  tie({ ties }) {
+    this.ties = ties;
+    return this.answer();
+  }
+  set({ values }) {
+    this.settings = { ...this.settings, ...values };
+    return this.answer();
+  }
+  kept() {
+    return { kind: 'looks', looks: [...this.looks] };
+  }
   save_look({ name }) {
     const id = (this.ids += 1);
-    this.looks.push({ id, name, weights: this.weights.map((rgb) => [...rgb]), delta_e: 2.3, stamp: "", thumbnail: `look/${id}` });
+    this.looks.push({
+      id,
+      name,
+      weights: this.weights.map((rgb) => [...rgb]),
+      delta_e: 2.3,
+      stamp: '',
+      thumbnail: `look/${id}`,
+    });
     return this.kept();
   }
-  load_look({ look }) { this.weights = this.looks.find(({ id }) => id === look).weights.map((rgb) => [...rgb]); this.step("look"); return this.patch(); }
-  rename_look({ look, name }) { this.looks = this.looks.map((one) => (one.id === look ? { ...one, name } : one)); return this.kept(); }
-  copy_look({ look }) { const one = this.looks.find(({ id }) => id === look); this.looks.push({ ...one, id: (this.ids += 1), name: `${one.name} 2` }); return this.kept(); }
-  drop_look({ look }) { this.looks = this.looks.filter(({ id }) => id !== look); return this.kept(); }
-  export({ what }) { return { kind: "exported", files: what.map((one) => `gallery-evening/${one}`), command: "lightpaint solve gallery.xml gallery-evening/target.exr" }; }
-  verify({ run }) { return run ? { kind: "progress", what: "verify", done: 3, total: 16, unit: "passes" } : { kind: "say", text: "The render was stopped.", tone: "info" }; }
-  explain() { return { kind: "explained", sentences: ["No light reaches the floor at the left.", "The cove is at its limit."] }; }
-  take_over() { return this.state(); }
+  load_look({ look }) {
+    this.weights = this.looks.find(({ id }) => id === look).weights.map((rgb) => [...rgb]);
+    this.step('look');
+    return this.patch();
+  }
+  rename_look({ look, name }) {
+    this.looks = this.looks.map((one) => (one.id === look ? { ...one, name } : one));
+    return this.kept();
+  }
+  copy_look({ look }) {
+    const one = this.looks.find(({ id }) => id === look);
+    this.looks.push({ ...one, id: (this.ids += 1), name: `${one.name} 2` });
+    return this.kept();
+  }
+  drop_look({ look }) {
+    this.looks = this.looks.filter(({ id }) => id !== look);
+    return this.kept();
+  }
+  export({ what }) {
+    return {
+      kind: 'exported',
+      files: what.map((one) => `gallery-evening/${one}`),
+      command: 'lightpaint solve gallery.xml gallery-evening/target.exr',
+    };
+  }
+  verify({ run }) {
+    return run
+      ? { kind: 'progress', what: 'verify', done: 3, total: 16, unit: 'passes' }
+      : { kind: 'say', text: 'The render was stopped.', tone: 'info' };
+  }
+  explain() {
+    return {
+      kind: 'explained',
+      sentences: ['No light reaches the floor at the left.', 'The cove is at its limit.'],
+    };
+  }
+  take_over() {
+    return this.state();
+  }
 
   async fetch(name) {
-    const [kind, at] = name.split("/");
+    const [kind, at] = name.split('/');
     const { w, h, planes, n, surfaces } = this.room;
-    if (kind === "plane") return { data: halves(planes[at]), shape: [h, w, 3] };
-    if (kind === "present") return { data: halves(this.original), shape: [h, w, 3] };
-    if (kind === "painting") return { data: this.original.slice(), shape: [h, w, 3] };
-    if (kind === "importance") return { data: new Float32Array(w * h), shape: [h, w] };
-    if (kind === "albedo") return { data: halves(Float32Array.from(surfaces.flatMap(({ albedo }) => albedo))), shape: [h, w, 3] };
-    if (kind === "objects") return { data: Int16Array.from(surfaces, ({ object }) => object), shape: [h, w] };
-    const weights = kind === "thumb" ? this.room.lights.map((_, k) => (k === Number(at) ? [8 / n, 8 / n, 8 / n].map((x) => x * n / 8) : [0, 0, 0]))
-      : this.looks.find((one) => one.thumbnail === name)?.weights ?? this.weights;
+    if (kind === 'plane') return { data: halves(planes[at]), shape: [h, w, 3] };
+    if (kind === 'present') return { data: halves(this.original), shape: [h, w, 3] };
+    if (kind === 'painting') return { data: this.original.slice(), shape: [h, w, 3] };
+    if (kind === 'importance') return { data: new Float32Array(w * h), shape: [h, w] };
+    if (kind === 'albedo')
+      return {
+        data: halves(Float32Array.from(surfaces.flatMap(({ albedo }) => albedo))),
+        shape: [h, w, 3],
+      };
+    if (kind === 'objects')
+      return { data: Int16Array.from(surfaces, ({ object }) => object), shape: [h, w] };
+    const weights =
+      kind === 'thumb'
+        ? this.room.lights.map((_, k) =>
+            k === Number(at) ? [8 / n, 8 / n, 8 / n].map((x) => (x * n) / 8) : [0, 0, 0],
+          )
+        : (this.looks.find((one) => one.thumbnail === name)?.weights ?? this.weights);
     const small = [Math.ceil(h / 2), Math.ceil(w / 2)];
     const data = new Uint8Array(small[0] * small[1] * 3);
-    for (let y = 0; y < small[0]; y += 1) for (let x = 0; x < small[1]; x += 1) for (let c = 0; c < 3; c += 1) {
-      const from = 3 * (2 * y * w + 2 * x) + c;
-      const light = planes.reduce((sum, plane, k) => sum + (weights[k][c] ? weights[k][c] * plane[from] : 0), 0);
-      data[3 * (y * small[1] + x) + c] = 255 * Math.min(1, light) ** (1 / 2.2);
-    }
+    for (let y = 0; y < small[0]; y += 1)
+      for (let x = 0; x < small[1]; x += 1)
+        for (let c = 0; c < 3; c += 1) {
+          const from = 3 * (2 * y * w + 2 * x) + c;
+          const light = planes.reduce(
+            (sum, plane, k) => sum + (weights[k][c] ? weights[k][c] * plane[from] : 0),
+            0,
+          );
+          data[3 * (y * small[1] + x) + c] = 255 * Math.min(1, light) ** (1 / 2.2);
+        }
     return { data, shape: [...small, 3] };
   }
 }

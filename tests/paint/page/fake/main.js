@@ -1,26 +1,28 @@
 /** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`. */
 
-import { mount } from "../app.js";
-import { FakeEngine } from "./engine.js";
-import { FakeHost } from "./host.js";
-import { makeRoom } from "./room.js";
+import { mount } from '../app.js';
+import { FakeEngine } from './engine.js';
+import { FakeHost } from './host.js';
+import { makeRoom } from './room.js';
 
 const asked = new URLSearchParams(location.search);
-const room = makeRoom(Number(asked.get("lights") ?? 7), asked.get("size") ?? "192x108");
-const host = new FakeHost(room, { isFirst: asked.has("first") });
-let element = /** @type {HTMLElement} */ (document.getElementById("lightpaint"));
-if (asked.has("shadow")) {
-  const shadow = element.attachShadow({ mode: "open" });
-  for (const link of document.querySelectorAll("link[rel=stylesheet]")) {
+const room = makeRoom(Number(asked.get('lights') ?? 7), asked.get('size') ?? '192x108');
+const host = new FakeHost(room, { isFirst: asked.has('first') });
+let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
+if (asked.has('shadow')) {
+  const shadow = element.attachShadow({ mode: 'open' });
+  for (const link of document.querySelectorAll('link[rel=stylesheet]')) {
     shadow.append(link.cloneNode());
     if (/style/.test(link.href)) link.remove();
   }
-  element = document.createElement("div");
-  element.style.height = "100%";
+  element = document.createElement('div');
+  element.style.height = '100%';
   shadow.append(element);
 }
 // `?engine`: the one that ships, over the same session.
-const engine = asked.has("engine") ? (await import("../engine/painter.js")).openEngine(host) : new FakeEngine(host, room);
-const painter = await mount(element, host, { global: !asked.has("shadow"), engine });
+const engine = asked.has('engine')
+  ? (await import('../engine/painter.js')).openEngine(host)
+  : new FakeEngine(host, room);
+const painter = await mount(element, host, { global: !asked.has('shadow'), engine });
 Object.assign(window, { painter, host, engine });
 host.open();
