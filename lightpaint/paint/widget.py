@@ -5,6 +5,7 @@ its event loop, where there is one. Without one, as in a script, they say it the
 """
 
 import asyncio
+import atexit
 import contextvars
 import sys
 import traceback
@@ -27,6 +28,7 @@ from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.bundle import widget_script, widget_style
+from lightpaint.paint.launch import wait_for_renders
 from lightpaint.paint.protocol import VERSION, Hello, Message, TakeOver, said_of
 from lightpaint.paint.session import Moment
 from lightpaint.paint.store import MemoryStore, Store
@@ -129,6 +131,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self.on_msg(self._said)
         self._studio.on_message = self._hears
         self._studio.start()
+        if subject.scene is not None:
+            atexit.register(self.close)  # what renders cannot be left alone at the end
         if subject.basis is not None:
             self._is_there.wait()
             if self._failed:
@@ -175,6 +179,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._studio.on_message = None
             self._studio.close()
             super().close()
+            if self._studio.subject.scene is not None:
+                wait_for_renders()
 
     # What is set from a cell
 
