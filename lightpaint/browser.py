@@ -119,7 +119,8 @@ def _wrapped(path: str, number: dict[str, int]) -> str:
     text, made = _code(path), []
 
     def imported(match: re.Match[str]) -> str:
-        return _constants(match["names"], f"m{number[_resolved(path, match['path'])]}", path)
+        needed = _resolved(path, match["path"])
+        return _constants(match["names"], f"m{number[needed]}", path, needed)
 
     def listed(match: re.Match[str]) -> str:
         its = "" if match["path"] is None else f"m{number[_resolved(path, match['path'])]}."
@@ -139,8 +140,8 @@ def _wrapped(path: str, number: dict[str, int]) -> str:
     return f"const m{number[path]} = (() => {{\n{body}\nreturn {{ {', '.join(made)} }}\n}})()"
 
 
-def _constants(names: str | None, module: str, path: str) -> str:
-    """What an import statement names, as constants."""
+def _constants(names: str | None, module: str, path: str, needed: str) -> str:
+    """What an import statement of `path` names of the module at `needed`, as constants."""
     if names is None:
         return ""
     names = names.strip()
@@ -149,6 +150,9 @@ def _constants(names: str | None, module: str, path: str) -> str:
     if not (names.startswith("{") and names.endswith("}")):
         raise BundleError(f"{path}: imports {names!r}; expected {{ names }} or * as a name")
     pairs = [x if x == y else f"{x}: {y}" for x, y in _pairs(names[1:-1])]
+    there = _exported(needed)
+    if missing := [x for x, _ in _pairs(names[1:-1]) if x not in there]:
+        raise BundleError(f"{path} imports {missing[0]!r}, which {needed} does not export")
     return f"const {{ {', '.join(pairs)} }} = {module}"
 
 

@@ -16,7 +16,7 @@ from renderer import LIGHTS, write_room
 import lightpaint as lp
 from lightpaint.images.exr import write_rgb
 
-NAMES = sorted(set(lp.__all__) - {"__version__"})
+NAMES = sorted({*lp.__all__, *lp._EXTRAS} - {"__version__"})
 SECTION = re.compile(r"^(Args|Attributes|Returns|Raises|Examples):$", re.MULTILINE)
 
 

@@ -58,7 +58,7 @@ def test_every_public_name_is_there_and_seen_by_type_checkers():
             for name in line.names:
                 assert name.asname == name.name  # which is what makes it public to them
                 seen[name.name] = line.module
-    assert set(seen) == set(lp.__all__) - {"__version__"}
+    assert set(seen) == {*lp.__all__, *lp._EXTRAS} - {"__version__"}
     for name, module in seen.items():
         assert getattr(lp, name) is getattr(sys.modules[str(module)], name)
         # Not by way of a module that only imports it.

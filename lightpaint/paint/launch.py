@@ -125,6 +125,11 @@ def _end(studio: Studio, store: Store) -> None:
         studio.close()
     finally:
         store.close()
+    wait_for_renders()
+
+
+def wait_for_renders() -> None:
+    """Until what renders beside a painter has come to an end."""
     end_s = time.monotonic() + PATIENCE_S
     for thread in threading.enumerate():
         if thread.name.startswith("lightpaint-"):

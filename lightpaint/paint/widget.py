@@ -5,6 +5,7 @@ its event loop, where there is one. Without one, as in a script, they say it the
 """
 
 import asyncio
+import atexit
 import contextvars
 import sys
 import traceback
@@ -27,6 +28,7 @@ from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.bundle import widget_script, widget_style
+from lightpaint.paint.launch import wait_for_renders
 from lightpaint.paint.protocol import VERSION, Hello, Message, TakeOver, said_of
 from lightpaint.paint.session import Moment
 from lightpaint.paint.store import MemoryStore, Store
@@ -87,7 +89,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     Examples:
         >>> painter = lp.Painter(basis, target=target)
-        >>> painter.observe(lambda change: print(change.new), "lighting")
+        >>> told = []
+        >>> painter.observe(lambda change: told.append(change.new), "lighting")
         >>> painter.constraints = lp.Constraints.of({"panel": {"lock": True}})
         >>> np.round(painter.solution.lighting.emission["panel"], 3).tolist()
         [4.0, 3.0, 2.0]
@@ -128,6 +131,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self.on_msg(self._said)
         self._studio.on_message = self._hears
         self._studio.start()
+        if subject.scene is not None:
+            atexit.register(self.close)  # what renders cannot be left alone at the end
         if subject.basis is not None:
             self._is_there.wait()
             if self._failed:
@@ -174,6 +179,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._studio.on_message = None
             self._studio.close()
             super().close()
+            if self._studio.subject.scene is not None:
+                wait_for_renders()
 
     # What is set from a cell
 
@@ -395,5 +402,5 @@ def _subject(
     else:
         kind = type(given).__name__
         raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
-    place = Path(f"{Path(name).stem}-painted") if folder is None else Path(folder)
+    place = Path(f"{Path(name).stem}.paint") if folder is None else Path(folder)
     return Subject(source=name, folder=place.absolute(), **about)

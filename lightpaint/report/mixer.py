@@ -41,8 +41,8 @@ CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
 
 #: What stands above it.
 ABOUT = (
-    "Every light by hand, from the answer on. Stops count from the light as it is in the scene; "
-    "S shows a light alone, M all others."
+    "Every light by hand, from the answer on. Stops count from the light as it is in the scene; S "
+    "shows one alone, M the picture without it."
 )
 
 

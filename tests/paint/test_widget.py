@@ -272,6 +272,7 @@ def test_the_script_is_one_module() -> None:
             "a.js > b.js > a.js",
         ),
         ({"a.js": "const here = import.meta.url\n"}, "import.meta"),
+        ({"a.js": "import { x } from './b.js'\n", "b.js": "export const y = 3\n"}, "not export"),
         ({"a.js": "import x from './b.js'\n", "b.js": "\n"}, "imports 'x'"),
     ],
 )

@@ -132,13 +132,13 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opene
     rows.nth(1).get_by_text("S", exact=True).click()
     rows.nth(0).get_by_text("M", exact=True).click()
     check(page, codes(basis, np.where(np.arange(3)[:, None] == 0, 0, weights), transform))
-    page.get_by_text("Present", exact=True).click()
+    page.get_by_text("Reset to present").click()
     check(page, codes(basis, basis.present_weights, transform))
     move(page, 0, 0, -8)
     dark = basis.present_weights.copy()
     dark[0] = 0
     check(page, codes(basis, dark, transform))
-    page.get_by_text("Solved", exact=True).click()
+    page.get_by_text("Reset to solved").click()
     check(page, codes(basis, answer, transform))
 
 
@@ -197,7 +197,7 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> 
     page = opened(report(basis))
     assert page.locator(".mixer-light").count() == SHOWN + 1
     check(page, codes(basis, answer, transform))
-    page.get_by_text("Present", exact=True).click()
+    page.get_by_text("Reset to present").click()
     check(page, codes(basis, basis.present_weights, transform))
     data = json.loads(page.locator(".mixer script").inner_text())
     assert len(data["rest"]["answer"]) == 60 - SHOWN
