@@ -3,12 +3,11 @@
     pip install '.[test]'
     python benchmarks/painter.py [--cases 12x960x540 64x960x540 ...] [--strokes N] [--minutes M]
 
-A basis of soft lights that is made up, the painter's own server, and headless Chromium that renders
-in software. A pointer is moved 60 times a second over the picture. For every answer that comes on
-screen, the time since the last move of the pointer that it answers; Python's part of a stroke is
-timed in this process. `frame`: of two planes fewer, a frame of the display, 16.7 ms, is in each
-figure, since a page draws once in a frame. With --minutes, how the memory of page and server grows
-while somebody paints.
+A basis of soft lights that is made up, the painter's own server, and headless Chromium that
+renders in software. A pointer is moved 60 times a second over the picture. For every answer that
+comes on screen, the time since the last move of the pointer that it answers; Python's part of a
+stroke is timed in this process. Up to a frame of the display, 16.7 ms, of each figure is waiting
+for it. With --minutes, how the memory of page and server grows while somebody paints.
 """
 
 import argparse
@@ -73,9 +72,8 @@ def main() -> None:
     cases = [tuple(map(int, case.split("x"))) for case in options.cases]
     print_session(cases[0])
     print("\nthrough the page, ms from pointer to screen")
-    print(
-        f"{'':16s} {'asked':16s} {'view':4s} {'median':>7s} {'95 %':>6s} {'99 %':>6s} {'answers':>8s}"
-    )
+    heads = ("", "asked", "view", "median", "95 %", "99 %", "answers")
+    print("{:16s} {:16s} {:4s} {:>7s} {:>6s} {:>6s} {:>8s}".format(*heads))
     for n, width, height in cases:
         basis = made_up(n, height, width)
         asked: dict[str, Any] = {}
@@ -131,14 +129,13 @@ def print_session(case: tuple[int, ...]) -> None:
         ("display, as by default", {}, {}),
         ("display, a lock, a limit", {}, held),
     ):
-        print(
-            f"{name:28s} {stroke_ms(basis, fit, asked, False):8.1f} {stroke_ms(basis, fit, asked, True):11.1f}"
-        )
+        colour, importance = (stroke_ms(basis, fit, asked, x) for x in (False, True))
+        print(f"{name:28s} {colour:8.1f} {importance:11.1f}")
 
 
 def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance: bool) -> float:
     """Median of what `Live` takes for one more piece of a stroke."""
-    height, width = basis.size
+    height = basis.size[0]
     image, importance = basis.present_look.copy(), np.zeros(basis.size, np.float32)
     importance[: height // 2] = 0.5
     one = np.ones((1, 1), np.float32)
@@ -224,7 +221,8 @@ class Opened:
         for number in range(strokes):
             self.stroke(number)
         kind = self.page.evaluate(
-            "() => document.getElementById('lightpaint').painter.engine.screen.view.constructor.name"
+            "() => { const { engine } = document.getElementById('lightpaint').painter;"
+            " return engine.screen.view.constructor.name; }"
         )
         return str(kind)[:2].lower(), self.page.evaluate("() => window.times")
 

@@ -126,7 +126,7 @@ class Studio:
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
                     return [looks.said(message)]
-                case protocol.DropLook():
+                case protocol.MixLooks() | protocol.DropLook():
                     return [looks.said(message)]
                 case protocol.LoadLook():
                     made = [looks.load(message)]
@@ -259,7 +259,9 @@ class Studio:
             "transforms": [x.name for x in self._transforms(session)],
             "transform": {"name": session.transform.name, "stops": session.transform.stops},
             "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
-            "resources": self.pictures.named(),
+            # These two change under the brush.
+            "resources": self.pictures.named()
+            | dict.fromkeys(("painting", "importance"), session.version),
             "looks": looks,
             "basis": {
                 "spp": basis.origin.spp,

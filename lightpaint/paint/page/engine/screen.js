@@ -30,6 +30,8 @@ export class Screen {
     this.height = 0;
     this.frame = 0;
     this.isLive = false;
+    /** Whether the solution is the present look. */
+    this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.rest = undefined;
     /** Milliseconds that a GPU has to come back. */
@@ -117,7 +119,14 @@ export class Screen {
   now() {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
-    this.view?.draw({ ...this.params, live: this.isLive });
+    const { left, right } = this.params;
+    const shown = { left: this.standIn(left), right: this.standIn(right) };
+    this.view?.draw({ ...this.params, ...shown, live: this.isLive });
+  }
+
+  /** The picture that is shown for another. @param {import('./view.js').Kind} kind */
+  standIn(kind) {
+    return kind === 'solution' && this.isPresent ? 'present' : kind;
   }
 
   close() {

@@ -49,6 +49,9 @@ export class Work {
     this.version = -1;
     /** @type {import("./lut.js").Lut} */
     this.lut = SRGB;
+    /** Whether the present look is there, and whether the view has it. */
+    this.knowsPresent = false;
+    this.hasPresent = false;
     /** Whether the canvas is what the session has. */
     this.isReady = false;
     /** Whether a stroke is in progress. */
@@ -82,6 +85,7 @@ export class Work {
       this.strokes = new Strokes(this.host, this.canvas, refused);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
       this.isReady = false;
+      this.knowsPresent = false;
       this.loader.forget();
     }
     this.answered(state);
@@ -182,7 +186,9 @@ export class Work {
     const { canvas, state } = this;
     if (!canvas || !state) return;
     canvas.setPresent(present);
-    if (showsPresent(this.shown)) this.screen.view?.setPicture("present", present);
+    this.knowsPresent = true;
+    this.weigh();
+    this.showPresent();
     if (!this.isReady && state.first) this.isReady = true;
     else if (!this.isReady) this.sync();
     this.redraw([canvas.whole]);
@@ -198,6 +204,7 @@ export class Work {
   refill() {
     this.setLut(this.lut);
     this.weigh();
+    this.showPresent();
     if (this.canvas) this.redraw([this.canvas.whole]);
     this.loader.forget(
       (slot) => slot.startsWith("plane ") || slot === "verified" || slot === "beyond",
@@ -210,9 +217,8 @@ export class Work {
     this.shown = show;
     this.screen.params = { ...show, live: false };
     if (before?.transform !== show.transform || before?.clean !== show.clean) this.want();
-    if (this.canvas && showsPresent(show) !== showsPresent(before))
-      this.screen.view?.setPicture("present", showsPresent(show) ? this.canvas.present : null);
     this.weigh();
+    if (showsPresent(show) !== showsPresent(before)) this.showPresent();
     this.screen.request();
   }
 
@@ -225,6 +231,27 @@ export class Work {
     if (gains) weights.forEach((weight, i) => (weights[i] = gains[Math.floor(i / 3)] ? weight : 0));
     if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
     if (other) view.setWeights(Float64Array.from(other.flat()), "other");
+    this.stand(weights);
+  }
+
+  /** Lights that are as they were make the present look, which is there before their planes are,
+   * and is clean. @param {Float64Array} weights */
+  stand(weights) {
+    const { screen, canvas, state, shown } = this;
+    const present = state?.lights.flatMap((light) => light.present) ?? [];
+    const isClean = shown?.clean ?? true;
+    const isPresent =
+      isClean && weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
+    screen.isPresent = isPresent && this.knowsPresent;
+    if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
+  }
+
+  /** Give the view the present look while it is shown. */
+  showPresent() {
+    const { screen, canvas, shown } = this;
+    const isShown = screen.isPresent || showsPresent(shown);
+    this.hasPresent = screen.isPresent;
+    screen.view?.setPicture('present', isShown && canvas ? canvas.present : null);
   }
 
   /** @param {Region[]} regions */
