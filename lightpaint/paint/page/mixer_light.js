@@ -1,207 +1,201 @@
 /** One light of the mixer: its row, and what its sliders make of it. */
 
-/** @typedef {import('./engine/protocol.js').RGB} RGB */
+/** @typedef {import("./engine/protocol.js").RGB} RGB */
 /** kelvin: where a look has it white, else null.
  * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean, isRest?: boolean,
  *   present: RGB, answer: RGB, kelvin: {present: number | null, answer: number | null}}} Light */
 
 /** Ends of the dimmer, in stops from the present; the left one is off. */
-const [DARKEST, BRIGHTEST] = [-8, 6]
+const [DARKEST, BRIGHTEST] = [-8, 6];
 
 /** @param {ArrayLike<number>} rgb */
 export function luminance(rgb) {
-  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
 /** Colours of luminance 1 by temperature, in between by mired.
  * @param {[number, RGB][]} table from cool to warm @typedef {ReturnType<typeof kelvinTable>} Kelvins */
 export function kelvinTable(table) {
-  const mireds = table.map(([kelvin]) => 1e6 / kelvin)
-  const last = mireds.length - 1
+  const mireds = table.map(([kelvin]) => 1e6 / kelvin);
+  const last = mireds.length - 1;
   /** @param {number} mired @returns {RGB} */
   const rgb = (mired) => {
-    const step = (mireds[last] - mireds[0]) / last
-    const place = Math.min(last, Math.max(0, (mired - mireds[0]) / step))
-    const k = Math.min(last - 1, Math.floor(place))
-    const [a, b] = [table[k][1], table[k + 1][1]]
-    const mixed = /** @type {RGB} */ (a.map((x, c) => x + (place - k) * (b[c] - x)))
-    const level = luminance(mixed)
-    return /** @type {RGB} */ (mixed.map((x) => x / level))
-  }
-  return { rgb, coolest: mireds[0], warmest: mireds[last] }
+    const step = (mireds[last] - mireds[0]) / last;
+    const place = Math.min(last, Math.max(0, (mired - mireds[0]) / step));
+    const k = Math.min(last - 1, Math.floor(place));
+    const [a, b] = [table[k][1], table[k + 1][1]];
+    const mixed = /** @type {RGB} */ (a.map((x, c) => x + (place - k) * (b[c] - x)));
+    const level = luminance(mixed);
+    return /** @type {RGB} */ (mixed.map((x) => x / level));
+  };
+  return { rgb, coolest: mireds[0], warmest: mireds[last] };
 }
 
 /** A light that can be moved. */
 export class Row {
   /** @param {Light} light @param {Kelvins} kelvins @param {() => void} changed */
   constructor(light, kelvins, changed) {
-    this.light = light
-    this.kelvins = kelvins
-    this.changed = changed
-    this.rgb = light.answer
-    this.kelvin = light.kelvin.answer
+    this.light = light;
+    this.kelvins = kelvins;
+    this.changed = changed;
+    this.rgb = light.answer;
+    this.kelvin = light.kelvin.answer;
     /** What it was when it was last on. */
-    this.hue = light.answer
-    this.isSolo = false
-    this.isMute = false
-    const levels = [light.present, light.answer].map(luminance)
-    this.level = levels[0] || levels[1] || 1
-    const stops = levels.filter((x) => x > 0).map((x) => Math.log2(x / this.level))
-    this.most = Math.ceil(Math.max(BRIGHTEST, ...stops))
-    this.least = Math.floor(Math.min(DARKEST, ...stops.map((x) => x - 1)))
-    this.build()
+    this.hue = light.answer;
+    this.isSolo = false;
+    this.isMute = false;
+    const levels = [light.present, light.answer].map(luminance);
+    this.level = levels[0] || levels[1] || 1;
+    const stops = levels.filter((x) => x > 0).map((x) => Math.log2(x / this.level));
+    this.most = Math.ceil(Math.max(BRIGHTEST, ...stops));
+    this.least = Math.floor(Math.min(DARKEST, ...stops.map((x) => x - 1)));
+    const { name } = light;
+    this.element = element("div", "mixer-light");
+    this.thumb = document.createElement("canvas");
+    this.swatch = element("i", "mixer-swatch");
+    this.solo = this.toggle("S", `Solo: show ${name} alone`, () => (this.isSolo = !this.isSolo));
+    this.mute = this.toggle("M", `Mute: show all but ${name}`, () => (this.isMute = !this.isMute));
+    this.dimmer = slider(`${name}: stops from now`, this.least, this.most);
+    this.dimmed = element("output");
+    this.white = slider(`${name}: colour temperature`, kelvins.coolest, kelvins.warmest);
+    this.whiteness = element("output");
+    this.build();
   }
 
   build() {
-    const { light, kelvins } = this
-    this.element = element('div', 'mixer-light')
-    this.element.setAttribute('role', 'group')
-    this.element.setAttribute('aria-label', light.name)
-    this.thumb = document.createElement('canvas')
-    this.thumb.setAttribute('aria-hidden', 'true')
-    const head = element('div', 'mixer-head')
-    const name = element('span', 'mixer-name', light.name)
-    name.title = light.name
-    this.swatch = element('i', 'mixer-swatch')
-    const hear = element('span', 'mixer-hear')
-    this.solo = this.toggle('S', `Solo: show ${light.name} alone`, () => (this.isSolo = !this.isSolo))
-    this.mute = this.toggle('M', `Mute: show all but ${light.name}`, () => (this.isMute = !this.isMute))
-    hear.append(this.solo, this.mute)
-    head.append(this.swatch, name, hear)
-    const body = element('div', 'mixer-sliders')
-    this.element.append(this.thumb, head, body)
-    this.dimmer = slider(`${light.name}: stops from now`, this.least, this.most)
-    this.dimmed = element('output')
-    this.white = slider(`${light.name}: colour temperature`, kelvins.coolest, kelvins.warmest)
-    this.whiteness = element('output')
+    const { light, kelvins } = this;
+    this.element.setAttribute("role", "group");
+    this.element.setAttribute("aria-label", light.name);
+    this.thumb.setAttribute("aria-hidden", "true");
+    const head = element("div", "mixer-head");
+    const name = element("span", "mixer-name", light.name);
+    name.title = light.name;
+    const hear = element("span", "mixer-hear");
+    hear.append(this.solo, this.mute);
+    head.append(this.swatch, name, hear);
+    const body = element("div", "mixer-sliders");
+    this.element.append(this.thumb, head, body);
     if (light.isFixed) {
-      body.append(element('small', '', 'stays as it is in the scene'))
-      return
+      body.append(element("small", "", "stays as it is in the scene"));
+      return;
     }
-    body.append(this.dimmer, this.dimmed)
-    this.dimmer.addEventListener('input', () => this.dim(Number(this.dimmer?.value)))
-    this.dimmer.addEventListener('dblclick', () => this.dim(0))
-    if (light.isScalar) return
-    this.white.classList.add('is-white')
-    this.white.style.setProperty('--track', trackOf(kelvins))
-    body.append(this.white, this.whiteness)
-    this.white.addEventListener('input', () => this.turn(Number(this.white?.value)))
+    body.append(this.dimmer, this.dimmed);
+    this.dimmer.addEventListener("input", () => this.dim(Number(this.dimmer.value)));
+    this.dimmer.addEventListener("dblclick", () => this.dim(0));
+    if (light.isScalar) return;
+    this.white.classList.add("is-white");
+    this.white.style.setProperty("--track", trackOf(kelvins));
+    body.append(this.white, this.whiteness);
+    this.white.addEventListener("input", () => this.turn(Number(this.white.value)));
   }
 
   /** @param {string} text @param {string} label @param {() => void} act */
   toggle(text, label, act) {
-    const button = /** @type {HTMLButtonElement} */ (element('button', '', text))
-    button.type = 'button'
-    button.title = label
-    button.setAttribute('aria-label', label)
-    button.addEventListener('click', () => {
-      act()
-      this.show()
-      this.changed()
-    })
-    return button
+    const button = /** @type {HTMLButtonElement} */ (element("button", "", text));
+    button.type = "button";
+    button.title = label;
+    button.setAttribute("aria-label", label);
+    button.addEventListener("click", () => {
+      act();
+      this.show();
+      this.changed();
+    });
+    return button;
   }
 
   /** @param {number} stops */
   dim(stops) {
-    const level = stops <= this.least ? 0 : this.level * 2 ** stops
-    const factor = level / luminance(this.hue)
-    this.set(/** @type {RGB} */ (this.hue.map((x) => x * factor)), this.kelvin)
+    const level = stops <= this.least ? 0 : this.level * 2 ** stops;
+    const factor = level / luminance(this.hue);
+    this.set(/** @type {RGB} */ (this.hue.map((x) => x * factor)), this.kelvin);
   }
 
   /** @param {number} mired */
   turn(mired) {
-    const hue = this.kelvins.rgb(mired)
-    const level = luminance(this.rgb)
-    if (level > 0) this.set(/** @type {RGB} */ (hue.map((x) => x * level)), 1e6 / mired)
+    const hue = this.kelvins.rgb(mired);
+    const level = luminance(this.rgb);
+    if (level > 0) this.set(/** @type {RGB} */ (hue.map((x) => x * level)), 1e6 / mired);
     else {
-      this.hue = hue
-      this.set(this.rgb, 1e6 / mired)
+      this.hue = hue;
+      this.set(this.rgb, 1e6 / mired);
     }
   }
 
   /** @param {'answer' | 'present'} look */
   reset(look) {
-    const { light } = this
-    this.isSolo = this.isMute = false
-    const other = look === 'answer' ? light.present : light.answer
-    const known = [light[look], other].find((rgb) => luminance(rgb) > 0)
-    this.hue = known ?? [1, 1, 1]
-    this.rgb = light[look]
-    this.kelvin = light.kelvin[look]
-    this.show()
+    const { light } = this;
+    this.isSolo = this.isMute = false;
+    const other = look === "answer" ? light.present : light.answer;
+    const known = [light[look], other].find((rgb) => luminance(rgb) > 0);
+    this.hue = known ?? [1, 1, 1];
+    this.rgb = light[look];
+    this.kelvin = light.kelvin[look];
+    this.show();
   }
 
   /** @param {RGB} rgb @param {number | null} kelvin */
   set(rgb, kelvin) {
-    this.rgb = rgb
-    this.kelvin = kelvin
-    if (luminance(rgb) > 0) this.hue = rgb
-    this.show()
-    this.changed()
+    this.rgb = rgb;
+    this.kelvin = kelvin;
+    if (luminance(rgb) > 0) this.hue = rgb;
+    this.show();
+    this.changed();
   }
 
   show() {
-    const { dimmer, dimmed, white, whiteness, swatch, solo, mute, element: all } = this
-    if (!(dimmer && dimmed && white && whiteness && swatch && solo && mute && all)) return
-    const level = luminance(this.rgb)
-    const stops = level > 0 ? Math.log2(level / this.level) : this.least
-    const told = level > 0 ? `${stops < -0.005 ? '\u2212' : '+'}${Math.abs(stops).toFixed(2)}` : 'off'
-    dimmer.value = String(stops)
-    dimmer.setAttribute('aria-valuetext', level > 0 ? `${told} stops` : 'off')
-    dimmed.textContent = told
-    const { kelvin } = this
-    const temperature = kelvin === null ? 'own colour' : `${Math.round(kelvin / 10) * 10} K`
-    const { coolest, warmest } = this.kelvins
-    const mired = kelvin === null ? (coolest + warmest) / 2 : 1e6 / kelvin
-    white.value = String(mired)
-    white.classList.toggle('is-none', kelvin === null)
-    white.setAttribute('aria-valuetext', temperature)
-    whiteness.textContent = kelvin === null ? 'colour' : temperature
-    swatch.style.background = level > 0 ? hexOf(this.rgb) : 'none'
-    swatch.classList.toggle('is-off', !(level > 0))
-    solo.setAttribute('aria-pressed', String(this.isSolo))
-    mute.setAttribute('aria-pressed', String(this.isMute))
-    all.classList.toggle('is-mute', this.isMute)
+    const { dimmer, dimmed, white, whiteness, swatch, solo, mute, element: all } = this;
+    const level = luminance(this.rgb);
+    const stops = level > 0 ? Math.log2(level / this.level) : this.least;
+    const told =
+      level > 0 ? `${stops < -0.005 ? "\u2212" : "+"}${Math.abs(stops).toFixed(2)}` : "off";
+    dimmer.value = String(stops);
+    dimmer.setAttribute("aria-valuetext", level > 0 ? `${told} stops` : "off");
+    dimmed.textContent = told;
+    const { kelvin } = this;
+    const temperature = kelvin === null ? "own colour" : `${Math.round(kelvin / 10) * 10} K`;
+    const { coolest, warmest } = this.kelvins;
+    const mired = kelvin === null ? (coolest + warmest) / 2 : 1e6 / kelvin;
+    white.value = String(mired);
+    white.classList.toggle("is-none", kelvin === null);
+    white.setAttribute("aria-valuetext", temperature);
+    whiteness.textContent = kelvin === null ? "colour" : temperature;
+    swatch.style.background = level > 0 ? hexOf(this.rgb) : "none";
+    swatch.classList.toggle("is-off", !(level > 0));
+    solo.setAttribute("aria-pressed", String(this.isSolo));
+    mute.setAttribute("aria-pressed", String(this.isMute));
+    all.classList.toggle("is-mute", this.isMute);
   }
-}
-
-/** @param {Light} light @param {Kelvins} kelvins @param {() => void} changed */
-export function rowOf(light, kelvins, changed) {
-  return /** @type {Row & {element: HTMLElement, thumb: HTMLCanvasElement}} */ (
-    new Row(light, kelvins, changed)
-  )
 }
 
 /** The colour of a light as a display has it, its brightest channel at full. @param {RGB} rgb */
 function hexOf(rgb) {
-  const top = Math.max(...rgb) || 1
+  const top = Math.max(...rgb) || 1;
   const codes = rgb.map((x) => {
-    const light = x / top
-    const shown = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055
-    return Math.round(255 * shown)
-  })
-  return `rgb(${codes.join(' ')})`
+    const light = x / top;
+    const shown = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
+    return Math.round(255 * shown);
+  });
+  return `rgb(${codes.join(" ")})`;
 }
 
 /** @param {Kelvins} kelvins */
 function trackOf({ rgb, coolest, warmest }) {
-  const places = Array.from({ length: 9 }, (_, k) => coolest + (k / 8) * (warmest - coolest))
-  return `linear-gradient(to right, ${places.map((mired) => hexOf(rgb(mired))).join(', ')})`
+  const places = Array.from({ length: 9 }, (_, k) => coolest + (k / 8) * (warmest - coolest));
+  return `linear-gradient(to right, ${places.map((mired) => hexOf(rgb(mired))).join(", ")})`;
 }
 
 /** @param {string} tag @param {string} [name] @param {string} [text] */
-function element(tag, name = '', text = '') {
-  const made = document.createElement(tag)
-  if (name) made.className = name
-  made.textContent = text
-  return made
+function element(tag, name = "", text = "") {
+  const made = document.createElement(tag);
+  if (name) made.className = name;
+  made.textContent = text;
+  return made;
 }
 
 /** @param {string} label @param {number} min @param {number} max */
 function slider(label, min, max) {
-  const input = document.createElement('input')
-  Object.assign(input, { type: 'range', min, max, step: 'any' })
-  input.setAttribute('aria-label', label)
-  return input
+  const input = document.createElement("input");
+  Object.assign(input, { type: "range", min, max, step: "any" });
+  input.setAttribute("aria-label", label);
+  return input;
 }

@@ -1,5 +1,5 @@
 /** Pictures that images/compact.py made small. */
-import { finite } from './engine/half.js'
+import { finite } from "./engine/half.js";
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,
  *   size: [height: number, width: number]}} Compact */
@@ -7,41 +7,41 @@ import { finite } from './engine/half.js'
 /** The picture as halves (h, w, 3), over its scale.
  * @param {Compact} picture @returns {Promise<Uint16Array>} */
 export async function unpacked({ data, dropped, size: [height, width] }) {
-  const bytes = await inflated(data.slice(data.indexOf(',') + 1))
-  const count = height * width
-  const planes = [0, 1, 2].map((c) => toldBy(bytes, c * count, 3 * count, height, width))
-  const [green, red, blue] = planes
-  const halves = new Uint16Array(3 * count)
+  const bytes = await inflated(data.slice(data.indexOf(",") + 1));
+  const count = height * width;
+  const planes = [0, 1, 2].map((c) => toldBy(bytes, c * count, 3 * count, height, width));
+  const [green, red, blue] = planes;
+  const halves = new Uint16Array(3 * count);
   for (let i = 0; i < count; i++) {
-    halves[3 * i] = (red[i] + green[i]) << dropped
-    halves[3 * i + 1] = green[i] << dropped
-    halves[3 * i + 2] = (blue[i] + green[i]) << dropped
+    halves[3 * i] = (red[i] + green[i]) << dropped;
+    halves[3 * i + 1] = green[i] << dropped;
+    halves[3 * i + 2] = (blue[i] + green[i]) << dropped;
   }
-  return finite(halves)
+  return finite(halves);
 }
 
 /** One channel's numbers, from what its neighbours do not tell of them.
  * @param {Uint8Array} bytes @param {number} first @param {number} all @param {number} height
  * @param {number} width @returns {Int32Array} */
 function toldBy(bytes, first, all, height, width) {
-  const made = new Int32Array(height * width)
+  const made = new Int32Array(height * width);
   for (let y = 0, i = 0; y < height; y++) {
     for (let x = 0; x < width; x++, i++) {
-      const folded = bytes[first + i] | (bytes[all + first + i] << 8)
-      const left = x ? made[i - 1] : 0
-      const above = y ? made[i - width] : 0
-      const corner = x && y ? made[i - width - 1] : 0
-      const [low, high] = left < above ? [left, above] : [above, left]
-      const plane = left + above - corner
-      made[i] = ((folded >> 1) ^ -(folded & 1)) + (plane < low ? low : plane > high ? high : plane)
+      const folded = bytes[first + i] | (bytes[all + first + i] << 8);
+      const left = x ? made[i - 1] : 0;
+      const above = y ? made[i - width] : 0;
+      const corner = x && y ? made[i - width - 1] : 0;
+      const [low, high] = left < above ? [left, above] : [above, left];
+      const plane = left + above - corner;
+      made[i] = ((folded >> 1) ^ -(folded & 1)) + (plane < low ? low : plane > high ? high : plane);
     }
   }
-  return made
+  return made;
 }
 
 /** @param {string} text base64 @returns {Promise<Uint8Array>} */
 async function inflated(text) {
-  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'))
-  return new Uint8Array(await new Response(stream).arrayBuffer())
+  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
 }

@@ -1,10 +1,11 @@
 /** The session behind a notebook's model: messages as they are, with their buffers beside them. */
-import { AT_ONCE, Hearers } from './host.js'
-import { VERSION, described, pictureOf } from './protocol.js'
+import { AT_ONCE, Hearers } from "./host.js";
+import { VERSION, described, pictureOf } from "./protocol.js";
 
-/** @typedef {import('./protocol.js').Arrays} Arrays */
-/** @typedef {import('./protocol.js').Message} Message */
-/** @typedef {import('./protocol.js').Picture} Picture */
+/** @typedef {import("./host.js").Host} Host */
+/** @typedef {import("./protocol.js").Arrays} Arrays */
+/** @typedef {import("./protocol.js").Message} Message */
+/** @typedef {import("./protocol.js").Picture} Picture */
 
 /** What anywidget has of a model.
  * @typedef {{get: (name: string) => unknown,
@@ -14,77 +15,79 @@ import { VERSION, described, pictureOf } from './protocol.js'
  *   void}} Model */
 
 /** Numbers of one page's messages: other pages of the same model have others. */
-const MESSAGES = 2 ** 32
+const MESSAGES = 2 ** 32;
 
-/** @implements {import('./host.js').Host} */
+/** @implements {Host} */
 export class ModelHost extends Hearers {
   /** @param {Model} model */
   constructor(model) {
-    super()
-    this.model = model
-    this.page = 1 + Math.floor(Math.random() * (2 ** 20 - 1))
-    this.seq = this.page * MESSAGES
+    super();
+    this.model = model;
+    this.page = 1 + Math.floor(Math.random() * (2 ** 20 - 1));
+    this.seq = this.page * MESSAGES;
     /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
-    this.asked = new Map()
+    this.asked = new Map();
     /** @type {(content: any, buffers: DataView[]) => void} */
-    this.hear = (content, buffers) => this.receive(content, buffers)
-    model.on('msg:custom', this.hear)
+    this.hear = (content, buffers) => this.receive(content, buffers);
+    model.on("msg:custom", this.hear);
   }
 
   /** Ask for all there is. */
   open() {
-    this.send('hello', { version: VERSION }).catch(() => {})
+    this.send("hello", { version: VERSION }).catch(() => {});
   }
 
   /** @param {any} content @param {DataView[]} buffers */
   receive(content, buffers) {
     // One model may be shown at several places, each of which hears all.
-    if (content.page !== this.page) return
+    if (content.page !== this.page) return;
     /** @type {Arrays} */
-    const arrays = {}
-    content.buffers.forEach((/** @type {any} */ { name, dtype, shape }, /** @type {number} */ k) => {
-      const { buffer, byteOffset, byteLength } = buffers[k]
-      // A copy, since numbers need not begin where an array of them could.
-      arrays[name] = pictureOf(
-        dtype,
-        shape,
-        /** @type {ArrayBuffer} */ (buffer.slice(byteOffset, byteOffset + byteLength)),
-      )
-    })
-    const message = /** @type {Message} */ ({ ...content, arrays })
-    this.tell(message.kind, message)
-    if (message.kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' })
-    if (message.reply === undefined) return
-    this.asked.get(message.reply)?.resolve(message)
-    this.asked.delete(message.reply)
+    const arrays = {};
+    content.buffers.forEach(
+      (/** @type {any} */ { name, dtype, shape }, /** @type {number} */ k) => {
+        const { buffer, byteOffset, byteLength } = buffers[k];
+        // A copy, since numbers need not begin where an array of them could.
+        arrays[name] = pictureOf(
+          dtype,
+          shape,
+          /** @type {ArrayBuffer} */ (buffer.slice(byteOffset, byteOffset + byteLength)),
+        );
+      },
+    );
+    const message = /** @type {Message} */ ({ ...content, arrays });
+    this.tell(message.kind, message);
+    if (message.kind === "state") this.tell("connection", { kind: "connection", state: "open" });
+    if (message.reply === undefined) return;
+    this.asked.get(message.reply)?.resolve(message);
+    this.asked.delete(message.reply);
   }
 
   /** @param {string} kind @param {Record<string, unknown>} [fields] @param {Arrays} [arrays]
    * @returns {Promise<Message>} */
   async send(kind, fields = {}, arrays = {}) {
-    if (!AT_ONCE.includes(kind)) await this.gate()
+    if (!AT_ONCE.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
-      const seq = ++this.seq
-      this.asked.set(seq, { resolve, reject })
-      const content = { kind, seq, ...fields, buffers: described(arrays) }
+      const seq = ++this.seq;
+      this.asked.set(seq, { resolve, reject });
+      const content = { kind, seq, ...fields, buffers: described(arrays) };
       // Copies: what is painted on meanwhile is of another message.
       const bytes = Object.values(arrays).map(({ data }) =>
         data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength),
-      )
-      this.model.send(content, undefined, /** @type {ArrayBuffer[]} */ (bytes))
-    })
+      );
+      this.model.send(content, undefined, /** @type {ArrayBuffer[]} */ (bytes));
+    });
   }
 
   /** @param {string} name @returns {Promise<Picture>} */
   async fetch(name) {
-    const message = await this.send('fetch', { name })
-    if (message.kind === 'failed') throw new Error(`${name}: ${message.text}`)
-    return message.arrays.data
+    const message = await this.send("fetch", { name });
+    if (message.kind === "failed") throw new Error(`${name}: ${message.text}`);
+    return message.arrays.data;
   }
 
   close() {
-    this.model.off('msg:custom', this.hear)
-    for (const { reject } of this.asked.values()) reject(new Error('the painter is closed'))
-    this.asked.clear()
+    this.model.off("msg:custom", this.hear);
+    for (const { reject } of this.asked.values()) reject(new Error("the painter is closed"));
+    this.asked.clear();
   }
 }
