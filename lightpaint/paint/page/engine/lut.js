@@ -5,7 +5,7 @@
  * for all light below 2^low. In between it is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
  * Where no display value depends on another channel, one curve stands for the lattice.
  */
-import { VALUES } from "./half.js";
+import { VALUES } from './half.js';
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 /** @typedef {import("./protocol.js").Shaper} Shaper */
@@ -24,7 +24,7 @@ export const SRGB = Object.freeze({
 /** @param {string} name of the transform @param {Picture} picture float16 @param {Shaper} shaper
  * @returns {Lut} */
 export function lutOf(name, picture, shaper) {
-  if (name === "srgb") return SRGB;
+  if (name === 'srgb') return SRGB;
   const { data } = picture;
   if (data.length !== shaper.side ** 3 * 3)
     throw new Error(`a lattice of ${data.length} numbers, not of ${shaper.side}³ colours`);

@@ -1,6 +1,6 @@
 /** Where the pictures are drawn: one view, its size in device pixels, and when it draws. */
-import { chooseView } from "./choose.js";
-import { DEFAULTS, panes } from "./view.js";
+import { chooseView } from './choose.js';
+import { DEFAULTS, panes } from './view.js';
 
 /** @typedef {import("./view.js").PictureView} PictureView */
 /** @typedef {import("./view.js").Params} Params */
@@ -50,7 +50,7 @@ export class Screen {
     this.count = count;
     const onRestored = () => this.restored();
     this.view = chooseView(this.element, size, count, { view: which, onRestored });
-    this.view.canvas.addEventListener("webglcontextlost", () => this.lost());
+    this.view.canvas.addEventListener('webglcontextlost', () => this.lost());
     this.fit();
   }
 
@@ -58,7 +58,7 @@ export class Screen {
   lost() {
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => {
-      this.begin(this.size, this.count, "cpu");
+      this.begin(this.size, this.count, 'cpu');
       this.options.refill();
     }, this.patience);
   }
@@ -80,7 +80,7 @@ export class Screen {
   fit() {
     if (!this.view) return;
     const { canvas } = this.view;
-    canvas.style.display = "block";
+    canvas.style.display = 'block';
     canvas.style.width = `${this.width}px`;
     canvas.style.height = `${this.height}px`;
     const [width, height] = [this.width, this.height].map((n) =>

@@ -12,7 +12,13 @@ import { paneAt } from './pointer.js';
  * @param {HTMLElement | null} rings @param {Engine} engine @param {Ui} ui
  * @param {number} [x] @param {number} [y]
  */
-export function ring(rings, engine, ui, x = Number(rings?.dataset.x), y = Number(rings?.dataset.y)) {
+export function ring(
+  rings,
+  engine,
+  ui,
+  x = Number(rings?.dataset.x),
+  y = Number(rings?.dataset.y),
+) {
   if (!rings || !Number.isFinite(x)) return;
   rings.dataset.x = String(x);
   rings.dataset.y = String(y);

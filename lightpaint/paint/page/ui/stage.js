@@ -74,7 +74,8 @@ export function Stage({ ui, hands }) {
     [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights],
   );
   const hasAlbedo = ui.resources.albedo !== undefined;
-  useEffect(
+  // Before the next press of a pointer.
+  useLayoutEffect(
     () =>
       engine.use({
         tool: ui.tool,
