@@ -238,7 +238,8 @@ export class Work {
    * and is clean. @param {Float64Array} weights */
   stand(weights) {
     const { screen, canvas, state, shown } = this;
-    const present = state?.lights.flatMap((light) => light.present) ?? [];
+    const present =
+      state?.lights.flatMap((/** @type {{present: number[]}} */ light) => light.present) ?? [];
     const isClean = shown?.clean ?? true;
     const isPresent =
       isClean && weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
