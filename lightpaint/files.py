@@ -289,3 +289,11 @@ def is_utf_8(path: Path) -> bool:
 def _inode(path: Path) -> tuple[int, int]:
     status = path.stat()
     return status.st_dev, status.st_ino
+
+
+def called(path: Path) -> str:
+    """A scene by its file, or by its folder where that is called as all are."""
+    is_basis = path.name.endswith(".basis.exr")
+    stem = path.name.removesuffix(".basis.exr") if is_basis else path.stem
+    parent = path.absolute().parent.name
+    return parent if stem == "scene" and parent else stem or path.name

@@ -18,7 +18,7 @@ from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
-from lightpaint.files import check_files, is_name, is_utf_8, one_line
+from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -156,9 +156,8 @@ def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> d
     source, asked = painted_of(options), constraints_of(options)
     if options.lights_file and not isinstance(source, SceneFile):
         asked = read_constraints(options.lights_file).and_then(asked)
-    name = Path(source.path).name
-    stem = name.removesuffix(".basis.exr") if name.endswith(".basis.exr") else Path(name).stem
-    [folder] = folders_of(options.output and Path(options.output), [f"{stem}.paint"])
+    named = f"{called(Path(source.path))}.paint"
+    [folder] = folders_of(options.output and Path(options.output), [named])
     # Those that `solve` has too, for the command that answers what was exported.
     dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
     dropped += ["as_json", "is_quiet", "is_verbose"]

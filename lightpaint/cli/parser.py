@@ -134,7 +134,9 @@ def _paint(parser: argparse.ArgumentParser) -> None:
         "name, too",
     )
     add_output(
-        parser, "DIR", "folder for the session and what is exported (default: <scene>.paint/)"
+        parser,
+        "DIR",
+        "folder for session and exports (default: named after the scene)",
     )
     add_server(parser)
     add_fit(parser)

@@ -81,12 +81,14 @@ class Live:
         """Whether anything is."""
         return bool(self._sums[:, 0].any())
 
-    def painted(self, region: Region) -> None:
-        """A rectangle of the painting is another now."""
-        self._count_rows(region[0])
-        for kind in (self._light, self._display):
-            if kind is not None:
-                kind.painted(region)
+    def painted(self, region: Region, *, with_importance: bool = True) -> None:
+        """A rectangle of the painting is another now. with_importance: also what counts there."""
+        if with_importance:
+            self._count_rows(region[0])
+        if self._light is not None:
+            self._light.painted(region, with_importance=with_importance)
+        if self._display is not None:
+            self._display.painted(region)
 
     def answer(self, start: Doubles) -> Doubles:
         """The weights (n, 3) that are best now, from those before.
@@ -162,10 +164,12 @@ class _Tiles:
         left = np.maximum(1 - self._importance[region], 0)
         self._left[region] = np.where(self._seen[region], 0, left)
 
-    def painted(self, region: Region) -> None:
+    def painted(self, region: Region, *, with_importance: bool) -> None:
+        self._paint.update(region, with_M=with_importance)
+        if not with_importance:
+            return
         before = self._left[region].copy()
         self._leave(region)
-        self._paint.update(region)
         if not np.array_equal(before, self._left[region]):
             self._rest.update(region)
 

@@ -9,15 +9,23 @@ import numpy.typing as npt
 from lightpaint.errors import PaintError
 from lightpaint.images.blocks import block_mean
 from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.protocol import CopyLook, DropLook, LoadLook, Message, RenameLook, SaveLook
+from lightpaint.paint.protocol import (
+    CopyLook,
+    DropLook,
+    LoadLook,
+    Message,
+    MixLooks,
+    RenameLook,
+    SaveLook,
+)
 from lightpaint.paint.session import Session
-from lightpaint.paint.steps import KeptLook
+from lightpaint.paint.steps import KeptLook, Pixels
 from lightpaint.paint.wishes import Wishes
 
 #: Pixels of a thumbnail's longer side, about, and characters of a name.
 THUMBNAIL, LONGEST = 192, 80
 
-Said = SaveLook | RenameLook | CopyLook | DropLook
+Said = SaveLook | RenameLook | CopyLook | MixLooks | DropLook
 
 
 class Looks:
@@ -56,6 +64,8 @@ class Looks:
                 look = self._look(number)
                 fields = {**look.fields, "name": f"{look.fields['name']} copy"[:LONGEST]}
                 self._put(KeptLook(self._free(), fields, look.arrays))
+            case MixLooks():
+                self._put(self._between(message))
             case DropLook(number):
                 store.drop_look(self._look(number).id)
                 self._pictures.withdraw(f"look/{number}")
@@ -70,15 +80,45 @@ class Looks:
 
     def _now(self, name: str) -> KeptLook:
         session = self._session
-        fields = {"name": name, "stamp": time.time(), "wishes": session.wishes.as_json()}
-        look = session.basis.mix(session.weights)
+        painting = session.image.copy(), session.importance.copy()
+        return self._made(name, painting, session.wishes, session.weights.copy())
+
+    def _between(self, message: MixLooks) -> KeptLook:
+        """Both paintings, each as far as it counts, and the lights held between the answers."""
+        part, name = message.part, self._named(message.name)
+        if not 0 <= part <= 1:
+            raise PaintError(f"part is {part:g}: expected 0 for the first look to 1 for the second")
+        arrays = [self._look(k).arrays for k in (message.first, message.second)]
+        shares = 1 - part, part
+        weights = sum(s * np.asarray(x["weights"]) for s, x in zip(shares, arrays, strict=True))
+        counts = [s * np.asarray(x["importance"]) for s, x in zip(shares, arrays, strict=True)]
+        total = counts[0] + counts[1]
+        whole = np.where(total > 0, total, 1)[..., None]
+        image = np.zeros((*total.shape, 3), np.float32)
+        for count, its in zip(counts, arrays, strict=True):
+            image += (count[..., None] / whole * np.asarray(its["image"])).astype(np.float32)
+        lights = self._session.basis.lights
+        held = {
+            light.name: {"lock": float(w[0]) if light.is_scalar else w.tolist()}
+            for light, w in zip(lights, np.asarray(weights), strict=True)
+            if not light.is_fixed
+        }
+        return self._made(
+            name, (image, total.astype(np.float32)), Wishes(held), np.asarray(weights)
+        )
+
+    def _made(
+        self, name: str, painting: Pixels, wishes: Wishes, weights: npt.NDArray[Any]
+    ) -> KeptLook:
+        fields = {"name": name, "stamp": time.time(), "wishes": wishes.as_json()}
+        look = self._session.basis.mix(weights)
         factor = max(1, round(max(look.shape[:2]) / THUMBNAIL))
         rows, columns = (n // factor * factor for n in look.shape[:2])
-        shown = session.transform.encode(block_mean(look[:rows, :columns], factor))
+        shown = self._session.transform.encode(block_mean(look[:rows, :columns], factor))
         arrays: dict[str, npt.NDArray[Any]] = {
-            "image": session.image.copy(),
-            "importance": session.importance.copy(),
-            "weights": session.weights.copy(),
+            "image": np.asarray(painting[0], np.float32),
+            "importance": np.asarray(painting[1], np.float32),
+            "weights": weights,
             "thumbnail": np.round(shown * 255).astype(np.uint8),
         }
         return KeptLook(self._free(), fields, arrays)

@@ -18,7 +18,7 @@ from lightpaint.report.figures import thumbnail
 BRIGHTEST = 1024.0
 
 #: Points along each side of a lookup table, and the light, in stops, that its ends stand for.
-SIDE, LOW, HIGH = 48, -13.0, 7.0
+SIDE, LOW, HIGH = 64, -13.0, 7.0
 
 #: Built-in transforms that a page may show through.
 TRANSFORMS = ("srgb", "filmic", "agx", "linear")

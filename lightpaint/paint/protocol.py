@@ -144,6 +144,18 @@ class CopyLook:
 
 
 @dataclass(frozen=True)
+class MixLooks:
+    """Keep what lies between two looks: a look whose lights are held at the share `part` of the way
+    from the first to the second. Answered by `looks`.
+    """
+
+    first: int
+    second: int
+    part: float
+    name: str
+
+
+@dataclass(frozen=True)
 class DropLook:
     """Answered by `looks`."""
 
@@ -195,6 +207,7 @@ Said = (
     | LoadLook
     | RenameLook
     | CopyLook
+    | MixLooks
     | DropLook
     | Export
     | Verify
@@ -216,6 +229,7 @@ KINDS: Mapping[str, type[Any]] = {
     "load_look": LoadLook,
     "rename_look": RenameLook,
     "copy_look": CopyLook,
+    "mix_looks": MixLooks,
     "drop_look": DropLook,
     "export": Export,
     "verify": Verify,

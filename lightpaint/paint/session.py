@@ -245,10 +245,23 @@ class Session:
         }
 
     def improve(self, basis: Basis, present: Floats) -> None:
-        """Go on with a basis of the same lights and size that has more samples."""
+        """Go on with a basis of the same lights and size that has more samples.
+
+        A stroke that is open stays so.
+        """
+        painted = [(region, self._pixels(region)) for region, _ in self._open]
+        weights = self.weights
         self.basis, self.present = basis, np.asarray(present, np.float32)
-        self._forget_open()
+        self._open, moved, wishes = [], self._moved, self.wishes
         self._replay()
+        for region, pixels in painted:
+            self._open.append((region, self._pixels(region)))
+            self._put(region, pixels)
+        if moved is not None:
+            self._moved, self.wishes = moved, wishes
+            self._asks()
+        self.weights = weights
+        self._changed()
 
     def load(self, image: Floats, importance: Floats, wishes: Wishes, label: str) -> Message:
         """Go on from another painting and what was asked with it: one step."""
@@ -315,8 +328,9 @@ class Session:
         image, importance = pixels
         painted = (importance > 0)[..., None]
         self.image[where] = np.where(painted, image, self.present[where])
+        same = np.array_equal(self.importance[where], importance)
         self.importance[where] = importance
-        self.live.painted(where)
+        self.live.painted(where, with_importance=not same)
 
     def _pixels(self, region: Region) -> Pixels:
         top, bottom, left, right = region
@@ -339,8 +353,10 @@ class Session:
         for (top, bottom, left, right), pixels in reversed(self._open):
             part = np.s_[top - region[0] : bottom - region[0], left - region[2] : right - region[2]]
             image[part], importance[part] = pixels
-        patch = Patch(region, (image, importance), after)
-        self.store.append(Step("stroke", label, {}, patch))
+        before = image, importance
+        if not all(np.array_equal(a, b) for a, b in zip(before, after, strict=True)):
+            # What is sent again, since its answer was lost, is there already.
+            self.store.append(Step("stroke", label, {}, Patch(region, before, after)))
         self._open = []
 
     def _dropped(self) -> tuple[Region]:

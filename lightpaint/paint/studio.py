@@ -19,7 +19,6 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.solution import Solution
 from lightpaint.paint import pictures, protocol
 from lightpaint.paint.exports import PAINTING, export, verified
 from lightpaint.paint.looks import Looks
@@ -57,7 +56,7 @@ class Studio:
         self.pictures = Pictures()
         self._session: Session | None = None
         self._looks: Looks | None = None
-        self._solution: Solution | None = None
+        self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
         self._lock, self._bell = RLock(), Condition()
         self._unsettled, self._is_open, self._failed = False, True, ""
         self._render, self._renders = Lock(), False
@@ -108,9 +107,10 @@ class Studio:
                 return Message("waiting", {**about, "text": self._failed})
             basis = session.basis
             about |= self._of_basis(basis, session)
-            answer = {"lights_answer": lights_fields(basis, session.weights)}
+            known = self._known if self._known.get("version") == session.version else {}
+            answer = {"lights": lights_fields(basis, session.weights), **known}
             arrays = session.weights_array
-            return Message("state", {**about, **session.about, **answer}, arrays)
+            return Message("state", {**about, **session.about, "answer": answer}, arrays)
 
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
         """What comes of a message at once. Raises LightpaintError for what cannot be done."""
@@ -126,7 +126,7 @@ class Studio:
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
                     return [looks.said(message)]
-                case protocol.DropLook():
+                case protocol.MixLooks() | protocol.DropLook():
                     return [looks.said(message)]
                 case protocol.LoadLook():
                     made = [looks.load(message)]
@@ -259,7 +259,9 @@ class Studio:
             "transforms": [x.name for x in self._transforms(session)],
             "transform": {"name": session.transform.name, "stops": session.transform.stops},
             "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
-            "resources": self.pictures.named(),
+            # These two change under the brush.
+            "resources": self.pictures.named()
+            | dict.fromkeys(("painting", "importance"), session.version),
             "looks": looks,
             "basis": {
                 "spp": basis.origin.spp,
@@ -323,19 +325,15 @@ class Studio:
             moment = session.moment()
         solution = moment.solution()
         self._tell(lambda: session.settled(moment, solution))
-        with self._lock:
-            self._solution = solution if moment.version == session.version else self._solution
         if solution is None or moment.version != session.version:
             return
         [analysis] = analyse(solution)
-        with self._lock:
-            if moment.version == session.version:
-                self._solution = with_findings(solution, (analysis,))
         self._tell(lambda: session.settled(moment, solution, **analysis_fields(analysis)))
 
     def _tell(self, make: Callable[[], Message | None]) -> None:
         with self._lock:
             message = make()
+            self._known = message.fields if message is not None else self._known
         self._say(message)
 
     # Long work

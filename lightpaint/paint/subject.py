@@ -9,6 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.wishes import Wishes
 from lightpaint.pipeline import obtain
@@ -45,7 +46,7 @@ class Subject:
     @property
     def name(self) -> str:
         """What it is called, for people."""
-        return Path(self.source).name
+        return called(Path(self.source))
 
     @property
     def wanted(self) -> int | None:

@@ -51,8 +51,8 @@ def asked(line: str) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("line", "kind", "path", "folder"),
     [
-        ("scene.xml", SceneFile, "scene.xml", "scene.paint"),
-        ("scene.xml --lights a,b", SceneFile, "scene.xml", "scene.paint"),
+        ("scene.xml", SceneFile, "scene.xml", None),
+        ("scene.xml --lights a,b", SceneFile, "scene.xml", None),
         ("room.basis.exr", BasisFile, "room.basis.exr", "room.paint"),
         ("groups.exr", GroupsFile, "groups.exr", "groups.paint"),
         ("--lights groups.exr", GroupsFile, "groups.exr", "groups.paint"),
@@ -61,12 +61,13 @@ def asked(line: str) -> dict[str, Any]:
 )
 @pytest.mark.usefixtures("here")
 def test_what_is_painted_and_where_it_is_kept(
-    line: str, kind: type, path: str, folder: str
+    line: str, kind: type, path: str, folder: str | None
 ) -> None:
     values = asked(line)
     assert type(values["source"]) is kind
     assert values["source"].path == path
-    assert values["folder"] == Path(folder)
+    # Scenes that are called alike go by their folders.
+    assert values["folder"] == Path(folder or f"{Path.cwd().name}.paint")
 
 
 @pytest.mark.usefixtures("here")

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import lightpaint as lp
 from lightpaint.basis.basis import BasisLight, Origin
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity
@@ -87,7 +88,7 @@ def test_an_answer_is_that_of_solve(basis: lp.Basis):
     expected = lp.solve(basis, moment.target, constraints=asked)
     np.testing.assert_array_equal(solution.weights, expected.weights)
     assert solution.space == "display"
-    assert solution.problem.fit.hold == 1.0
+    assert solution.problem.fit.hold == HOLD
     message = session.settled(moment, solution)
     assert message is not None
     assert message.fields["exact"]

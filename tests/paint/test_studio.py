@@ -163,6 +163,21 @@ def test_a_look_is_gone_back_to_and_undone(heard: Heard):
         heard.studio.said(protocol.LoadLook(99), {})
 
 
+def test_what_lies_between_two_looks_is_kept(heard: Heard):
+    answers = []
+    for stroke, light in ((1, 0.8), (2, 0.1)):
+        heard.paint(stroke, light)
+        answers.append(heard.exact().arrays["weights"])
+        [message] = heard.studio.said(protocol.SaveLook(f"look {stroke}"), {})
+    one, two = (look["id"] for look in message.fields["looks"])
+    [message] = heard.studio.said(protocol.MixLooks(one, two, 0.25, "between"), {})
+    heard.studio.said(protocol.LoadLook(message.fields["looks"][-1]["id"]), {})
+    between = heard.exact().arrays["weights"]
+    np.testing.assert_allclose(between, 0.75 * answers[0] + 0.25 * answers[1], rtol=1e-9)
+    with pytest.raises(lp.LightpaintError, match="part is 2"):
+        heard.studio.said(protocol.MixLooks(one, two, 2, "beyond"), {})
+
+
 def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: Path):
     heard.paint(1, 0.8)
     heard.paint(2, 0.3, (0, 6, 10, 30))

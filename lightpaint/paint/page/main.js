@@ -6,5 +6,8 @@ import { openEngine, openHost } from './engine/painter.js';
 const element = document.getElementById('lightpaint');
 if (element) {
   const host = openHost();
-  await mount(element, host, { global: true, engine: openEngine(host) });
+  const engine = openEngine(host);
+  // For whoever measures it, and for the console.
+  Object.assign(element, { painter: { host, engine } });
+  await mount(element, host, { global: true, engine });
 }

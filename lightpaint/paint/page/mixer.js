@@ -3,11 +3,11 @@
  *
  * Every `.mixer` of the document is filled from the JSON inside it; without scripts it stays hidden.
  */
-import { VALUES } from "./engine/half.js";
-import { Encoder, SRGB } from "./engine/lut.js";
-import { Mix } from "./engine/mix.js";
-import { Row, kelvinTable, luminance } from "./mixer_light.js";
-import { unpacked } from "./unpack.js";
+import { VALUES } from './engine/half.js';
+import { Encoder, SRGB } from './engine/lut.js';
+import { Mix } from './engine/mix.js';
+import { Row, kelvinTable, luminance } from './mixer_light.js';
+import { unpacked } from './unpack.js';
 
 /** @typedef {import("./unpack.js").Compact} Compact */
 /** @typedef {import("./mixer_light.js").Light} Light */
@@ -35,7 +35,7 @@ class Mixer {
     this.mix = new Mix(data.size);
     this.picture = canvasOf(data.size);
     this.isWaiting = false;
-    this.look = /** @type {'answer' | 'present'} */ ("answer");
+    this.look = /** @type {'answer' | 'present'} */ ('answer');
     const kelvins = kelvinTable(data.kelvins);
     const changed = () => this.draw();
     /** @type {Row[]} */
@@ -44,7 +44,7 @@ class Mixer {
       const one = /** @type {RGB} */ ([1, 1, 1]);
       const about = {
         name: data.rest.label,
-        unit: "",
+        unit: '',
         isFixed: false,
         isScalar: true,
         isRest: true,
@@ -59,69 +59,69 @@ class Mixer {
     }
     const view = this.stage();
     view.append(...this.buttons());
-    const list = made("div", "mixer-lights");
+    const list = made('div', 'mixer-lights');
     list.append(...this.rows.map((row) => row.element));
     root.append(view, list);
     this.rows.forEach((row, k) => this.thumb(row, k));
-    this.reset("answer");
+    this.reset('answer');
   }
 
   /** Painting and mix, one over the other. */
   stage() {
     const [height, width] = this.data.size;
     const { painting } = this.data;
-    const view = made("div", "mixer-view");
-    const stage = made("div", "mixer-stage");
+    const view = made('div', 'mixer-view');
+    const stage = made('div', 'mixer-stage');
     stage.style.aspectRatio = `${width} / ${height}`;
-    this.picture.className = "mixer-mix";
-    this.picture.setAttribute("role", "img");
-    this.picture.setAttribute("aria-label", "What the lights make together");
+    this.picture.className = 'mixer-mix';
+    this.picture.setAttribute('role', 'img');
+    this.picture.setAttribute('aria-label', 'What the lights make together');
     stage.append(this.picture);
     view.append(stage);
     if (!painting) return view;
-    const image = /** @type {HTMLImageElement} */ (made("img", "mixer-painting"));
+    const image = /** @type {HTMLImageElement} */ (made('img', 'mixer-painting'));
     image.src = painting;
-    image.alt = "The painting";
+    image.alt = 'The painting';
     image.draggable = false;
-    const edge = made("div", "mixer-edge");
-    edge.append(made("i"));
-    stage.append(image, edge, made("span", "mixer-tag", "painting"));
-    stage.append(made("span", "mixer-tag is-right", "mix"));
-    const wipe = range("Wipe: how much of the painting", 0, 100, 50);
-    const move = () => stage.style.setProperty("--p", `${wipe.value}%`);
-    wipe.addEventListener("input", move);
+    const edge = made('div', 'mixer-edge');
+    edge.append(made('i'));
+    stage.append(image, edge, made('span', 'mixer-tag', 'painting'));
+    stage.append(made('span', 'mixer-tag is-right', 'mix'));
+    const wipe = range('Wipe: how much of the painting', 0, 100, 50);
+    const move = () => stage.style.setProperty('--p', `${wipe.value}%`);
+    wipe.addEventListener('input', move);
     drag(stage, (part) => {
       wipe.value = String(100 * part);
       move();
     });
     move();
-    const label = made("label", "mixer-wipe");
-    label.append(made("span", "", "Wipe"), wipe);
+    const label = made('label', 'mixer-wipe');
+    label.append(made('span', '', 'Wipe'), wipe);
     view.append(label);
     return view;
   }
 
   /** What is done with all lights, and what has come of it. */
   buttons() {
-    this.said = made("p", "mixer-said");
-    this.said.setAttribute("role", "status");
-    const buttons = made("div", "mixer-buttons");
+    this.said = made('p', 'mixer-said');
+    this.said.setAttribute('role', 'status');
+    const buttons = made('div', 'mixer-buttons');
     buttons.append(
-      button("Reset to solved", "All lights as the answer has them", () => this.reset("answer")),
-      button("Reset to present", "All lights as the scene has them", () => this.reset("present")),
+      button('Reset to solved', 'All lights as the answer has them', () => this.reset('answer')),
+      button('Reset to present', 'All lights as the scene has them', () => this.reset('present')),
       button(
-        "Copy as lighting.json",
-        "Every light as its sliders stand; solo and mute only change " + "what is seen",
-        () => this.copy(this.lighting(), "lighting.json"),
+        'Copy as lighting.json',
+        'Every light as its sliders stand; solo and mute only change ' + 'what is seen',
+        () => this.copy(this.lighting(), 'lighting.json'),
       ),
     );
     const { command } = this.data;
     if (command)
-      buttons.append(button("Copy command", command, () => this.copy(command, "The command")));
-    this.text = /** @type {HTMLTextAreaElement} */ (made("textarea", "mixer-text"));
+      buttons.append(button('Copy command', command, () => this.copy(command, 'The command')));
+    this.text = /** @type {HTMLTextAreaElement} */ (made('textarea', 'mixer-text'));
     this.text.readOnly = true;
     this.text.hidden = true;
-    this.text.setAttribute("aria-label", "To copy by hand");
+    this.text.setAttribute('aria-label', 'To copy by hand');
     return [buttons, this.said, this.text];
   }
 
@@ -139,7 +139,7 @@ class Mixer {
     this.rows.forEach((row, k) => {
       const isHeard = isSolo ? row.isSolo : !row.isMute;
       // Of the rest, the plane of the look that was last gone back to.
-      const plane = row.light.isRest && this.look === "present" ? k + 1 : k;
+      const plane = row.light.isRest && this.look === 'present' ? k + 1 : k;
       if (isHeard) weights.set(row.rgb, 3 * plane);
     });
     return weights;
@@ -172,7 +172,7 @@ class Mixer {
     thumb.width = THUMB;
     thumb.height = Math.max(1, Math.round((THUMB * height) / width));
     const context = contextOf(thumb);
-    context.imageSmoothingQuality = "high";
+    context.imageSmoothingQuality = 'high';
     context.drawImage(whole, 0, 0, thumb.width, thumb.height);
   }
 
@@ -190,7 +190,7 @@ class Mixer {
           set(name, /** @type {RGB} */ (its.map((x, c) => x * rgb[c])));
     }
     for (const { light } of this.rows) if (light.isFixed) set(light.name, [1, 1, 1]);
-    return JSON.stringify(file, null, 2) + "\n";
+    return JSON.stringify(file, null, 2) + '\n';
   }
 
   /** @param {string} text @param {string} what */
@@ -206,9 +206,9 @@ class Mixer {
       // A page from a disk may not be let: then by hand.
       field.hidden = false;
       field.select();
-      said.textContent = document.execCommand("copy")
+      said.textContent = document.execCommand('copy')
         ? `${what} is on the clipboard.`
-        : "This browser lets nobody copy here: it is marked below.";
+        : 'This browser lets nobody copy here: it is marked below.';
     }
   }
 }
@@ -222,20 +222,20 @@ function put(canvas, light, encoder) {
 
 /** @param {[height: number, width: number]} size */
 function canvasOf([height, width]) {
-  const canvas = document.createElement("canvas");
+  const canvas = document.createElement('canvas');
   Object.assign(canvas, { width, height });
   return canvas;
 }
 
 /** @param {HTMLCanvasElement} canvas */
 function contextOf(canvas) {
-  const context = canvas.getContext("2d", { alpha: false });
-  if (!context) throw new Error("no canvas to draw on");
+  const context = canvas.getContext('2d', { alpha: false });
+  if (!context) throw new Error('no canvas to draw on');
   return context;
 }
 
 /** @param {string} tag @param {string} [name] of its class @param {string} [text] */
-function made(tag, name = "", text = "") {
+function made(tag, name = '', text = '') {
   const element = document.createElement(tag);
   if (name) element.className = name;
   element.textContent = text;
@@ -244,18 +244,18 @@ function made(tag, name = "", text = "") {
 
 /** @param {string} label @param {number} min @param {number} max @param {number} value */
 function range(label, min, max, value) {
-  const input = /** @type {HTMLInputElement} */ (made("input"));
-  Object.assign(input, { type: "range", min, max, step: "any", value });
-  input.setAttribute("aria-label", label);
+  const input = /** @type {HTMLInputElement} */ (made('input'));
+  Object.assign(input, { type: 'range', min, max, step: 'any', value });
+  input.setAttribute('aria-label', label);
   return input;
 }
 
 /** @param {string} text @param {string} title @param {() => void} act */
 function button(text, title, act) {
-  const element = /** @type {HTMLButtonElement} */ (made("button", "", text));
-  element.type = "button";
+  const element = /** @type {HTMLButtonElement} */ (made('button', '', text));
+  element.type = 'button';
   element.title = title;
-  element.addEventListener("click", act);
+  element.addEventListener('click', act);
   return element;
 }
 
@@ -265,12 +265,12 @@ function drag(stage, hear) {
     const box = stage.getBoundingClientRect();
     hear(Math.min(1, Math.max(0, (event.clientX - box.left) / box.width)));
   };
-  stage.addEventListener("pointerdown", (event) => {
+  stage.addEventListener('pointerdown', (event) => {
     if (event.button !== 0) return;
     stage.setPointerCapture(event.pointerId);
     at(event);
   });
-  stage.addEventListener("pointermove", (event) => {
+  stage.addEventListener('pointermove', (event) => {
     if (stage.hasPointerCapture(event.pointerId)) at(event);
   });
 }
@@ -292,16 +292,16 @@ async function lutOf({ low, high, curve, lattice }) {
 
 /** @param {HTMLElement} root */
 async function start(root) {
-  root.dataset.ready = "";
-  const text = root.querySelector('script[type="application/json"]')?.textContent ?? "";
+  root.dataset.ready = '';
+  const text = root.querySelector('script[type="application/json"]')?.textContent ?? '';
   /** @type {Data} */
   const data = JSON.parse(text);
   const planes = await Promise.all(data.planes.map(unpacked));
-  const body = made("div", "mixer-body");
+  const body = made('div', 'mixer-body');
   new Mixer(body, data, planes, await lutOf(data.transform));
   root.append(body);
   root.hidden = false;
 }
 
-for (const root of document.querySelectorAll(".mixer:not([data-ready])"))
+for (const root of document.querySelectorAll('.mixer:not([data-ready])'))
   if (root instanceof HTMLElement) start(root);

@@ -50,52 +50,52 @@ export class Row {
     this.most = Math.ceil(Math.max(BRIGHTEST, ...stops));
     this.least = Math.floor(Math.min(DARKEST, ...stops.map((x) => x - 1)));
     const { name } = light;
-    this.element = element("div", "mixer-light");
-    this.thumb = document.createElement("canvas");
-    this.swatch = element("i", "mixer-swatch");
-    this.solo = this.toggle("S", `Solo: show ${name} alone`, () => (this.isSolo = !this.isSolo));
-    this.mute = this.toggle("M", `Mute: show all but ${name}`, () => (this.isMute = !this.isMute));
+    this.element = element('div', 'mixer-light');
+    this.thumb = document.createElement('canvas');
+    this.swatch = element('i', 'mixer-swatch');
+    this.solo = this.toggle('S', `Solo: show ${name} alone`, () => (this.isSolo = !this.isSolo));
+    this.mute = this.toggle('M', `Mute: show all but ${name}`, () => (this.isMute = !this.isMute));
     this.dimmer = slider(`${name}: stops from now`, this.least, this.most);
-    this.dimmed = element("output");
+    this.dimmed = element('output');
     this.white = slider(`${name}: colour temperature`, kelvins.coolest, kelvins.warmest);
-    this.whiteness = element("output");
+    this.whiteness = element('output');
     this.build();
   }
 
   build() {
     const { light, kelvins } = this;
-    this.element.setAttribute("role", "group");
-    this.element.setAttribute("aria-label", light.name);
-    this.thumb.setAttribute("aria-hidden", "true");
-    const head = element("div", "mixer-head");
-    const name = element("span", "mixer-name", light.name);
+    this.element.setAttribute('role', 'group');
+    this.element.setAttribute('aria-label', light.name);
+    this.thumb.setAttribute('aria-hidden', 'true');
+    const head = element('div', 'mixer-head');
+    const name = element('span', 'mixer-name', light.name);
     name.title = light.name;
-    const hear = element("span", "mixer-hear");
+    const hear = element('span', 'mixer-hear');
     hear.append(this.solo, this.mute);
     head.append(this.swatch, name, hear);
-    const body = element("div", "mixer-sliders");
+    const body = element('div', 'mixer-sliders');
     this.element.append(this.thumb, head, body);
     if (light.isFixed) {
-      body.append(element("small", "", "stays as it is in the scene"));
+      body.append(element('small', '', 'stays as it is in the scene'));
       return;
     }
     body.append(this.dimmer, this.dimmed);
-    this.dimmer.addEventListener("input", () => this.dim(Number(this.dimmer.value)));
-    this.dimmer.addEventListener("dblclick", () => this.dim(0));
+    this.dimmer.addEventListener('input', () => this.dim(Number(this.dimmer.value)));
+    this.dimmer.addEventListener('dblclick', () => this.dim(0));
     if (light.isScalar) return;
-    this.white.classList.add("is-white");
-    this.white.style.setProperty("--track", trackOf(kelvins));
+    this.white.classList.add('is-white');
+    this.white.style.setProperty('--track', trackOf(kelvins));
     body.append(this.white, this.whiteness);
-    this.white.addEventListener("input", () => this.turn(Number(this.white.value)));
+    this.white.addEventListener('input', () => this.turn(Number(this.white.value)));
   }
 
   /** @param {string} text @param {string} label @param {() => void} act */
   toggle(text, label, act) {
-    const button = /** @type {HTMLButtonElement} */ (element("button", "", text));
-    button.type = "button";
+    const button = /** @type {HTMLButtonElement} */ (element('button', '', text));
+    button.type = 'button';
     button.title = label;
-    button.setAttribute("aria-label", label);
-    button.addEventListener("click", () => {
+    button.setAttribute('aria-label', label);
+    button.addEventListener('click', () => {
       act();
       this.show();
       this.changed();
@@ -125,7 +125,7 @@ export class Row {
   reset(look) {
     const { light } = this;
     this.isSolo = this.isMute = false;
-    const other = look === "answer" ? light.present : light.answer;
+    const other = look === 'answer' ? light.present : light.answer;
     const known = [light[look], other].find((rgb) => luminance(rgb) > 0);
     this.hue = known ?? [1, 1, 1];
     this.rgb = light[look];
@@ -147,23 +147,23 @@ export class Row {
     const level = luminance(this.rgb);
     const stops = level > 0 ? Math.log2(level / this.level) : this.least;
     const told =
-      level > 0 ? `${stops < -0.005 ? "\u2212" : "+"}${Math.abs(stops).toFixed(2)}` : "off";
+      level > 0 ? `${stops < -0.005 ? '\u2212' : '+'}${Math.abs(stops).toFixed(2)}` : 'off';
     dimmer.value = String(stops);
-    dimmer.setAttribute("aria-valuetext", level > 0 ? `${told} stops` : "off");
+    dimmer.setAttribute('aria-valuetext', level > 0 ? `${told} stops` : 'off');
     dimmed.textContent = told;
     const { kelvin } = this;
-    const temperature = kelvin === null ? "own colour" : `${Math.round(kelvin / 10) * 10} K`;
+    const temperature = kelvin === null ? 'own colour' : `${Math.round(kelvin / 10) * 10} K`;
     const { coolest, warmest } = this.kelvins;
     const mired = kelvin === null ? (coolest + warmest) / 2 : 1e6 / kelvin;
     white.value = String(mired);
-    white.classList.toggle("is-none", kelvin === null);
-    white.setAttribute("aria-valuetext", temperature);
-    whiteness.textContent = kelvin === null ? "colour" : temperature;
-    swatch.style.background = level > 0 ? hexOf(this.rgb) : "none";
-    swatch.classList.toggle("is-off", !(level > 0));
-    solo.setAttribute("aria-pressed", String(this.isSolo));
-    mute.setAttribute("aria-pressed", String(this.isMute));
-    all.classList.toggle("is-mute", this.isMute);
+    white.classList.toggle('is-none', kelvin === null);
+    white.setAttribute('aria-valuetext', temperature);
+    whiteness.textContent = kelvin === null ? 'colour' : temperature;
+    swatch.style.background = level > 0 ? hexOf(this.rgb) : 'none';
+    swatch.classList.toggle('is-off', !(level > 0));
+    solo.setAttribute('aria-pressed', String(this.isSolo));
+    mute.setAttribute('aria-pressed', String(this.isMute));
+    all.classList.toggle('is-mute', this.isMute);
   }
 }
 
@@ -175,17 +175,17 @@ function hexOf(rgb) {
     const shown = light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055;
     return Math.round(255 * shown);
   });
-  return `rgb(${codes.join(" ")})`;
+  return `rgb(${codes.join(' ')})`;
 }
 
 /** @param {Kelvins} kelvins */
 function trackOf({ rgb, coolest, warmest }) {
   const places = Array.from({ length: 9 }, (_, k) => coolest + (k / 8) * (warmest - coolest));
-  return `linear-gradient(to right, ${places.map((mired) => hexOf(rgb(mired))).join(", ")})`;
+  return `linear-gradient(to right, ${places.map((mired) => hexOf(rgb(mired))).join(', ')})`;
 }
 
 /** @param {string} tag @param {string} [name] @param {string} [text] */
-function element(tag, name = "", text = "") {
+function element(tag, name = '', text = '') {
   const made = document.createElement(tag);
   if (name) made.className = name;
   made.textContent = text;
@@ -194,8 +194,8 @@ function element(tag, name = "", text = "") {
 
 /** @param {string} label @param {number} min @param {number} max */
 function slider(label, min, max) {
-  const input = document.createElement("input");
-  Object.assign(input, { type: "range", min, max, step: "any" });
-  input.setAttribute("aria-label", label);
+  const input = document.createElement('input');
+  Object.assign(input, { type: 'range', min, max, step: 'any' });
+  input.setAttribute('aria-label', label);
   return input;
 }

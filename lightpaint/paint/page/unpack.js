@@ -1,5 +1,5 @@
 /** Pictures that images/compact.py made small. */
-import { finite } from "./engine/half.js";
+import { finite } from './engine/half.js';
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,
  *   size: [height: number, width: number]}} Compact */
@@ -7,7 +7,7 @@ import { finite } from "./engine/half.js";
 /** The picture as halves (h, w, 3), over its scale.
  * @param {Compact} picture @returns {Promise<Uint16Array>} */
 export async function unpacked({ data, dropped, size: [height, width] }) {
-  const bytes = await inflated(data.slice(data.indexOf(",") + 1));
+  const bytes = await inflated(data.slice(data.indexOf(',') + 1));
   const count = height * width;
   const planes = [0, 1, 2].map((c) => toldBy(bytes, c * count, 3 * count, height, width));
   const [green, red, blue] = planes;
@@ -42,6 +42,6 @@ function toldBy(bytes, first, all, height, width) {
 /** @param {string} text base64 @returns {Promise<Uint8Array>} */
 async function inflated(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }

@@ -1,17 +1,17 @@
 /** The painter in a notebook: the same page, over the model of an anywidget. */
-import { mount } from "./app.js";
-import { openEngine } from "./engine/painter.js";
-import { ModelHost } from "./engine/model_host.js";
+import { mount } from './app.js';
+import { openEngine } from './engine/painter.js';
+import { ModelHost } from './engine/model_host.js';
 
 /** What anywidget calls for each place where the painter is shown; what it returns ends it.
  * @param {{model: import("./engine/model_host.js").Model, el: HTMLElement}} notebook */
 async function render({ model, el }) {
-  const style = document.createElement("style");
-  style.textContent = String(model.get("_sheet"));
-  const frame = document.createElement("div");
-  const size = () => (frame.style.height = `${Number(model.get("height"))}px`);
+  const style = document.createElement('style');
+  style.textContent = String(model.get('_sheet'));
+  const frame = document.createElement('div');
+  const size = () => (frame.style.height = `${Number(model.get('height'))}px`);
   size();
-  model.on("change:height", size);
+  model.on('change:height', size);
   // Inside the element, since some notebooks show it in a shadow root.
   el.append(style, frame);
   const host = new ModelHost(model);
@@ -19,7 +19,7 @@ async function render({ model, el }) {
   const painter = await mount(frame, host, { engine });
   host.open();
   return () => {
-    model.off("change:height", size);
+    model.off('change:height', size);
     painter.close();
     style.remove();
     frame.remove();

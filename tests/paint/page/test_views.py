@@ -232,6 +232,24 @@ def test_a_lost_context_comes_back_empty(page: Any, pictures: Any):
     assert lost == [True, False, 0]
 
 
+def test_without_a_gpu_the_view_is_chosen_that_is_faster_there(page: Any):
+    # WebGL2 in software says that it is slow; and where there is none, nothing else is left.
+    chosen = page.evaluate(
+        """async () => {
+            const { chooseView } = await import("/engine/choose.js");
+            const names = [chooseView(document.body, [30, 40], 3).name];
+            const real = HTMLCanvasElement.prototype.getContext;
+            HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+                return kind === "webgl2" ? null : real.call(this, kind, ...rest);
+            };
+            names.push(chooseView(document.body, [30, 40], 3).name);
+            HTMLCanvasElement.prototype.getContext = real;
+            return [...names, document.querySelectorAll("canvas").length];
+        }"""
+    )
+    assert chosen == ["cpu", "cpu", 2]
+
+
 @pytest.mark.parametrize("which", ["cpu", "gl"])
 def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, which: str):
     shown(page, which, pictures)

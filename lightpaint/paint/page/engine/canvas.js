@@ -5,9 +5,9 @@
  * before and from how far it is covered. So a stroke can change as long as it lasts (a line, a
  * drag that asks), and be dropped. What was before is kept in tiles, where the stroke has been.
  */
-import { changing } from "./effects.js";
-import { VALUES, toFloats } from "./half.js";
-import { union } from "./layer.js";
+import { changing } from './effects.js';
+import { VALUES, toFloats } from './half.js';
+import { union } from './layer.js';
 
 /** @typedef {import("./protocol.js").Region} Region */
 /** @typedef {import("./effects.js").Effect} Effect */

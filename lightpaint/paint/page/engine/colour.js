@@ -4,7 +4,7 @@
  * Kelvin is a place on Planck's locus; green is the distance from it in CIE 1960 (u, v), times
  * 1000, positive towards green (1000 Duv).
  */
-import { decodeSrgb, encodeSrgb } from "./lut.js";
+import { decodeSrgb, encodeSrgb } from './lut.js';
 
 /** @typedef {import("./protocol.js").RGB} RGB */
 
@@ -25,7 +25,7 @@ export function luminance(rgb) {
 export function toHex(rgb) {
   const most = Math.max(1, rgb[0], rgb[1], rgb[2]);
   const codes = [0, 1, 2].map((c) => Math.round(255 * encodeSrgb(rgb[c] / most)));
-  return `#${codes.map((code) => code.toString(16).padStart(2, "0")).join("")}`;
+  return `#${codes.map((code) => code.toString(16).padStart(2, '0')).join('')}`;
 }
 
 /** Linear light of `#ffaa66` or `#fa6`; null for what is no colour.
@@ -33,7 +33,7 @@ export function toHex(rgb) {
 export function ofHex(text) {
   const found = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim());
   if (!found) return null;
-  const digits = found[1].length === 6 ? found[1] : found[1].replace(/./g, "$&$&");
+  const digits = found[1].length === 6 ? found[1] : found[1].replace(/./g, '$&$&');
   return three((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255));
 }
 

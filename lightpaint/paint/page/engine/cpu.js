@@ -5,12 +5,12 @@
  * frame takes longer than the budget, every second row and column is mixed while the brush is
  * down, and all of them when it rests.
  */
-import { VALUES, finite, toFloats } from "./half.js";
-import { Layer } from "./layer.js";
-import { SRGB } from "./lut.js";
-import { Mix } from "./mix.js";
-import { INKS, falseColour, inked, missed } from "./overlay.js";
-import { GROUND, SQUARES, panes } from "./view.js";
+import { VALUES, finite, toFloats } from './half.js';
+import { Layer } from './layer.js';
+import { SRGB } from './lut.js';
+import { Mix } from './mix.js';
+import { INKS, falseColour, inked, missed } from './overlay.js';
+import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
 /** @typedef {import("./view.js").Params} Params */
@@ -23,11 +23,12 @@ export const BUDGET = 28;
 export class CpuView {
   /** @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size */
   constructor(canvas, size) {
-    this.name = /** @type {const} */ ("cpu");
+    this.name = /** @type {const} */ ('cpu');
     this.canvas = canvas;
     this.size = size;
-    const context = canvas.getContext("2d", { alpha: false });
-    if (!context) throw new Error("no canvas to draw on");
+    // Pixels come from the processor: a canvas of the GPU, or of one in software, would be slower.
+    const context = canvas.getContext('2d', { alpha: false, willReadFrequently: true });
+    if (!context) throw new Error('no canvas to draw on');
     this.context = context;
     /** @type {import("./mix.js").Plane[]} */
     this.planes = [];
@@ -59,21 +60,21 @@ export class CpuView {
   setPlane(light, halves, scale) {
     if (halves.length !== this.size[0] * this.size[1] * 3)
       throw new Error(
-        `a plane of ${halves.length} numbers on a picture of ${this.size.join(" × ")}`,
+        `a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`,
       );
     this.planes[light] = { halves: finite(halves), scale };
     for (const mix of Object.values(this.mixes)) mix.forget();
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
-  setWeights(weights, kind = "solution") {
+  setWeights(weights, kind = 'solution') {
     this.mixes[kind].weights = Float64Array.from(weights);
   }
 
   /** @param {Region} region @param {Float32Array} image @param {Float32Array} importance */
   setCanvas(region, image, importance) {
     this.importance = importance;
-    this.layer("painting").setLight(image, region);
+    this.layer('painting').setLight(image, region);
   }
 
   /** @param {'verified' | 'present'} kind @param {Uint16Array | null} halves */
@@ -99,7 +100,7 @@ export class CpuView {
     if (!params.live) this.step = 1;
     else if (!this.wasLive) this.step = this.pace > BUDGET ? 2 : 1;
     this.wasLive = params.live;
-    context.fillStyle = `rgb(${GROUND.join(" ")})`;
+    context.fillStyle = `rgb(${GROUND.join(' ')})`;
     context.fillRect(0, 0, canvas.width, canvas.height);
     for (const pane of panes(params, canvas, this.size)) {
       const layer = this.shown(pane.kind, params);
@@ -110,7 +111,7 @@ export class CpuView {
       context.clip();
       const isSharp = layer.step === 1;
       context.imageSmoothingEnabled = !(isSharp && (pane.scale >= SQUARES || pane.scale === 1));
-      context.imageSmoothingQuality = pane.scale < 0.75 && !params.live ? "medium" : "low";
+      context.imageSmoothingQuality = pane.scale < 0.75 && !params.live ? 'medium' : 'low';
       const scale = pane.scale * layer.step;
       const [height, width] = [layer.height * scale, layer.width * scale];
       context.drawImage(layer.canvas, pane.left, pane.top, width, height);
@@ -121,12 +122,12 @@ export class CpuView {
   /** The picture of a kind with its codes up to date; null where there is none.
    * @param {Kind} kind @param {Params} params @returns {Layer | null} */
   shown(kind, params) {
-    if (kind === "solution" || kind === "other") return this.mixed(kind, params);
+    if (kind === 'solution' || kind === 'other') return this.mixed(kind, params);
     const layer = this.layers.get(kind);
     if (!layer) return null;
-    const isImportance = kind === "painting" && params.overlay === "importance";
+    const isImportance = kind === 'painting' && params.overlay === 'importance';
     if (isImportance && layer.stale) layer.forget();
-    layer.show(this.lut, params.stops, isImportance ? "importance" : falseOnly(params), (rgba) => {
+    layer.show(this.lut, params.stops, isImportance ? 'importance' : falseOnly(params), (rgba) => {
       if (isImportance) inked(rgba, this.importance, 1, INKS.importance, this.grid(1));
       else falseColour(rgba, layer.light, 2 ** params.stops);
     });
@@ -140,15 +141,15 @@ export class CpuView {
     const isOther = mix.update(this.planes, this.step, params.live);
     const layer = this.layer(kind, this.step);
     if (isOther) layer.setLight(mix.light);
-    const wants = kind === "solution" ? params.overlay : falseOnly(params);
+    const wants = kind === 'solution' ? params.overlay : falseOnly(params);
     // What is missed depends on the painting, too.
-    if (wants === "missed") layer.forget();
-    const painting = wants === "missed" ? this.codesOfPainting(params) : null;
+    if (wants === 'missed') layer.forget();
+    const painting = wants === 'missed' ? this.codesOfPainting(params) : null;
     const { beyond } = this;
-    layer.show(this.lut, params.stops, wants === "importance" ? null : wants, (rgba) => {
+    layer.show(this.lut, params.stops, wants === 'importance' ? null : wants, (rgba) => {
       const grid = this.grid(this.step);
-      if (wants === "falsecolor") falseColour(rgba, layer.light, 2 ** params.stops);
-      else if (wants === "beyond" && beyond) inked(rgba, beyond, 255, INKS.beyond, grid);
+      if (wants === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops);
+      else if (wants === 'beyond' && beyond) inked(rgba, beyond, 255, INKS.beyond, grid);
       else if (painting) missed(rgba, painting, this.importance, grid);
     });
     if (isOther) this.pace = (performance.now() - started) * this.step ** 2;
@@ -157,7 +158,7 @@ export class CpuView {
 
   /** @param {Params} params */
   codesOfPainting(params) {
-    const layer = this.shown("painting", { ...params, overlay: null });
+    const layer = this.shown('painting', { ...params, overlay: null });
     return layer && layer.image.data;
   }
 
@@ -193,7 +194,7 @@ export class CpuView {
   /** @param {Kind} kind @param {number} x @param {number} y
    * @returns {[number, number, number]} */
   lightAt(kind, x, y) {
-    if (kind === "solution" || kind === "other")
+    if (kind === 'solution' || kind === 'other')
       return mixedAt(this.planesAt(x, y), this.mixes[kind].weights);
     const from = 3 * (y * this.size[1] + x);
     const light = this.layers.get(kind)?.light;
@@ -207,7 +208,7 @@ export class CpuView {
   memory() {
     const planes = this.planes.reduce((sum, { halves }) => sum + (halves?.byteLength ?? 0), 0);
     const layers = [...this.layers].reduce((sum, [kind, layer]) => {
-      const isOwn = kind === "verified" || kind === "present";
+      const isOwn = kind === 'verified' || kind === 'present';
       return sum + layer.memory() + (isOwn ? layer.light.byteLength : 0);
     }, 0);
     return planes + layers + this.mixes.solution.memory() + this.mixes.other.memory();
@@ -231,5 +232,5 @@ export function mixedAt(planes, weights) {
 
 /** @param {Params} params */
 function falseOnly(params) {
-  return params.overlay === "falsecolor" ? params.overlay : null;
+  return params.overlay === 'falsecolor' ? params.overlay : null;
 }

@@ -1,5 +1,5 @@
 /** What a stroke makes of the pixels that it covers. */
-import { VALUES } from "./half.js";
+import { VALUES } from './half.js';
 
 /** @typedef {import("./canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./canvas.js").Tile} Tile */
@@ -31,26 +31,26 @@ export function changing(canvas, effect) {
     importance[p] = before < 1 ? before + covered * (1 - before) : before;
   };
   switch (effect.kind) {
-    case "paint": {
+    case 'paint': {
       const { rgb } = effect;
-      const on = effect.as === "light" ? albedo : null;
+      const on = effect.as === 'light' ? albedo : null;
       return (tile, q, p, covered) => {
         towards(tile, q, p, covered, (c) => (on ? VALUES[on[3 * p + c]] * rgb[c] : rgb[c]));
         count(tile, q, p, covered);
       };
     }
-    case "erase":
+    case 'erase':
       return (tile, q, p, covered) => {
         towards(tile, q, p, covered, (c) => VALUES[present[3 * p + c]]);
         importance[p] = tile.importance[q] * (1 - covered);
       };
-    case "weigh":
+    case 'weigh':
       return (tile, q, p, covered) => {
         towards(tile, q, p, 0, () => 0);
         const before = tile.importance[q];
         importance[p] = before + covered * (effect.importance - before);
       };
-    case "ask": {
+    case 'ask': {
       const { gain, tint } = effect;
       return (tile, q, p, covered) => {
         const [r, g, b] = [tile.image[3 * q], tile.image[3 * q + 1], tile.image[3 * q + 2]];

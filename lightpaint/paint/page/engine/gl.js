@@ -4,10 +4,10 @@
  * The mix is a picture of its own, made when weights change; exposure, zoom and overlays are only
  * the last step. A lost context takes all that was set with it.
  */
-import { mixedAt } from "./cpu.js";
-import { Planes } from "./gpu.js";
-import { SRGB } from "./lut.js";
-import { GROUND, SQUARES, panes } from "./view.js";
+import { mixedAt } from './cpu.js';
+import { Planes } from './gpu.js';
+import { SRGB } from './lut.js';
+import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
 /** @typedef {import("./view.js").Params} Params */
@@ -22,24 +22,24 @@ export class GlView {
    * @param {{isSlowRefused?: boolean, onRestored?: () => void}} [options] isSlowRefused: whether
    * a context without a GPU is none */
   constructor(canvas, size, options = {}) {
-    this.name = /** @type {const} */ ("gl");
+    this.name = /** @type {const} */ ('gl');
     this.canvas = canvas;
     this.size = size;
-    const gl = canvas.getContext("webgl2", {
+    const gl = canvas.getContext('webgl2', {
       alpha: false,
       antialias: false,
       depth: false,
-      powerPreference: "high-performance",
+      powerPreference: 'high-performance',
       failIfMajorPerformanceCaveat: options.isSlowRefused ?? false,
     });
-    if (!gl) throw new Error("no WebGL2");
+    if (!gl) throw new Error('no WebGL2');
     this.gl = gl;
     this.isLost = false;
-    canvas.addEventListener("webglcontextlost", (event) => {
+    canvas.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();
       this.isLost = true;
     });
-    canvas.addEventListener("webglcontextrestored", () => {
+    canvas.addEventListener('webglcontextrestored', () => {
       this.isLost = false;
       this.planes = new Planes(gl, size);
       this.forget();
@@ -84,7 +84,7 @@ export class GlView {
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
-  setWeights(weights, kind = "solution") {
+  setWeights(weights, kind = 'solution') {
     this.planes.setWeights(weights, kind);
   }
 
@@ -97,8 +97,8 @@ export class GlView {
   setCanvas(region, image, importance) {
     if (image !== this.image) region = [0, this.size[0], 0, this.size[1]];
     this.image = image;
-    const texture = this.pictures.get("painting") ?? this.textures.halves();
-    this.pictures.set("painting", texture);
+    const texture = this.pictures.get('painting') ?? this.textures.halves();
+    this.pictures.set('painting', texture);
     this.textures.setCanvas(texture, region, image, importance);
   }
 
@@ -133,7 +133,7 @@ export class GlView {
     if (this.lost()) return;
     const shown = panes(params, canvas, this.size);
     for (const { kind } of shown)
-      if (kind === "solution" || kind === "other") this.planes.mix(kind);
+      if (kind === 'solution' || kind === 'other') this.planes.mix(kind);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.disable(gl.SCISSOR_TEST);
@@ -147,7 +147,7 @@ export class GlView {
 
   /** @param {Kind} kind */
   texture(kind) {
-    const isMix = kind === "solution" || kind === "other";
+    const isMix = kind === 'solution' || kind === 'other';
     return (isMix ? this.planes.mixes[kind].texture : this.pictures.get(kind)) ?? null;
   }
 
@@ -159,23 +159,23 @@ export class GlView {
     const { at } = this.planes.shower.use();
     const isSharp = pane.scale >= SQUARES || pane.scale === 1;
     const { nothing } = textures;
-    const units = [picture, this.pictures.get("painting") ?? nothing, this.beyond ?? nothing];
+    const units = [picture, this.pictures.get('painting') ?? nothing, this.beyond ?? nothing];
     units.forEach((texture, i) => textures.bind(i, gl.TEXTURE_2D, texture));
     textures.bind(3, gl.TEXTURE_3D, this.lattice ?? textures.black);
-    for (const [i, name] of ["picture", "painting", "beyond", "lattice"].entries())
+    for (const [i, name] of ['picture', 'painting', 'beyond', 'lattice'].entries())
       gl.uniform1i(at(name), i);
     const { shaper, lattice } = this.lut;
-    gl.uniform2f(at("size"), this.size[1], this.size[0]);
-    gl.uniform2f(at("corner"), pane.left, pane.top);
-    gl.uniform1f(at("scale"), pane.scale);
-    gl.uniform1f(at("above"), canvas.height);
-    gl.uniform1f(at("gain"), 2 ** params.stops);
-    gl.uniform1f(at("side"), shaper.side);
-    gl.uniform2f(at("shaper"), shaper.low, shaper.high);
-    gl.uniform1i(at("isSrgb"), Number(!lattice));
-    gl.uniform1i(at("isSharp"), Number(isSharp));
-    gl.uniform1i(at("isSmall"), Number(pane.scale < 0.75));
-    gl.uniform1i(at("overlay"), overlayOf(pane.kind, params));
+    gl.uniform2f(at('size'), this.size[1], this.size[0]);
+    gl.uniform2f(at('corner'), pane.left, pane.top);
+    gl.uniform1f(at('scale'), pane.scale);
+    gl.uniform1f(at('above'), canvas.height);
+    gl.uniform1f(at('gain'), 2 ** params.stops);
+    gl.uniform1f(at('side'), shaper.side);
+    gl.uniform2f(at('shaper'), shaper.low, shaper.high);
+    gl.uniform1i(at('isSrgb'), Number(!lattice));
+    gl.uniform1i(at('isSharp'), Number(isSharp));
+    gl.uniform1i(at('isSmall'), Number(pane.scale < 0.75));
+    gl.uniform1i(at('overlay'), overlayOf(pane.kind, params));
     gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
@@ -200,10 +200,10 @@ export class GlView {
   /** @param {Kind} kind @param {number} x @param {number} y
    * @returns {[number, number, number]} */
   lightAt(kind, x, y) {
-    if (kind === "solution" || kind === "other")
+    if (kind === 'solution' || kind === 'other')
       return mixedAt(this.planesAt(x, y), this.planes.mixes[kind].weights);
     const from = 3 * (y * this.size[1] + x);
-    if (kind === "painting" && this.image)
+    if (kind === 'painting' && this.image)
       return [this.image[from], this.image[from + 1], this.image[from + 2]];
     const texture = this.texture(kind);
     if (!texture) return [0, 0, 0];
@@ -222,7 +222,7 @@ export class GlView {
   }
 
   close() {
-    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
+    this.gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 }
 
@@ -230,7 +230,7 @@ export class GlView {
 function overlayOf(kind, { overlay }) {
   if (!overlay) return 0;
   const isHere =
-    overlay === "falsecolor" ||
-    (overlay === "importance" ? kind === "painting" : kind === "solution");
+    overlay === 'falsecolor' ||
+    (overlay === 'importance' ? kind === 'painting' : kind === 'solution');
   return isHere ? OVERLAYS[overlay] : 0;
 }

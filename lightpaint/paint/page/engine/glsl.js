@@ -1,7 +1,7 @@
 /** What gl.js runs on the GPU. Numbers come from overlay.js, so that there is one of each. */
-import { LARGEST } from "./half.js";
-import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from "./overlay.js";
-import { GROUND } from "./view.js";
+import { LARGEST } from './half.js';
+import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from './overlay.js';
+import { GROUND } from './view.js';
 
 const HEAD = `#version 300 es
 precision highp float;
@@ -43,7 +43,7 @@ void main() {
 }`;
 
 /** @param {number[]} codes */
-const vec3 = (codes) => `vec3(${codes.map((code) => (code / 255).toFixed(6)).join(", ")})`;
+const vec3 = (codes) => `vec3(${codes.map((code) => (code / 255).toFixed(6)).join(', ')})`;
 
 /** A pane: light through the view transform, and what is laid over it. */
 export const SHOW = `${HEAD}
@@ -64,9 +64,9 @@ uniform bool isSmall;
 uniform int overlay;
 out vec4 shown;
 
-const vec3 LUMA = vec3(${LUMA.join(", ")});
+const vec3 LUMA = vec3(${LUMA.join(', ')});
 const vec3 BANDS[${BANDS.length}] = vec3[](
-  ${BANDS.map(vec3).join(",\n  ")}
+  ${BANDS.map(vec3).join(',\n  ')}
 );
 
 vec3 encode(vec3 light) {

@@ -1,6 +1,6 @@
 /** Planes and mixes on a GPU: what one life of a WebGL2 context holds of the lights. */
-import { MIX, PROBE, SHOW, VERTEX } from "./glsl.js";
-import { Textures, program } from "./textures.js";
+import { MIX, PROBE, SHOW, VERTEX } from './glsl.js';
+import { Textures, program } from './textures.js';
 
 /** @typedef {{weights: Float64Array, texture: WebGLTexture | null, isStale: boolean}} Mixed */
 
@@ -13,11 +13,11 @@ export class Planes {
   constructor(gl, size) {
     this.gl = gl;
     this.size = size;
-    const isFloat = gl.getExtension("EXT_color_buffer_float");
-    if (!isFloat && !gl.getExtension("EXT_color_buffer_half_float"))
-      throw new Error("this WebGL2 does not render to halves");
+    const isFloat = gl.getExtension('EXT_color_buffer_float');
+    if (!isFloat && !gl.getExtension('EXT_color_buffer_half_float'))
+      throw new Error('this WebGL2 does not render to halves');
     if (Math.max(...size) > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-      throw new Error(`this WebGL2 holds no picture of ${size.join(" × ")}`);
+      throw new Error(`this WebGL2 holds no picture of ${size.join(' × ')}`);
     this.mixer = program(gl, VERTEX, MIX);
     this.shower = program(gl, VERTEX, SHOW);
     this.prober = program(gl, VERTEX, PROBE);
@@ -51,14 +51,14 @@ export class Planes {
     for (let first = 0; first < count; first += most)
       this.slices.push(textures.planes(Math.min(most, count - first)));
     this.mixes = { solution: mixed(count), other: mixed(count) };
-    if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error("the GPU has no room for the planes");
+    if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error('the GPU has no room for the planes');
   }
 
   /** @param {number} light @param {Uint16Array} halves @param {number} scale */
   setPlane(light, halves, scale) {
     if (halves.length !== this.size[0] * this.size[1] * 3)
       throw new Error(
-        `a plane of ${halves.length} numbers on a picture of ${this.size.join(" × ")}`,
+        `a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`,
       );
     const slice = this.slices[Math.floor(light / this.perSlice)];
     this.textures.setPlane(slice, light % this.perSlice, halves);
@@ -67,7 +67,7 @@ export class Planes {
   }
 
   /** @param {ArrayLike<number>} weights @param {'solution' | 'other'} [kind] */
-  setWeights(weights, kind = "solution") {
+  setWeights(weights, kind = 'solution') {
     this.mixes[kind].weights = Float64Array.from(weights);
     this.mixes[kind].isStale = true;
   }
@@ -83,8 +83,8 @@ export class Planes {
     for (let k = 0; k < count; k++)
       for (let c = 0; c < 3; c++) scaled[4 * k + c] = mix.weights[3 * k + c] * this.scales[k];
     this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaled));
-    gl.uniform1i(at("planes"), 0);
-    gl.uniform1i(at("weights"), 1);
+    gl.uniform1i(at('planes'), 0);
+    gl.uniform1i(at('weights'), 1);
     this.onto(mix.texture, this.size[1], this.size[0]);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
@@ -92,8 +92,8 @@ export class Planes {
     gl.blendFunc(gl.ONE, gl.ONE);
     this.slices.forEach((slice, i) => {
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
-      gl.uniform1i(at("first"), i * perSlice);
-      gl.uniform1i(at("count"), Math.min(perSlice, count - i * perSlice));
+      gl.uniform1i(at('first'), i * perSlice);
+      gl.uniform1i(at('count'), Math.min(perSlice, count - i * perSlice));
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.disable(gl.BLEND);
@@ -116,8 +116,8 @@ export class Planes {
     const { gl, count, perSlice } = this;
     const made = new Float32Array(3 * count);
     const { at } = this.prober.use();
-    gl.uniform1i(at("planes"), 0);
-    gl.uniform2i(at("at"), x, y);
+    gl.uniform1i(at('planes'), 0);
+    gl.uniform2i(at('at'), x, y);
     this.slices.forEach((slice, i) => {
       const here = Math.min(perSlice, count - i * perSlice);
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);

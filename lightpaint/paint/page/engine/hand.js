@@ -1,8 +1,8 @@
 /**
  * The tool in the hand: what a stroke of it does to the canvas, from where it begins to its end.
  */
-import { Path, fill, flood, stamp } from "./brush.js";
-import { warmer } from "./colour.js";
+import { Path, fill, flood, stamp } from './brush.js';
+import { warmer } from './colour.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./effects.js").Effect} Effect */
@@ -26,9 +26,9 @@ const MOST_STOPS = 8;
 
 /** @type {Use} */
 export const FIRST = {
-  tool: "brush",
+  tool: 'brush',
   rgb: [1, 1, 1],
-  as: "look",
+  as: 'look',
   size: 60,
   hardness: 0.5,
   flow: 1,
@@ -37,19 +37,19 @@ export const FIRST = {
 
 /** What undo calls a stroke. @type {Record<Tool, string>} */
 export const LABELS = {
-  brush: "brush",
-  eraser: "eraser",
-  weight: "importance",
-  pick: "pick",
-  fill: "fill",
-  line: "line",
-  ask: "ask",
+  brush: 'brush',
+  eraser: 'eraser',
+  weight: 'importance',
+  pick: 'pick',
+  fill: 'fill',
+  line: 'line',
+  ask: 'ask',
 };
 
 /** What brighter and warmer light is. @param {number} stops @param {number} mired
  * @returns {Effect} */
 export function asking(stops, mired) {
-  return { kind: "ask", gain: 2 ** stops, tint: warmer(mired) };
+  return { kind: 'ask', gain: 2 ** stops, tint: warmer(mired) };
 }
 
 /** One stroke. Its methods say what they have changed. */
@@ -71,13 +71,13 @@ export class Stroke {
   /** @returns {Region[]} */
   begin() {
     const { canvas, use, start } = this;
-    if (use.tool === "fill") {
+    if (use.tool === 'fill') {
       const object = canvas.objectAt(start.x, start.y);
       return this.applied([fill(canvas, object, use.flow)]);
     }
-    if (use.tool !== "ask") return this.applied(this.path.to(start));
+    if (use.tool !== 'ask') return this.applied(this.path.to(start));
     const object = canvas.objectAt(start.x, start.y);
-    if (use.about === "object" && object >= 0) fill(canvas, object, 1);
+    if (use.about === 'object' && object >= 0) fill(canvas, object, 1);
     else stamp(canvas, { ...start, pressure: 1 }, { size: 2 * use.size, hardness: 0, flow: 1 });
     return [];
   }
@@ -86,9 +86,9 @@ export class Stroke {
   move(points) {
     const { tool } = this.use;
     const last = points.at(-1);
-    if (!last || tool === "fill") return [];
-    if (tool === "ask") return this.ask(last);
-    if (tool === "line") return this.line(last);
+    if (!last || tool === 'fill') return [];
+    if (tool === 'ask') return this.ask(last);
+    if (tool === 'line') return this.line(last);
     return this.applied(points.flatMap((point) => this.path.to(point)));
   }
 
@@ -134,10 +134,10 @@ export function askFor(canvas, { stops, mired, object }) {
 
 /** @param {Use} use @returns {Effect} */
 function effectOf(use) {
-  if (use.tool === "eraser") return { kind: "erase" };
-  if (use.tool === "weight") return { kind: "weigh", importance: use.importance };
-  if (use.tool === "ask") return asking(0, 0);
-  return { kind: "paint", rgb: use.rgb, as: use.as };
+  if (use.tool === 'eraser') return { kind: 'erase' };
+  if (use.tool === 'weight') return { kind: 'weigh', importance: use.importance };
+  if (use.tool === 'ask') return asking(0, 0);
+  return { kind: 'paint', rgb: use.rgb, as: use.as };
 }
 
 /** Regions in a few, of which none lies within another: stamps overlap, and each of them would

@@ -4,7 +4,7 @@
  * Every message has a number, and is answered by one that gives it back. A lost connection is
  * made anew, and begins with `hello`.
  */
-import { VERSION, frame, pictureOf, unframe } from "./protocol.js";
+import { VERSION, frame, pictureOf, unframe } from './protocol.js';
 
 /** @typedef {import("./protocol.js").Arrays} Arrays */
 /** @typedef {import("./protocol.js").Message} Message */
@@ -24,7 +24,7 @@ import { VERSION, frame, pictureOf, unframe } from "./protocol.js";
  */
 
 /** What does not wait for strokes that are on their way. */
-export const AT_ONCE = ["paint", "drop", "hello", "take_over", "fetch"];
+export const AT_ONCE = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
 
 /** Who hears what: the part that all hosts share. */
 export class Hearers {
@@ -60,7 +60,7 @@ export class SocketHost extends Hearers {
   /** Where the page came from. @param {string | URL} [base] */
   constructor(base = document.baseURI) {
     super();
-    this.base = new URL(".", base);
+    this.base = new URL('.', base);
     /** By which the session knows this page when it is back. */
     this.page = crypto.randomUUID?.() ?? String(Math.random());
     this.seq = 0;
@@ -79,12 +79,12 @@ export class SocketHost extends Hearers {
   /** Connect, now and whenever the connection is lost. */
   open() {
     const url = new URL(`live?page=${this.page}`, this.base);
-    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
     const socket = new WebSocket(url);
-    socket.binaryType = "arraybuffer";
+    socket.binaryType = 'arraybuffer';
     this.socket = socket;
     socket.onopen = () => {
-      this.send("hello", { version: VERSION }).catch(() => {});
+      this.send('hello', { version: VERSION }).catch(() => {});
     };
     socket.onmessage = ({ data }) => this.receive(unframe(data));
     socket.onclose = () => this.dropped(socket);
@@ -94,11 +94,11 @@ export class SocketHost extends Hearers {
   dropped(socket) {
     if (socket !== this.socket) return;
     this.socket = null;
-    const gone = new Error("the connection to the painter is lost");
+    const gone = new Error('the connection to the painter is lost');
     for (const { reject } of this.asked.values()) reject(gone);
     this.asked.clear();
     if (this.isOver) return;
-    this.tell("connection", { kind: "connection", state: "lost" });
+    this.tell('connection', { kind: 'connection', state: 'lost' });
     this.timer = setTimeout(() => this.open(), this.wait);
     this.wait = Math.min(WAITS.most, 2 * this.wait);
   }
@@ -106,16 +106,16 @@ export class SocketHost extends Hearers {
   /** @param {Message} message */
   receive(message) {
     const { kind, reply } = message;
-    if (kind === "state" || kind === "renewed")
+    if (kind === 'state' || kind === 'renewed')
       this.generations = { ...this.generations, ...message.resources };
-    if (kind === "state") {
+    if (kind === 'state') {
       this.generations = { ...message.resources };
       this.wait = WAITS.first;
     }
     // Who is of another version, or has been told to leave, does not come back by itself.
-    if (kind === "closed" && message.reason === "version") this.isOver = true;
+    if (kind === 'closed' && message.reason === 'version') this.isOver = true;
     this.tell(kind, message);
-    if (kind === "state") this.tell("connection", { kind: "connection", state: "open" });
+    if (kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' });
     if (reply === undefined) return;
     this.asked.get(reply)?.resolve(message);
     this.asked.delete(reply);
@@ -128,7 +128,7 @@ export class SocketHost extends Hearers {
     if (isOpen && !AT_ONCE.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
       if (this.socket?.readyState !== WebSocket.OPEN)
-        return reject(new Error("there is no connection to the painter"));
+        return reject(new Error('there is no connection to the painter'));
       const seq = ++this.seq;
       this.asked.set(seq, { resolve, reject });
       this.socket.send(frame({ kind, seq, ...fields }, arrays));
@@ -137,14 +137,14 @@ export class SocketHost extends Hearers {
 
   /** @param {string} name @returns {Promise<Picture>} */
   async fetch(name) {
-    const path = name.split("/").map(encodeURIComponent).join("/");
+    const path = name.split('/').map(encodeURIComponent).join('/');
     const url = new URL(`data/${path}`, this.base);
     const generation = this.generations[name];
-    if (generation !== undefined) url.searchParams.set("g", String(generation));
-    const response = await fetch(url, { credentials: "same-origin" });
+    if (generation !== undefined) url.searchParams.set('g', String(generation));
+    const response = await fetch(url, { credentials: 'same-origin' });
     if (!response.ok) throw new Error(`${name}: ${await response.text()}`);
-    const shape = (response.headers.get("x-shape") ?? "").split(",").map(Number);
-    const dtype = response.headers.get("x-dtype") ?? "";
+    const shape = (response.headers.get('x-shape') ?? '').split(',').map(Number);
+    const dtype = response.headers.get('x-dtype') ?? '';
     return pictureOf(dtype, shape, await response.arrayBuffer());
   }
 

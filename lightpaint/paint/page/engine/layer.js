@@ -1,5 +1,5 @@
 /** One picture as the CPU shows it: its light, its codes, and a canvas with them. */
-import { Encoder, SRGB } from "./lut.js";
+import { Encoder, SRGB } from './lut.js';
 
 /** @typedef {import("./protocol.js").Region} Region */
 
@@ -13,11 +13,11 @@ export class Layer {
     /** @type {Float32Array} */
     this.light = new Float32Array(0);
     this.image = new ImageData(this.width, this.height);
-    this.canvas = document.createElement("canvas");
+    this.canvas = document.createElement('canvas');
     this.canvas.width = this.width;
     this.canvas.height = this.height;
-    const context = this.canvas.getContext("2d", { alpha: false });
-    if (!context) throw new Error("no canvas to draw on");
+    const context = this.canvas.getContext('2d', { alpha: false, willReadFrequently: true });
+    if (!context) throw new Error('no canvas to draw on');
     this.context = context;
     this.encoder = new Encoder(SRGB, 0);
     /** What of the codes is to be made anew. @type {Region | null} */

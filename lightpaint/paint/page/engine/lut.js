@@ -5,34 +5,31 @@
  * for all light below 2^low. In between it is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
  * Where no display value depends on another channel, one curve stands for the lattice.
  */
-import { VALUES } from "./half.js";
+import { VALUES } from './half.js';
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 /** @typedef {import("./protocol.js").Shaper} Shaper */
 
 /** lattice: (side, side, side, 3) display values, axes r, g, b; of sRGB null.
- * codes: the same times 255. curve: (side,) where it is one for all channels, else null.
- * @typedef {{shaper: Shaper, lattice: Float32Array | null, codes: Float32Array | null,
- *   curve: Float32Array | null}} Lut */
+ * curve: (side,) where it is one for all channels, else null.
+ * @typedef {{shaper: Shaper, lattice: Float32Array | null, curve: Float32Array | null}} Lut */
 
 /** Exact, and what is shown until another one is there. @type {Readonly<Lut>} */
 export const SRGB = Object.freeze({
   shaper: { side: 2, low: -16, high: 0 },
   lattice: null,
-  codes: null,
   curve: null,
 });
 
 /** @param {string} name of the transform @param {Picture} picture float16 @param {Shaper} shaper
  * @returns {Lut} */
 export function lutOf(name, picture, shaper) {
-  if (name === "srgb") return SRGB;
+  if (name === 'srgb') return SRGB;
   const { data } = picture;
   if (data.length !== shaper.side ** 3 * 3)
     throw new Error(`a lattice of ${data.length} numbers, not of ${shaper.side}³ colours`);
   const lattice = Float32Array.from(data, (bits) => VALUES[bits]);
-  const codes = lattice.map((value) => 255 * value);
-  return { shaper, lattice, codes, curve: curveOf(lattice, shaper.side) };
+  return { shaper, lattice, curve: curveOf(lattice, shaper.side) };
 }
 
 /** Display value in [0, 1] of light in [0, 1], by IEC 61966-2-1. @param {number} light */
@@ -68,6 +65,8 @@ export class Encoder {
     float[0] = 2 ** Math.min(127, Math.ceil(high - stops));
     const length = (bits[0] >> SHIFT) - this.first + 1;
     this.isCurve = !lut.lattice || !!lut.curve;
+    /** The lattice as codes, where it is needed. */
+    this.codes = !this.isCurve && lut.lattice ? lut.lattice.map((value) => 255 * value) : null;
     this.table = this.isCurve ? new Uint8ClampedArray(length) : new Float32Array(length);
     for (let i = 0; i < length; i++) {
       bits[0] = ((this.first + i) << SHIFT) | (1 << (SHIFT - 1)); // the middle of the step
@@ -116,7 +115,7 @@ export class Encoder {
    * @param {number} to */
   mixed(bits, rgba, from, to) {
     const { table, first } = this;
-    const codes = /** @type {Float32Array} */ (this.lut.codes);
+    const codes = /** @type {Float32Array} */ (this.codes);
     const side = this.lut.shaper.side;
     const last = table.length - 1;
     const red = side * side * 3;

@@ -1,5 +1,5 @@
 /** Pictures that lights make together: Σ weights[k] · plane[k], without a GPU. */
-import { VALUES } from "./half.js";
+import { VALUES } from './half.js';
 
 /** @typedef {{halves: Uint16Array | null, scale: number}} Plane (h, w, 3), light at unit emission
  *   over scale */
@@ -70,7 +70,7 @@ export class Mix {
    * @param {boolean} fresh */
   add(planes, which, weights, fresh) {
     const [height, width] = this.sizeAt(this.step);
-    const name = this.step === 1 ? "full" : "half";
+    const name = this.step === 1 ? 'full' : 'half';
     if (this[name].length !== height * width * 3) this[name] = new Float32Array(height * width * 3);
     const terms = [];
     for (const k of which) {

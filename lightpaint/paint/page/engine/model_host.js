@@ -1,6 +1,6 @@
 /** The session behind a notebook's model: messages as they are, with their buffers beside them. */
-import { AT_ONCE, Hearers } from "./host.js";
-import { VERSION, described, pictureOf } from "./protocol.js";
+import { AT_ONCE, Hearers } from './host.js';
+import { VERSION, described, pictureOf } from './protocol.js';
 
 /** @typedef {import("./host.js").Host} Host */
 /** @typedef {import("./protocol.js").Arrays} Arrays */
@@ -29,12 +29,12 @@ export class ModelHost extends Hearers {
     this.asked = new Map();
     /** @type {(content: any, buffers: DataView[]) => void} */
     this.hear = (content, buffers) => this.receive(content, buffers);
-    model.on("msg:custom", this.hear);
+    model.on('msg:custom', this.hear);
   }
 
   /** Ask for all there is. */
   open() {
-    this.send("hello", { version: VERSION }).catch(() => {});
+    this.send('hello', { version: VERSION }).catch(() => {});
   }
 
   /** @param {any} content @param {DataView[]} buffers */
@@ -56,7 +56,7 @@ export class ModelHost extends Hearers {
     );
     const message = /** @type {Message} */ ({ ...content, arrays });
     this.tell(message.kind, message);
-    if (message.kind === "state") this.tell("connection", { kind: "connection", state: "open" });
+    if (message.kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' });
     if (message.reply === undefined) return;
     this.asked.get(message.reply)?.resolve(message);
     this.asked.delete(message.reply);
@@ -80,14 +80,14 @@ export class ModelHost extends Hearers {
 
   /** @param {string} name @returns {Promise<Picture>} */
   async fetch(name) {
-    const message = await this.send("fetch", { name });
-    if (message.kind === "failed") throw new Error(`${name}: ${message.text}`);
+    const message = await this.send('fetch', { name });
+    if (message.kind === 'failed') throw new Error(`${name}: ${message.text}`);
     return message.arrays.data;
   }
 
   close() {
-    this.model.off("msg:custom", this.hear);
-    for (const { reject } of this.asked.values()) reject(new Error("the painter is closed"));
+    this.model.off('msg:custom', this.hear);
+    for (const { reject } of this.asked.values()) reject(new Error('the painter is closed'));
     this.asked.clear();
   }
 }

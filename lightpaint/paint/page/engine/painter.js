@@ -4,13 +4,13 @@
  * It holds the painting, shows the pictures, turns what the hand does into strokes, and follows
  * what the session says of pixels and weights.
  */
-import { luminance } from "./colour.js";
-import { FIRST, LABELS, Stroke, askFor } from "./hand.js";
-import { Hearers, SocketHost } from "./host.js";
-import { union } from "./layer.js";
-import { Screen } from "./screen.js";
-import { at, zoomed } from "./view.js";
-import { Work } from "./work.js";
+import { luminance } from './colour.js';
+import { FIRST, LABELS, Stroke, askFor } from './hand.js';
+import { Hearers, SocketHost } from './host.js';
+import { union } from './layer.js';
+import { Screen } from './screen.js';
+import { at, zoomed } from './view.js';
+import { Work } from './work.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./hand.js").Use} Use */
@@ -30,8 +30,8 @@ export function openHost() {
 /** @param {Host} host @param {{view?: 'gl' | 'cpu' | null}} [options]
  * @returns {Painter} */
 export function openEngine(host, options = {}) {
-  const asked = new URLSearchParams(location.search).get("view");
-  const view = options.view ?? (asked === "gl" || asked === "cpu" ? asked : null);
+  const asked = new URLSearchParams(location.search).get('view');
+  const view = options.view ?? (asked === 'gl' || asked === 'cpu' ? asked : null);
   return new Painter(host, { view });
 }
 
@@ -39,8 +39,8 @@ export class Painter extends Hearers {
   /** @param {Host} host @param {{view: 'gl' | 'cpu' | null}} options */
   constructor(host, { view }) {
     super();
-    this.element = document.createElement("div");
-    this.element.className = "pictures";
+    this.element = document.createElement('div');
+    this.element.className = 'pictures';
     this.screen = new Screen(this.element, { view, refill: () => this.work.refill() });
     this.work = new Work(host, this.screen, (kind, event) => this.tell(kind, event));
     /** @type {Stroke | null} */
@@ -131,7 +131,7 @@ export class Painter extends Hearers {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || this.hand.tool === "pick") return;
+    if (!place || this.hand.tool === 'pick') return;
     const scale = this.panes()[0]?.scale ?? 1;
     this.stroke = new Stroke(place.canvas, this.hand, point, scale);
     this.work.isPainting = true;
@@ -143,14 +143,14 @@ export class Painter extends Hearers {
   move(points) {
     if (!this.stroke) return;
     this.touched(this.stroke.move(points));
-    if (this.stroke.use.tool === "ask") this.tell("asking", this.stroke.asked);
+    if (this.stroke.use.tool === 'ask') this.tell('asking', this.stroke.asked);
   }
 
   end() {
     const { stroke, place } = this;
     if (!stroke || !place) return;
     const { stops, mired } = stroke.asked;
-    if (stroke.use.tool === "ask" && !stops && !mired) return this.cancel();
+    if (stroke.use.tool === 'ask' && !stops && !mired) return this.cancel();
     this.ended();
     place.canvas.end();
     place.strokes.end(LABELS[stroke.use.tool]);

@@ -48,9 +48,9 @@ const DTYPES = {
 export function pictureOf(dtype, shape, buffer, at = 0) {
   const made = DTYPES[dtype];
   const length = shape.reduce((a, b) => a * b, 1);
-  if (!made) throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(", ")}`);
+  if (!made) throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(', ')}`);
   if (at + length * made.BYTES_PER_ELEMENT > buffer.byteLength)
-    throw new Error(`${buffer.byteLength} bytes are no array of shape ${shape.join(" × ")}`);
+    throw new Error(`${buffer.byteLength} bytes are no array of shape ${shape.join(' × ')}`);
   return { data: new made(buffer, at, length), shape };
 }
 
@@ -58,8 +58,8 @@ export function pictureOf(dtype, shape, buffer, at = 0) {
  * @param {Data} data */
 export function dtypeOf(data) {
   for (const [name, made] of Object.entries(DTYPES))
-    if (name !== "float16" && data instanceof made) return name;
-  throw new Error("an array that no message holds");
+    if (name !== 'float16' && data instanceof made) return name;
+  throw new Error('an array that no message holds');
 }
 
 /** What `buffers` says of some arrays.
@@ -96,7 +96,7 @@ export function frame(content, arrays = {}) {
  * @param {ArrayBuffer} buffer @returns {Message} */
 export function unframe(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
-  if (4 + length > buffer.byteLength) throw new Error("a frame that is cut short");
+  if (4 + length > buffer.byteLength) throw new Error('a frame that is cut short');
   const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   return withArrays(content, buffer, padded(4 + length));
 }

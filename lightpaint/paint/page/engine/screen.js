@@ -1,6 +1,6 @@
 /** Where the pictures are drawn: one view, its size in device pixels, and when it draws. */
-import { chooseView } from "./choose.js";
-import { DEFAULTS, panes } from "./view.js";
+import { chooseView } from './choose.js';
+import { DEFAULTS, panes } from './view.js';
 
 /** @typedef {import("./view.js").PictureView} PictureView */
 /** @typedef {import("./view.js").Params} Params */
@@ -30,6 +30,8 @@ export class Screen {
     this.height = 0;
     this.frame = 0;
     this.isLive = false;
+    /** Whether the solution is the present look. */
+    this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.rest = undefined;
     /** Milliseconds that a GPU has to come back. */
@@ -48,7 +50,7 @@ export class Screen {
     this.count = count;
     const onRestored = () => this.restored();
     this.view = chooseView(this.element, size, count, { view: which, onRestored });
-    this.view.canvas.addEventListener("webglcontextlost", () => this.lost());
+    this.view.canvas.addEventListener('webglcontextlost', () => this.lost());
     this.fit();
   }
 
@@ -56,7 +58,7 @@ export class Screen {
   lost() {
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => {
-      this.begin(this.size, this.count, "cpu");
+      this.begin(this.size, this.count, 'cpu');
       this.options.refill();
     }, this.patience);
   }
@@ -78,7 +80,7 @@ export class Screen {
   fit() {
     if (!this.view) return;
     const { canvas } = this.view;
-    canvas.style.display = "block";
+    canvas.style.display = 'block';
     canvas.style.width = `${this.width}px`;
     canvas.style.height = `${this.height}px`;
     const [width, height] = [this.width, this.height].map((n) =>
@@ -117,7 +119,14 @@ export class Screen {
   now() {
     cancelAnimationFrame(this.frame);
     this.frame = 0;
-    this.view?.draw({ ...this.params, live: this.isLive });
+    const { left, right } = this.params;
+    const shown = { left: this.standIn(left), right: this.standIn(right) };
+    this.view?.draw({ ...this.params, ...shown, live: this.isLive });
+  }
+
+  /** The picture that is shown for another. @param {import('./view.js').Kind} kind */
+  standIn(kind) {
+    return kind === 'solution' && this.isPresent ? 'present' : kind;
   }
 
   close() {

@@ -4,7 +4,7 @@
  * What changes in the meantime is sent together with the next one. A stroke that is done is kept
  * until the session has said that it has it, and sent again, whole, after a lost connection.
  */
-import { union } from "./layer.js";
+import { union } from './layer.js';
 
 /** @typedef {import("./protocol.js").Region} Region */
 /** @typedef {import("./protocol.js").Arrays} Arrays */
@@ -37,12 +37,12 @@ export class Strokes {
     /** Whether the next patch is of a stroke that the canvas has dropped already. */
     this.isDropping = false;
     host.gate = () => this.settled();
-    host.on("connection", ({ state }) => this.connected(state === "open"));
+    host.on('connection', ({ state }) => this.connected(state === 'open'));
     // With another basis, a session begins anew with what is done.
-    host.on("renewed", () => {
+    host.on('renewed', () => {
       if (this.live) this.live.dirty = this.live.whole;
     });
-    host.on("state", ({ stroke }) => {
+    host.on('state', ({ stroke }) => {
       this.count = Math.max(this.count, Number(stroke) || 0);
     });
   }
@@ -108,7 +108,7 @@ export class Strokes {
     this.isOpen = isOpen;
     if (!isOpen) {
       // What of them was heard nobody knows.
-      for (const one of this.left) if (!("isDropped" in one)) one.cut = one.whole;
+      for (const one of this.left) if (!('isDropped' in one)) one.cut = one.whole;
       if (this.live) this.live.dirty = this.live.whole;
     }
     this.pump();
@@ -118,15 +118,15 @@ export class Strokes {
   pump() {
     if (this.isBusy || !this.isOpen || this.isOver) return;
     const [next] = this.left;
-    if (next && "isDropped" in next) this.send("drop", { stroke: next.stroke }, {}, next);
+    if (next && 'isDropped' in next) this.send('drop', { stroke: next.stroke }, {}, next);
     else if (next) {
       const { stroke, cut, label } = next;
-      this.send("paint", { stroke, region: cut, done: true, label }, cutOf(next), next);
+      this.send('paint', { stroke, region: cut, done: true, label }, cutOf(next), next);
     } else if (this.live?.dirty) {
       const { stroke, dirty } = this.live;
       this.live.dirty = null;
       this.live.isKnown = true;
-      this.send("paint", { stroke, region: dirty, done: false }, this.canvas.copy(dirty), null);
+      this.send('paint', { stroke, region: dirty, done: false }, this.canvas.copy(dirty), null);
     }
   }
 
@@ -134,11 +134,11 @@ export class Strokes {
    * @param {Left | null} left what is answered with it */
   async send(kind, fields, arrays, left) {
     this.isBusy = true;
-    this.isDropping = kind === "drop";
+    this.isDropping = kind === 'drop';
     try {
       const reply = await this.host.send(kind, fields, arrays);
       if (left) this.left = this.left.filter((one) => one !== left);
-      if (left && reply.kind === "failed") this.refused();
+      if (left && reply.kind === 'failed') this.refused();
     } catch {
       // The connection is lost; `connected` says when it is there again.
       this.isOpen = false;

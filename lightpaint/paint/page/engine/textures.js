@@ -1,6 +1,6 @@
 /** Textures and programs of WebGL2, with what is known of them. */
-import { LARGEST } from "./half.js";
-import { SRGB } from "./lut.js";
+import { LARGEST } from './half.js';
+import { SRGB } from './lut.js';
 
 /** @typedef {import("./protocol.js").Region} Region */
 
@@ -18,7 +18,7 @@ export function program(gl, vertex, fragment) {
     [gl.FRAGMENT_SHADER, fragment],
   ])) {
     const shader = gl.createShader(kind);
-    if (!shader) throw new Error("no shader: the context is lost");
+    if (!shader) throw new Error('no shader: the context is lost');
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(made, shader);

@@ -29,11 +29,11 @@
 
 /** @type {Readonly<Params>} */
 export const DEFAULTS = Object.freeze({
-  left: "painting",
-  right: "solution",
-  layout: "side",
+  left: 'painting',
+  right: 'solution',
+  layout: 'side',
   wipe: 0.5,
-  blink: "left",
+  blink: 'left',
   zoom: 1,
   pan: /** @type {[number, number]} */ ([0, 0]),
   stops: 0,
@@ -90,8 +90,8 @@ export const GROUND = [24, 24, 26];
 export function panes(params, canvas, size) {
   const { width, height } = canvas;
   const whole = { x: 0, y: 0, width, height };
-  if (params.layout === "blink") return [placed(params[params.blink], whole, whole, params, size)];
-  if (params.layout === "wipe") {
+  if (params.layout === 'blink') return [placed(params[params.blink], whole, whole, params, size)];
+  if (params.layout === 'wipe') {
     const cut = Math.round(width * Math.min(1, Math.max(0, params.wipe)));
     const front = { ...whole, width: cut };
     const back = { ...whole, x: cut, width: width - cut };

@@ -1,12 +1,12 @@
 /**
  * What the page has of the session: the painting, weights, pictures; and how they follow it.
  */
-import { PaintCanvas } from "./canvas.js";
-import { union } from "./layer.js";
-import { Loader } from "./loader.js";
-import { SRGB, lutOf } from "./lut.js";
-import { VERSION } from "./protocol.js";
-import { Strokes } from "./strokes.js";
+import { PaintCanvas } from './canvas.js';
+import { union } from './layer.js';
+import { Loader } from './loader.js';
+import { SRGB, lutOf } from './lut.js';
+import { VERSION } from './protocol.js';
+import { Strokes } from './strokes.js';
 
 /** @typedef {import("./host.js").Host} Host */
 /** @typedef {import("./protocol.js").Message} Message */
@@ -23,7 +23,7 @@ import { Strokes } from "./strokes.js";
  */
 
 /** Pictures that are wanted as soon as there are any, by name. */
-const WANTED = ["present", "albedo", "objects", "verified", "beyond"];
+const WANTED = ['present', 'albedo', 'objects', 'verified', 'beyond'];
 
 export class Work {
   /** @param {Host} host @param {Screen} screen
@@ -35,7 +35,7 @@ export class Work {
     this.loader = new Loader(
       host,
       (slot, name, picture) => this.loaded(slot, name, picture),
-      (done, total) => tell("loading", { done, total }),
+      (done, total) => tell('loading', { done, total }),
     );
     /** @type {Message | null} */
     this.state = null;
@@ -49,19 +49,22 @@ export class Work {
     this.version = -1;
     /** @type {import("./lut.js").Lut} */
     this.lut = SRGB;
+    /** Whether the present look is there, and whether the view has it. */
+    this.knowsPresent = false;
+    this.hasPresent = false;
     /** Whether the canvas is what the session has. */
     this.isReady = false;
     /** Whether a stroke is in progress. */
     this.isPainting = false;
-    host.on("state", (message) => this.begin(message));
-    host.on("answer", (message) => this.answered(message));
-    host.on("patch", (message) => this.patched(message));
-    host.on("renewed", ({ resources }) => {
+    host.on('state', (message) => this.begin(message));
+    host.on('answer', (message) => this.answered(message));
+    host.on('patch', (message) => this.patched(message));
+    host.on('renewed', ({ resources }) => {
       this.loader.know(resources);
       this.want();
     });
-    host.on("verified", () => this.loader.renew("verified"));
-    host.on("explained", () => this.loader.renew("beyond"));
+    host.on('verified', () => this.loader.renew('verified'));
+    host.on('explained', () => this.loader.renew('beyond'));
   }
 
   /** @param {Message} state */
@@ -77,25 +80,26 @@ export class Work {
     ) {
       this.screen.begin([height, width], state.lights.length);
       this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
-      const refused = () => this.host.send("hello", { version: VERSION }).catch(() => {});
+      const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
       this.strokes?.close();
       this.strokes = new Strokes(this.host, this.canvas, refused);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
       this.isReady = false;
+      this.knowsPresent = false;
       this.loader.forget();
     }
     this.answered(state);
     this.loader.know(state.resources);
     this.want();
-    if (this.loader.there.has("present")) this.sync();
+    if (this.loader.there.has('present')) this.sync();
   }
 
   /** Weights that come with a message. @param {Message} message */
   answered(message) {
     const weights = message.arrays?.weights?.data;
     const version = message.version ?? this.version;
-    if (message.kind === "answer" && version < this.version) return;
-    if (message.kind === "answer") this.version = version;
+    if (message.kind === 'answer' && version < this.version) return;
+    if (message.kind === 'answer') this.version = version;
     if (!weights) return;
     this.weights = Float64Array.from(weights);
     this.weigh();
@@ -127,7 +131,7 @@ export class Work {
     if (strokes.isPending) return;
     try {
       const [image, importance] = await Promise.all(
-        ["painting", "importance"].map((name) => this.host.fetch(name)),
+        ['painting', 'importance'].map((name) => this.host.fetch(name)),
       );
       // What has been painted since then is newer.
       if (strokes.isPending || canvas !== this.canvas) return;
@@ -139,7 +143,7 @@ export class Work {
       this.isReady = true;
       this.redraw([canvas.whole]);
     } catch (error) {
-      this.tell("trouble", { text: error instanceof Error ? error.message : String(error) });
+      this.tell('trouble', { text: error instanceof Error ? error.message : String(error) });
     }
   }
 
@@ -154,9 +158,9 @@ export class Work {
       const isThere = isClean && clean in loader.resources;
       loader.want(`plane ${k}`, isThere ? clean : `plane/${k}`);
     }
-    const transform = shown?.transform ?? "srgb";
-    loader.want("lut", transform === "srgb" ? null : `lut/${transform}`);
-    if (transform === "srgb") this.setLut(SRGB);
+    const transform = shown?.transform ?? 'srgb';
+    loader.want('lut', transform === 'srgb' ? null : `lut/${transform}`);
+    if (transform === 'srgb') this.setLut(SRGB);
   }
 
   /** @param {string} slot @param {string} name @param {Picture} picture */
@@ -165,15 +169,15 @@ export class Work {
     const { canvas, state } = this;
     if (!view || !canvas || !state) return;
     const { data } = picture;
-    if (slot.startsWith("plane ")) {
+    if (slot.startsWith('plane ')) {
       const light = Number(slot.slice(6));
       view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
-    } else if (slot === "lut") this.setLut(lutOf(name.slice(4), picture, state.lut));
-    else if (slot === "present") this.setPresent(/** @type {Uint16Array} */ (data));
-    else if (slot === "albedo") canvas.albedo = /** @type {Uint16Array} */ (data);
-    else if (slot === "objects") canvas.objects = /** @type {Int16Array} */ (data);
-    else if (slot === "verified") view.setPicture("verified", /** @type {Uint16Array} */ (data));
-    else if (slot === "beyond") view.setBeyond(/** @type {Uint8Array} */ (data));
+    } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
+    else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));
+    else if (slot === 'albedo') canvas.albedo = /** @type {Uint16Array} */ (data);
+    else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
+    else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));
+    else if (slot === 'beyond') view.setBeyond(/** @type {Uint8Array} */ (data));
     this.screen.request();
   }
 
@@ -182,7 +186,9 @@ export class Work {
     const { canvas, state } = this;
     if (!canvas || !state) return;
     canvas.setPresent(present);
-    if (showsPresent(this.shown)) this.screen.view?.setPicture("present", present);
+    this.knowsPresent = true;
+    this.weigh();
+    this.showPresent();
     if (!this.isReady && state.first) this.isReady = true;
     else if (!this.isReady) this.sync();
     this.redraw([canvas.whole]);
@@ -198,9 +204,10 @@ export class Work {
   refill() {
     this.setLut(this.lut);
     this.weigh();
+    this.showPresent();
     if (this.canvas) this.redraw([this.canvas.whole]);
     this.loader.forget(
-      (slot) => slot.startsWith("plane ") || slot === "verified" || slot === "beyond",
+      (slot) => slot.startsWith('plane ') || slot === 'verified' || slot === 'beyond',
     );
   }
 
@@ -210,9 +217,8 @@ export class Work {
     this.shown = show;
     this.screen.params = { ...show, live: false };
     if (before?.transform !== show.transform || before?.clean !== show.clean) this.want();
-    if (this.canvas && showsPresent(show) !== showsPresent(before))
-      this.screen.view?.setPicture("present", showsPresent(show) ? this.canvas.present : null);
     this.weigh();
+    if (showsPresent(show) !== showsPresent(before)) this.showPresent();
     this.screen.request();
   }
 
@@ -224,7 +230,28 @@ export class Work {
     const weights = Float64Array.from(instead?.flat() ?? this.weights);
     if (gains) weights.forEach((weight, i) => (weights[i] = gains[Math.floor(i / 3)] ? weight : 0));
     if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
-    if (other) view.setWeights(Float64Array.from(other.flat()), "other");
+    if (other) view.setWeights(Float64Array.from(other.flat()), 'other');
+    this.stand(weights);
+  }
+
+  /** Lights that are as they were make the present look, which is there before their planes are,
+   * and is clean. @param {Float64Array} weights */
+  stand(weights) {
+    const { screen, canvas, state, shown } = this;
+    const present = state?.lights.flatMap((light) => light.present) ?? [];
+    const isClean = shown?.clean ?? true;
+    const isPresent =
+      isClean && weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
+    screen.isPresent = isPresent && this.knowsPresent;
+    if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
+  }
+
+  /** Give the view the present look while it is shown. */
+  showPresent() {
+    const { screen, canvas, shown } = this;
+    const isShown = screen.isPresent || showsPresent(shown);
+    this.hasPresent = screen.isPresent;
+    screen.view?.setPicture('present', isShown && canvas ? canvas.present : null);
   }
 
   /** @param {Region[]} regions */
@@ -239,5 +266,5 @@ export class Work {
 
 /** @param {Show | null} show */
 function showsPresent(show) {
-  return show?.left === "present" || show?.right === "present";
+  return show?.left === 'present' || show?.right === 'present';
 }

@@ -83,6 +83,12 @@ function Mix({ ui, hands }) {
     store.set({ mix: null });
     look(store, { left: 'painting', right: 'solution', instead: null, other: null });
   };
+  const keep = () => {
+    const names = [a, b].map((id) => ui.looks.find((one) => one.id === id)?.name ?? '');
+    const part = ui.mix?.share ?? 1;
+    const name = `${names.join(' to ')}, ${Math.round(100 * part)} %`;
+    hands.session.send('mix_looks', { first: a, second: b, part, name });
+  };
   return html`<div class="mix" role="group" aria-label="Compare two looks">
     <${Button} label=${ui.mix ? 'Back to the painting' : 'Compare looks'} on=${Boolean(ui.mix)}
       act=${() => (ui.mix ? end() : set({}))} />
@@ -93,7 +99,8 @@ function Mix({ ui, hands }) {
     ${
       ui.mix &&
       html`<${Slider} label="Between" value=${100 * ui.mix.share} least=${0} most=${100}
-      unit="%" change=${(/** @type {number} */ share) => set({ share: share / 100 })} />`
+      unit="%" change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
+      <${Button} label="Keep this as a look" act=${keep} />`
     }
   </div>`;
 }

@@ -1,0 +1,251 @@
+"""How soon a stroke is answered on screen, through the real page.
+
+    pip install '.[test]'
+    python benchmarks/painter.py [--cases 12x960x540 64x960x540 ...] [--strokes N] [--minutes M]
+
+A basis of soft lights that is made up, the painter's own server, and headless Chromium that
+renders in software. A pointer is moved 60 times a second over the picture. For every answer that
+comes on screen, the time since the last move of the pointer that it answers; Python's part of a
+stroke is timed in this process. Up to a frame of the display, 16.7 ms, of each figure is waiting
+for it. With --minutes, how the memory of page and server grows while somebody paints.
+"""
+
+import argparse
+import gc
+import resource
+import shutil
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+import lightpaint as lp
+from lightpaint.basis.basis import BasisLight, Origin
+from lightpaint.lighting.fit import meant_by
+from lightpaint.lighting.live import Live
+from lightpaint.paint.server import Server
+from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.settings import Settings
+from lightpaint.target.target import Target
+
+ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+#: Watches a page: when the last move of the pointer was, of which of them an answer knows, and when
+#: that is drawn.
+WATCH = """() => {
+  const { host, engine } = document.getElementById('lightpaint').painter;
+  const { screen } = engine;
+  const times = [], send = host.send.bind(host), now = screen.now.bind(screen);
+  let moved = 0, answered = 0;
+  addEventListener('pointermove', (event) => { moved = event.timeStamp; }, true);
+  host.send = async (kind, fields, arrays) => {
+    const at = moved;
+    const reply = await send(kind, fields, arrays);
+    if (kind === 'paint' && !fields.done) answered = at;
+    return reply;
+  };
+  screen.now = () => {
+    now();
+    if (answered) times.push(performance.now() - answered);
+    answered = 0;
+  };
+  window.times = times;
+}"""
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--cases", nargs="+", default=["12x960x540", "64x960x540", "12x1920x1080"], metavar="NxWxH"
+    )
+    parser.add_argument("--strokes", type=int, default=6)
+    parser.add_argument("--view", choices=("gl", "cpu"), help="picture view (default: the quicker)")
+    parser.add_argument("--minutes", type=float, default=0.0)
+    options = parser.parse_args()
+    cases = [tuple(map(int, case.split("x"))) for case in options.cases]
+    print_session(cases[0])
+    print("\nthrough the page, ms from pointer to screen")
+    heads = ("", "asked", "view", "median", "95 %", "99 %", "answers")
+    print("{:16s} {:16s} {:4s} {:>7s} {:>6s} {:>6s} {:>8s}".format(*heads))
+    for n, width, height in cases:
+        basis = made_up(n, height, width)
+        asked: dict[str, Any] = {}
+        for name in ("defaults", "lock, two limits", "linear"):
+            if name == "lock, two limits":
+                asked = {"light 0": {"lock": True}}
+                asked |= {f"light {k}": {"limits": {"min": 0.2, "max": 0.7}} for k in (1, 2)}
+            space = "linear" if name == "linear" else None
+            with Opened(basis, asked, space=space, view=options.view) as opened:
+                view, times = opened.painted(options.strokes)
+            p50, p95, p99 = np.percentile(times, [50, 95, 99])
+            case = f"{n} at {width}x{height}"
+            print(
+                f"{case:16s} {name:16s} {view:4s} {p50:7.0f} {p95:6.0f} {p99:6.0f} {len(times):8d}",
+                flush=True,
+            )
+            asked = {}
+    if options.minutes:
+        n, width, height = cases[0]
+        with Opened(made_up(n, height, width), {}, view=options.view) as opened:
+            opened.print_growth(options.minutes)
+
+
+def made_up(n: int, height: int, width: int) -> lp.Basis:
+    """Soft lights of different colours, each with some texture."""
+    rng = np.random.default_rng(1)
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    images = np.empty((n, height, width, 3), np.float32)
+    texture = rng.uniform(0.7, 1, (height, width, 1)).astype(np.float32)
+    for k in range(n):
+        cy, cx, wide = rng.uniform(0, height), rng.uniform(0, width), rng.uniform(0.1, 0.5) * width
+        soft = np.exp(-((y - cy) ** 2 + (x - cx) ** 2) / (2 * wide**2))[..., None]
+        images[k] = (soft * rng.uniform(0.3, 1, 3) + 0.02) * texture * 3 / n
+    lights = tuple(
+        BasisLight(f"light {k}", "point", "intensity", "W/sr", (0.5, 0.5, 0.5)) for k in range(n)
+    )
+    origin = Origin("made up", "", "camera", 0, "separate", (0, 0), (0, 0))
+    seen = np.zeros((height, width), bool)
+    return lp.Basis(lights, images, np.zeros_like(images), seen, origin)
+
+
+def print_session(case: tuple[int, ...]) -> None:
+    """Python's part of a stroke of 64 x 64 pixels, by what is asked."""
+    n, width, height = case
+    basis = made_up(n, height, width)
+    held = {"light 0": {"lock": True}, "light 1": {"limits": {"min": 0.2, "max": 0.7}}}
+    print(f"Python's part of a stroke, {n} lights at {width}x{height}, 64 x 64 pixels, ms")
+    print(f"{'':28s} {'colour':>8s} {'importance':>11s}")
+    for name, fit, asked in (
+        ("literal", {"literal": True}, {}),
+        ("linear, held, gentle", {"space": "linear"}, {}),
+        ("linear, a lock, a limit", {"space": "linear"}, held),
+        ("display, as by default", {}, {}),
+        ("display, a lock, a limit", {}, held),
+    ):
+        colour, importance = (stroke_ms(basis, fit, asked, x) for x in (False, True))
+        print(f"{name:28s} {colour:8.1f} {importance:11.1f}")
+
+
+def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance: bool) -> float:
+    """Median of what `Live` takes for one more piece of a stroke."""
+    height = basis.size[0]
+    image, importance = basis.present_look.copy(), np.zeros(basis.size, np.float32)
+    importance[: height // 2] = 0.5
+    one = np.ones((1, 1), np.float32)
+    transform = lp.ViewTransform()
+    over = Target("", np.zeros((1, 1, 3), np.float32), one, False, transform=transform,
+                  through_view=True, over_look=True)  # fmt: skip
+    meant = meant_by(Settings(**fit), [over])
+    live = Live(basis, image, importance, fit=meant, constraints=lp.Constraints.of(asked))
+    weights, times = live.answer(basis.present_weights), []
+    for k in range(40):
+        region = slice(8 + 3 * k, 72 + 3 * k), slice(8 + 5 * k, 72 + 5 * k)
+        begin = time.perf_counter()
+        image[region] *= 1.05
+        if with_importance:
+            importance[region] = 0.5 + 0.01 * k
+        live.painted(region, with_importance=with_importance)
+        weights = live.answer(weights)
+        times.append(1e3 * (time.perf_counter() - begin))
+    return float(np.median(times))
+
+
+class Opened:
+    """A painter that is served, and a page of it."""
+
+    def __init__(
+        self, basis: lp.Basis, asked: Any, *, space: Any = None, view: str | None = None
+    ) -> None:
+        self.folder = Path(tempfile.mkdtemp())
+        settings = Settings(space=space)
+        constraints = lp.Constraints.of(asked)
+        subject = Subject("made up", self.folder, basis=basis, settings=settings,
+                          constraints=constraints)  # fmt: skip
+        self.studio = Studio(subject, MemoryStore)
+        self.server = Server(self.studio, port=0)
+        self.studio.start()
+        threading.Thread(target=self.server.run, daemon=True).start()
+        self.view, self.size = view, basis.size
+
+    def __enter__(self) -> "Opened":
+        self.playwright = sync_playwright().start()
+        path = shutil.which("chromium")
+        self.browser = self.playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        self.page: Page = self.browser.new_page(viewport={"width": 1600, "height": 900})
+        self.page.goto(self.server.url)
+        if self.view:
+            self.page.goto(f"{self.page.url.partition('?')[0]}?view={self.view}")
+        self.page.wait_for_selector(".lightpaint .stage canvas", timeout=120_000)
+        self.page.wait_for_function(
+            "() => document.getElementById('lightpaint').painter?.engine.work.isReady",
+            timeout=120_000,
+        )
+        time.sleep(3)
+        self.page.evaluate(WATCH)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.browser.close()
+        self.playwright.stop()
+        self.studio.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def stroke(self, number: int, moves: int = 60) -> None:
+        """Over the painting and back, at 60 moves a second."""
+        pane = self.page.evaluate(
+            "() => { const { engine } = document.getElementById('lightpaint').painter;"
+            " const box = engine.element.getBoundingClientRect(), [pane] = engine.panes();"
+            " return [box.x + pane.x, box.y + pane.y, pane.width, pane.height]; }"
+        )
+        left, top, width, height = pane
+        y = top + height * (0.2 + 0.06 * (number % 10))
+        mouse = self.page.mouse
+        mouse.move(left + 0.2 * width, y)
+        mouse.down()
+        begin = time.perf_counter()
+        for k in range(moves):
+            mouse.move(left + width * (0.2 + 0.6 * k / moves), y + 20 * np.sin(k / 8))
+            time.sleep(max(0, begin + k / 60 - time.perf_counter()))
+        mouse.up()
+        time.sleep(0.6)
+
+    def painted(self, strokes: int) -> tuple[str, list[float]]:
+        """Which view it was, and the times of all answers."""
+        for number in range(strokes):
+            self.stroke(number)
+        kind = self.page.evaluate(
+            "() => { const { engine } = document.getElementById('lightpaint').painter;"
+            " return engine.screen.view.constructor.name; }"
+        )
+        return str(kind)[:2].lower(), self.page.evaluate("() => window.times")
+
+    def print_growth(self, minutes: float) -> None:
+        """Memory of page and server while somebody paints."""
+        print(f"\nmemory over {minutes:g} minutes of strokes, MB")
+        session = self.page.context.new_cdp_session(self.page)
+        until, number, samples = time.monotonic() + 60 * minutes, 0, []
+        while time.monotonic() < until:
+            self.stroke(number, moves=30)
+            number += 1
+            if number % 10 == 0:
+                session.send("HeapProfiler.collectGarbage")
+                gc.collect()
+                heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
+                rss = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+                samples.append((number, heap, rss))
+                print(f"{number:5d} strokes: page {heap:7.1f}, server {rss:7.1f}", flush=True)
+        each = np.array(samples[len(samples) // 3 :])
+        for name, column in (("page", 1), ("server", 2)):
+            slope = np.polyfit(each[:, 0], each[:, column], 1)[0] if len(each) > 1 else 0.0
+            print(f"{name}: {1e3 * slope:+.0f} kB a stroke")
+
+
+if __name__ == "__main__":
+    main()
