@@ -1,7 +1,9 @@
 """The painter of a notebook, over a comm that only notes: what it hears, what it says."""
 
+import asyncio
 import importlib
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -37,7 +39,8 @@ class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
 
 @pytest.fixture(autouse=True)
 def line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Widgets have such a line, also where no kernel runs."""
+    """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
+    monkeypatch.setattr("lightpaint.paint.widget._running_loop", lambda: None)
     noted = type("Line", (Noted,), {"messages": [], "synced": {}})
     monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
 
@@ -227,6 +230,31 @@ def test_who_is_shown_last_has_it(basis: lp.Basis, open_: Any) -> None:
     assert second.paint(basis.images[0])["kind"] == "answer"
     assert first.say("take_over")["kind"] == "state"
     assert second.heard()[-1][0]["reason"] == "taken"
+
+
+def test_callbacks_come_in_the_thread_of_the_kernel(
+    basis: lp.Basis, open_: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard: list[Any] = []
+
+    async def cell() -> None:
+        loop = asyncio.get_running_loop()
+        monkeypatch.setattr("lightpaint.paint.widget._running_loop", lambda: loop)
+        painter = open_()
+        page = Page(painter)
+        page.say("hello", version=protocol.VERSION)
+        painter.observe(lambda _: heard.append(threading.current_thread()), "lighting")
+        page.paint(basis.images[0])
+        for _ in range(3000):
+            if heard:
+                break
+            await asyncio.sleep(0.01)
+
+    # Playwright's loop, which may be there, is no thread's but its own.
+    thread = threading.Thread(target=lambda: asyncio.run(cell()))
+    thread.start()
+    thread.join()
+    assert heard[0] is thread
 
 
 def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
