@@ -6,6 +6,7 @@ which say what has come of them through `on_message`.
 """
 
 import time
+import traceback
 from collections.abc import Callable, Mapping
 from threading import Condition, Lock, RLock, Thread
 from typing import Any
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.files import first_line
 from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
@@ -316,6 +318,11 @@ class Studio:
                 self._find()
             except LightpaintError as error:
                 self._say(Message("say", {"text": str(error), "tone": "warn"}))
+            except Exception as error:
+                # A mistake of our own ends no session: the next stroke is answered again.
+                traceback.print_exception(error)
+                text = f"this answer could not be made exact: {first_line(error)}"
+                self._say(Message("say", {"text": text, "tone": "warn"}))
 
     def _find(self) -> None:
         with self._lock:

@@ -280,14 +280,12 @@ async function lutOf({ low, high, curve, lattice }) {
   if (curve) {
     // Which lattice it is the diagonal of is not asked where there is a curve.
     const shaper = { side: curve.length, low, high };
-    const none = new Float32Array(1);
-    return { shaper, lattice: none, codes: none, curve: Float32Array.from(curve) };
+    return { shaper, lattice: new Float32Array(1), curve: Float32Array.from(curve) };
   }
   if (!lattice) return SRGB;
   const halves = await unpacked(lattice);
   const values = Float32Array.from(halves, (bits) => VALUES[bits] * lattice.scale);
-  const codes = values.map((value) => 255 * value);
-  return { shaper: { side: lattice.size[1], low, high }, lattice: values, codes, curve: null };
+  return { shaper: { side: lattice.size[1], low, high }, lattice: values, curve: null };
 }
 
 /** @param {HTMLElement} root */

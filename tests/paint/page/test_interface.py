@@ -465,7 +465,7 @@ def test_settings(painter: Painter) -> None:
 def test_what_fails_is_said_and_the_painter_lives(painter: Painter) -> None:
     painter.page.evaluate("() => { window.host.fails = 'the disk is full'; }")
     painter.button("Keep look").click()
-    assert painter.page.get_by_text("the disk is full").is_visible()
+    painter.page.get_by_text("the disk is full").wait_for()
     painter.button("Dismiss").click()
     assert not painter.page.get_by_text("the disk is full").is_visible()
     painter.button("Keep look").click()

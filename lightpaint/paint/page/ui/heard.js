@@ -5,7 +5,7 @@
 /** @typedef {import('./model.js').Ui} Ui */
 
 /** @param {any} message @returns {Partial<Ui>} */
-export function stateOf(message) {
+export function stateOf(message, /** @type {import('./model.js').Ui} */ before) {
   const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
   return {
     ready: true,
@@ -25,9 +25,16 @@ export function stateOf(message) {
       basis && !basis.done
         ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
         : null,
-    ...answerFields(message.answer ?? { lights: message.lights_answer }, []),
+    // A scene is first shown as it is painted.
+    ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
+    ...answerFields(message.answer ?? {}, []),
     ...weightsOf(message),
   };
+}
+
+/** @param {{name: string, stops: number} | undefined} transform */
+function shownAs(transform) {
+  return transform ? { transform: transform.name, stops: transform.stops } : {};
 }
 
 /**

@@ -127,8 +127,8 @@ export function first() {
     hint: false,
     tool: 'brush',
     size: 60,
-    hardness: 0.5,
-    flow: 1,
+    hardness: 0.3,
+    flow: 0.7,
     importance: 1,
     as: 'light',
     about: 'spot',
@@ -199,7 +199,13 @@ export function mixOf(ui, { a, b, share }) {
     .map((rgb) => /** @type {RGB} */ (rgb));
 }
 
-/** Linear light of the paint in the hand. @param {Ui} ui @returns {RGB} */
-export function paintOf({ colour, stops }) {
-  return /** @type {RGB} */ (colour.map((x) => x * 2 ** stops));
+/** Linear light of the paint in the hand: at 0 stops it is as bright as what the scene's own
+ * exposure shows as white. @param {Ui} ui @returns {RGB} */
+export function paintOf({ colour, stops, state }) {
+  return /** @type {RGB} */ (colour.map((x) => x * 2 ** (stops - exposureOf(state))));
+}
+
+/** Stops at which the scene is painted. @param {any} state @returns {number} */
+export function exposureOf(state) {
+  return state?.transform?.stops ?? 0;
 }

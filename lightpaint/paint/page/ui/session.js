@@ -61,7 +61,7 @@ export class Session {
     if (this.done.has(origin)) return;
     this.done.add(origin);
     const told = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
-      state: stateOf,
+      state: (/** @type {any} */ m) => stateOf(m, this.store.value),
       waiting: (/** @type {any} */ m) => ({ ready: false, state: null, waiting: m.text ?? '' }),
       answer: (/** @type {any} */ m) => answerOf(m, this.store.value),
       patch: (/** @type {any} */ m) => answerOf(m, this.store.value),

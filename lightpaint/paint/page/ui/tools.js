@@ -1,6 +1,7 @@
 /** The tools, and what a person does with them that is no stroke: colours, sizes, looks of it. */
 
 import { toHex } from './colours.js';
+import { exposureOf } from './model.js';
 
 /** @typedef {import("./engine.js").Tool} Tool */
 /** @typedef {import("./engine.js").RGB} RGB */
@@ -71,11 +72,12 @@ export function swap(store) {
 
 /** Take light from a picture as paint. @param {UiStore} store @param {RGB} light */
 export function take(store, light) {
-  const top = Math.max(...light);
+  const shown = light.map((x) => Math.max(0, x) * 2 ** exposureOf(store.value.state));
+  const top = Math.max(...shown);
   if (!(top > 0)) return store.set({ colour: [0, 0, 0], stops: 0 });
   const scale = Math.max(1, top);
   store.set({
-    colour: /** @type {RGB} */ (light.map((x) => Math.max(0, x) / scale)),
+    colour: /** @type {RGB} */ (shown.map((x) => x / scale)),
     stops: Math.log2(scale),
   });
 }
