@@ -11,11 +11,12 @@ for it. With --minutes, how the memory of page and server grows while somebody p
 """
 
 import argparse
-import gc
+import json
 import resource
 import shutil
+import subprocess
+import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
-ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+ARGUMENTS = ["--no-sandbox"]
 
 #: Watches a page: when the last move of the pointer was, of which of them an answer knows, and when
 #: that is drawn.
@@ -75,14 +76,13 @@ def main() -> None:
     heads = ("", "asked", "view", "median", "95 %", "99 %", "answers")
     print("{:16s} {:16s} {:4s} {:>7s} {:>6s} {:>6s} {:>8s}".format(*heads))
     for n, width, height in cases:
-        basis = made_up(n, height, width)
         asked: dict[str, Any] = {}
         for name in ("defaults", "lock, two limits", "linear"):
             if name == "lock, two limits":
                 asked = {"light 0": {"lock": True}}
                 asked |= {f"light {k}": {"limits": {"min": 0.2, "max": 0.7}} for k in (1, 2)}
-            space = "linear" if name == "linear" else None
-            with Opened(basis, asked, space=space, view=options.view) as opened:
+            space = "linear" if name == "linear" else ""
+            with Opened((n, width, height), asked, space=space, view=options.view) as opened:
                 view, times = opened.painted(options.strokes)
             p50, p95, p99 = np.percentile(times, [50, 95, 99])
             case = f"{n} at {width}x{height}"
@@ -92,8 +92,7 @@ def main() -> None:
             )
             asked = {}
     if options.minutes:
-        n, width, height = cases[0]
-        with Opened(made_up(n, height, width), {}, view=options.view) as opened:
+        with Opened(cases[0], {}, view=options.view) as opened:
             opened.print_growth(options.minutes)
 
 
@@ -157,32 +156,43 @@ def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance:
     return float(np.median(times))
 
 
+def serve(case: str, asked: str, space: str) -> None:
+    """A painter of a made-up basis, until it is ended; says where it is."""
+    n, width, height = map(int, case.split("x"))
+    with tempfile.TemporaryDirectory() as folder:
+        subject = Subject(
+            "made up",
+            Path(folder),
+            basis=made_up(n, height, width),
+            settings=Settings(space=space or None),  # type: ignore[arg-type]
+            constraints=lp.Constraints.of(json.loads(asked)),
+        )
+        studio = Studio(subject, MemoryStore)
+        server = Server(studio, port=0)
+        studio.start()
+        print(server.url, flush=True)
+        server.run()
+
+
 class Opened:
-    """A painter that is served, and a page of it."""
+    """A painter that is served by a process of its own, and a page of it."""
 
     def __init__(
-        self, basis: lp.Basis, asked: Any, *, space: Any = None, view: str | None = None
+        self, case: tuple[int, ...], asked: Any, *, space: str = "", view: str | None = None
     ) -> None:
-        self.folder = Path(tempfile.mkdtemp())
-        settings = Settings(space=space)
-        constraints = lp.Constraints.of(asked)
-        subject = Subject("made up", self.folder, basis=basis, settings=settings,
-                          constraints=constraints)  # fmt: skip
-        self.studio = Studio(subject, MemoryStore)
-        self.server = Server(self.studio, port=0)
-        self.studio.start()
-        threading.Thread(target=self.server.run, daemon=True).start()
-        self.view, self.size = view, basis.size
+        words = [sys.executable, __file__, "--serve", "x".join(map(str, case)), json.dumps(asked)]
+        self.server = subprocess.Popen([*words, space], stdout=subprocess.PIPE, text=True)
+        assert self.server.stdout is not None
+        self.url, self.view = self.server.stdout.readline().strip(), view
 
     def __enter__(self) -> "Opened":
         self.playwright = sync_playwright().start()
         path = shutil.which("chromium")
         self.browser = self.playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         self.page: Page = self.browser.new_page(viewport={"width": 1600, "height": 900})
-        self.page.goto(self.server.url)
+        self.page.goto(self.url)
         if self.view:
             self.page.goto(f"{self.page.url.partition('?')[0]}?view={self.view}")
-        self.page.wait_for_selector(".lightpaint .stage canvas", timeout=120_000)
         self.page.wait_for_function(
             "() => document.getElementById('lightpaint').painter?.engine.work.isReady",
             timeout=120_000,
@@ -194,8 +204,8 @@ class Opened:
     def __exit__(self, *_: object) -> None:
         self.browser.close()
         self.playwright.stop()
-        self.studio.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self.server.terminate()
+        self.server.wait()
 
     def stroke(self, number: int, moves: int = 60) -> None:
         """Over the painting and back, at 60 moves a second."""
@@ -236,9 +246,9 @@ class Opened:
             number += 1
             if number % 10 == 0:
                 session.send("HeapProfiler.collectGarbage")
-                gc.collect()
                 heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
-                rss = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+                held = Path(f"/proc/{self.server.pid}/statm").read_text().split()[1]
+                rss = int(held) * resource.getpagesize() / 1e6
                 samples.append((number, heap, rss))
                 print(f"{number:5d} strokes: page {heap:7.1f}, server {rss:7.1f}", flush=True)
         each = np.array(samples[len(samples) // 3 :])
@@ -248,4 +258,7 @@ class Opened:
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["--serve"]:
+        serve(*sys.argv[2:])
+    else:
+        main()

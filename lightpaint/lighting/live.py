@@ -37,9 +37,8 @@ Region = tuple[slice, slice]
 #: Pixels that a picture is averaged to in display space, at most: what goes into one strip.
 FILM = STRIP
 
-#: Rounds of reweighting for an answer in display space, at most, and the change of a light that
-#: ends them sooner.
-ROUNDS, ENOUGH = 2, 1e-3
+#: Rounds of reweighting for an answer in display space: the next answer goes on from there.
+ROUNDS = 1
 
 
 class Live:
@@ -70,6 +69,13 @@ class Live:
         """Go on with these. Raises ConstraintError for what is impossible."""
         reduction = reduced_by(constraints, self._basis, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
+
+    def prepare(self) -> None:
+        """Do now what the first answer would wait for."""
+        if self.mode == "linear":
+            self._tiles()
+        else:
+            self._film()
 
     @property
     def mode(self) -> Space:
@@ -109,7 +115,7 @@ class Live:
         if self.mode == "linear":
             return best(self._tiles().equations(self._rest_weight), start)
         lit = self._film().lit(self._rest_weight, fit.transform)
-        how: dict[str, Any] = {"from_clipping": False, "until": ENOUGH, "at_most": ROUNDS}
+        how: dict[str, Any] = {"from_clipping": False, "at_most": ROUNDS}
         return rounds(lit, Asked(pull), start, best, **how).weights
 
     @property

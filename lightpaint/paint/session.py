@@ -446,6 +446,7 @@ class Session:
         fit = self._fit
         constraints = self._constraints(self.wishes)
         self.live = Live(self.basis, self.image, self.importance, fit=fit, constraints=constraints)
+        self.live.prepare()
         self.weights = self.basis.present_weights
         self._changed()
 

@@ -5,10 +5,13 @@ rendered, exact answers, clean planes, exports and the verifying render have thr
 which say what has come of them through `on_message`.
 """
 
+import os
+import sys
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from threading import Condition, Lock, RLock, Thread
+from contextlib import suppress
+from threading import Condition, Lock, RLock, Thread, get_native_id
 from typing import Any
 
 import numpy as np
@@ -34,7 +37,10 @@ from lightpaint.paint.told import analysis_fields, light_fields, lights_fields
 from lightpaint.paint.wishes import Wishes
 
 #: Seconds of rest after a stroke before the exact answer is looked for.
-REST_S = 0.08
+REST_S = 0.2
+
+#: How much less urgent than strokes all else is, where threads can be told apart: on Linux.
+NICE = 10
 
 
 class StoppedError(Exception):
@@ -178,6 +184,7 @@ class Studio:
         """Do it in a thread of its own; what fails is said."""
 
         def run() -> None:
+            give_way()
             try:
                 work(message)
             except StoppedError:
@@ -190,6 +197,7 @@ class Studio:
 
     def _obtain(self) -> None:
         """The basis, better and better."""
+        give_way()
         try:
             for basis in self.subject.bases(self._hears):
                 self._take(basis)
@@ -304,6 +312,7 @@ class Studio:
 
     def _settle(self) -> None:
         """The exact answer, whenever the brush rests; then what is known of it."""
+        give_way()
         while True:
             with self._bell:
                 self._bell.wait_for(lambda: self._unsettled or not self._is_open)
@@ -399,3 +408,10 @@ class Studio:
             new = {"beyond": self.pictures.generations["beyond"]}
         self._say(Message("renewed", {"resources": new}))
         self._say(Message("explained", {"sentences": said}))
+
+
+def give_way() -> None:
+    """Let this thread, and those that it starts, leave the processors to more urgent ones."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, get_native_id(), NICE)

@@ -16,8 +16,10 @@ import { GROUND, SQUARES, panes } from './view.js';
 /** @typedef {import("./view.js").Params} Params */
 /** @typedef {import("./view.js").Region} Region */
 
-/** Milliseconds of a live frame above which it is mixed at half its size. */
-export const BUDGET = 28;
+/** Milliseconds of a live frame above which it is mixed at a part of its size, and values of pixels
+ * and lights that take about as long where nothing was timed yet. */
+export const BUDGET = 14;
+const MANY = 3e6;
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class CpuView {
@@ -98,7 +100,7 @@ export class CpuView {
   draw(params) {
     const { context, canvas } = this;
     if (!params.live) this.step = 1;
-    else if (!this.wasLive) this.step = this.pace > BUDGET ? 2 : 1;
+    else if (!this.wasLive) this.step = this.liveStep();
     this.wasLive = params.live;
     context.fillStyle = `rgb(${GROUND.join(' ')})`;
     context.fillRect(0, 0, canvas.width, canvas.height);
@@ -117,6 +119,13 @@ export class CpuView {
       context.drawImage(layer.canvas, pane.left, pane.top, width, height);
       context.restore();
     }
+  }
+
+  /** Of which each so manieth pixel of so manieth row is mixed while the brush is down. */
+  liveStep() {
+    const work = (this.planes.length * this.size[0] * this.size[1]) / MANY;
+    const frames = Math.max(work, this.pace / BUDGET);
+    return frames <= 1 ? 1 : frames <= 5 ? 2 : 3;
   }
 
   /** The picture of a kind with its codes up to date; null where there is none.
