@@ -32,6 +32,9 @@ NOTICED, SPOT = 6.0, 0.02
 #: ΔE below which nobody sees anything, and the share of what was asked that must have come about.
 UNSEEN, SOME = 1.0, 0.3
 
+#: Share of what was asked that may be missed of a great change before the answer is called far.
+HALF = 0.5
+
 #: A light gets to a place from this share on of what it does to its brightest pixels, and does
 #: much there from that.
 GETS_THERE, DOES_MUCH = 0.01, 0.1
@@ -99,8 +102,12 @@ class Seen:
 
     @property
     def is_far(self) -> bool:
-        """Whether it looks like another picture, or still like the one there was."""
-        return self.missed > FAR or self.is_in_vain
+        """Whether it looks like another picture, or still like the one there was.
+
+        Not where more than half of what was asked has come about.
+        """
+        is_another = self.missed > FAR and self.missed > HALF * self.asked
+        return is_another or self.is_in_vain
 
 
 def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
