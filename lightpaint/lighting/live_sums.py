@@ -1,0 +1,195 @@
+"""The sums behind answers under a brush: of light by tiles, and of a display over a small film."""
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from math import ceil
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import block_mean
+from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.pixels import STRIP, Pixels
+from lightpaint.lighting.reweighted import between
+from lightpaint.lighting.tiles import FEW_LIGHTS, TiledEquations
+
+Region = tuple[slice, slice]
+
+#: Pixels that a picture is averaged to in display space, at most: what goes into one strip.
+FILM = STRIP
+
+#: Parts of a step in display space that are tried. An answer is one step from the one before.
+PARTS = (1.0, 0.5, 0.25)
+
+
+class PaintedTiles:
+    """Equations of what is painted and of the rest, each at weight 1, in linear light."""
+
+    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+        self._importance, self._seen = importance, basis.emitters_seen
+        self._left = np.empty(importance.shape, np.float32)
+        everything = slice(0, len(importance)), slice(0, importance.shape[1])
+        self._leave(everything)
+        self._paint = TiledEquations(basis.images, image, importance)
+        self._rest = TiledEquations(basis.images, basis.present_look, self._left)
+
+    def _leave(self, region: Region) -> None:
+        left = np.maximum(1 - self._importance[region], 0)
+        self._left[region] = np.where(self._seen[region], 0, left)
+
+    def painted(self, region: Region, *, with_importance: bool) -> None:
+        self._paint.update(region, with_M=with_importance)
+        if not with_importance:
+            return
+        before = self._left[region].copy()
+        self._leave(region)
+        if not np.array_equal(before, self._left[region]):
+            self._rest.update(region)
+
+    def equations(self, rest_weight: float) -> NormalEquations:
+        equations, rest = self._paint.equations, self._rest.equations
+        if not rest_weight:
+            return equations
+        return NormalEquations(
+            equations.M + rest_weight * rest.M,
+            equations.b + rest_weight * rest.b,
+            equations.target_norm2 + rest_weight * rest.target_norm2,
+        )
+
+
+class SmallFilm:
+    """The picture averaged to few pixels; what is painted of each, by its importance."""
+
+    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+        height, width = importance.shape
+        self._side = side = max(1, ceil((height * width / FILM) ** 0.5))
+        self._image, self._importance, self._seen = image, importance, basis.emitters_seen
+        rows, columns = -(-height // side), -(-width // side)
+        self._size = rows, columns
+        small = np.stack([_averaged(x, side) for x in basis.images])
+        # Singles are enough for what is averaged, and sums of them take half the time.
+        planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
+        self._rows = np.ascontiguousarray(planes, np.float32)
+        self._current = _planes(_averaged(basis.present_look, side))
+        self._painted = self._current.copy()
+        self._transform: ViewTransform | None = None
+        self._seen_painted = self._seen_current = self._current
+        self._a, self._left = np.zeros((2, rows * columns))
+        self.painted((slice(0, height), slice(0, width)))
+
+    def painted(self, region: Region) -> None:
+        """Average anew what a rectangle touches."""
+        side, (height, width) = self._side, self._importance.shape
+        (top, bottom), (left, right) = (
+            _around(part, side, length)
+            for part, length in zip(region, (height, width), strict=True)
+        )
+        if top >= bottom or left >= right:
+            return
+        where = slice(top, bottom), slice(left, right)
+        a = self._importance[where].astype(np.float64)
+        light = self._image[where] * a[..., None]
+        rest = np.where(self._seen[where], 0, np.maximum(1 - a, 0))
+        total, lit, unpainted = (_summed(x, side) for x in (a, light, rest))
+        rows = slice(top // side, -(-bottom // side))
+        columns = slice(left // side, -(-right // side))
+        some = total > 0
+        mean = lit / np.where(some, total, 1)[..., None]
+        painted = self._painted.reshape(3, *self._size)[:, rows, columns]
+        current = self._current.reshape(3, *self._size)[:, rows, columns]
+        painted[...] = np.where(some, mean.transpose(2, 0, 1), current)
+        self._a.reshape(self._size)[rows, columns] = total
+        self._left.reshape(self._size)[rows, columns] = unpainted
+        if self._transform is not None:
+            seen = self._seen_painted.reshape(3, *self._size)[:, rows, columns]
+            planes = np.ascontiguousarray(painted).reshape(3, -1)
+            seen[...] = self._transform.with_slopes(planes)[0].reshape(seen.shape)
+
+    def see_through(self, transform: ViewTransform | None) -> None:
+        """From now on a display is meant that shows light so."""
+        if transform is not None and transform != self._transform:
+            self._seen_painted, self._seen_current = (
+                np.array(transform.with_slopes(x)[0], np.float64)
+                for x in (self._painted, self._current)
+            )
+        self._transform = transform
+
+    def pixels(self, rest_weight: float, transform: ViewTransform | None) -> Pixels:
+        """The loss of these pixels; an average counts as much as all that are in it."""
+        rest = rest_weight * self._left
+        weight = self._a + rest
+        share = np.where(weight > 0, rest / np.where(weight > 0, weight, 1), 0)
+        seen = self._seen_painted, self._seen_current
+        return Pixels(self._painted, weight, share, self._current, None, transform, seen)
+
+    def nearer(
+        self,
+        pixels: Pixels,
+        start: Doubles,
+        best: Callable[[NormalEquations, Doubles], Doubles],
+        pull: NormalEquations | None,
+    ) -> Doubles:
+        """One round of reweighting: weights (n, 3) that miss no more than those before.
+
+        As of `reweighted.rounds`, but for singles, and for a step that is halved a few times only.
+        """
+
+        def missed(w: Doubles, x: Doubles) -> float:
+            value = float(pixels.objective(x).sum())
+            return value if pull is None else value + float(pull.objective(w).sum())
+
+        before = self._mixed(start)
+        squares = pixels.squares(before, from_clipping=False)
+        image, weight = (x.astype(np.float32) for x in squares)
+        # Threads of BLAS would wait for each other at few lights.
+        with one_thread() if len(start) <= FEW_LIGHTS else nullcontext():
+            M = np.stack([(r * w) @ r.T for r, w in zip(self._rows, weight, strict=True)])
+        b = np.stack([r @ x for r, x in zip(self._rows, weight * image, strict=True)])
+        norm2 = np.square(image) * weight
+        equations = NormalEquations(
+            M.astype(np.float64), b.astype(np.float64), norm2.sum(axis=1, dtype=np.float64)
+        )
+        found, value = best(equations, start), missed(start, before)
+        for part in PARTS:
+            nearer = between(start, found, part)
+            if missed(nearer, self._mixed(nearer)) <= value:
+                return nearer
+        return start
+
+    def _mixed(self, weights: Doubles) -> Doubles:
+        """The picture of these weights, (3, p)."""
+        w = weights.astype(np.float32)
+        mixed = np.stack([w[:, c] @ rows for c, rows in enumerate(self._rows)])
+        return mixed.astype(np.float64)
+
+
+def _around(along: slice, side: int, length: int) -> tuple[int, int]:
+    """The pixels of all blocks that a slice touches."""
+    start, stop, _ = along.indices(length)
+    return start // side * side, min(-(-stop // side) * side, length)
+
+
+def _summed(values: npt.NDArray[np.float64], side: int) -> Doubles:
+    """Sums over blocks; those that the border cuts off are of what there is."""
+    height, width = values.shape[:2]
+    rows, columns = (np.arange(0, length, side) for length in (height, width))
+    return np.asarray(np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1))
+
+
+def _averaged(image: Floats, side: int) -> Floats:
+    """(h, w, 3) means over blocks."""
+    height, width = image.shape[:2]
+    if side == 1:
+        return image
+    if not (height % side or width % side):
+        return block_mean(image, side)
+    ones = _summed(np.ones((height, width)), side)
+    return np.asarray(_summed(image.astype(np.float64), side) / ones[..., None], np.float32)
+
+
+def _planes(image: Floats) -> Doubles:
+    return np.ascontiguousarray(image.reshape(-1, 3).T, np.float64)
