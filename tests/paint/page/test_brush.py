@@ -188,7 +188,8 @@ def test_a_stroke_may_leave_the_picture_on_any_side(page: Any):
                 f"""async ([H, W]) => {{
                     const hand = await import("/engine/hand.js");
                     const canvas = bench.plain(H, W, 0, null);
-                    const stroke = new hand.Stroke(canvas, {{ ...hand.FIRST, size: 20 }}, {begin}, 1);
+                    const use = {{ ...hand.FIRST, size: 20 }};
+                    const stroke = new hand.Stroke(canvas, use, {begin}, 1);
                     return [...stroke.begin(), ...stroke.move([{to}]), canvas.end()];
                 }}""",
                 [H, W],
