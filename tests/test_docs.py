@@ -39,6 +39,27 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
     assert sorted(options - _options()) == []
 
 
+def test_keys_of_the_painter_are_those_of_its_page():
+    page = ROOT / "lightpaint" / "paint" / "page" / "ui"
+    tools = re.findall(
+        r"label: '(\w+)',\s*icon: '\w+',\s*keys: '(\w)'", (page / "tools.js").read_text()
+    )
+    others = re.findall(
+        r"shown: \[((?:'[^']*'(?:, )?)+)\],\s*does: '([^']*)'", (page / "keys.js").read_text()
+    )
+    keys = [*((f"'{key}'", label) for label, key in tools), *others]
+    assert len(keys) > 30
+    shown = [re.findall(r"'([^']*)'", names) for names, _ in keys]
+    rows = [
+        f"| {' '.join(f'`{name}`' for name in names)} | {does} |"
+        for names, (_, does) in zip(shown, keys, strict=True)
+    ]
+    [table] = re.findall(
+        r"\| key \| does \|\n\|[-|]+\|\n((?:\|.*\n)+)", (ROOT / "docs" / "painter.md").read_text()
+    )
+    assert table.splitlines() == rows
+
+
 def _options() -> set[str]:
     [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
     return {

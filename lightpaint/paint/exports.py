@@ -86,5 +86,6 @@ def verified(
         predicted = combine(basis, lighting)
         result = verify(predicted, relit, spp=basis.origin.spp, progress=progress)
     picture = denoised(result.verified.image, basis.features)
-    said = f"Rendered with {basis.origin.spp} samples per pixel: {agreement(result)}."
+    says = "confirms it" if result.agrees else "does NOT confirm it"
+    said = f"A render of {basis.origin.spp} samples per pixel {says}: {agreement(result)}."
     return picture, said, result.agrees

@@ -368,8 +368,12 @@ class Studio:
 
     def _export(self, message: protocol.Export) -> None:
         session, lighting = self._answer()
+
+        def hears(_: str, done: int, total: int, unit: str = "passes") -> None:
+            self._hears("export", done, total, unit)
+
         with self._render:
-            files = export(self.subject, session.moment(), lighting, message.what, self._hears)
+            files = export(self.subject, session.moment(), lighting, message.what, hears)
         command = self._command(session)
         self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
 

@@ -167,7 +167,7 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
         f"no mix of {which} can reach": d.unreachable,
         "only light below zero could"
         if not d.is_constrained
-        else "what is asked of the lights, or zero, forbids": d.forbidden,
+        else "would need other limits of the lights or light below zero": d.forbidden,
         "is given up for the other views": d.compromise,
         "is noise of the basis": d.noise,
         noise_of_painting(d): d.painting_noise,
@@ -226,7 +226,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
     it = "it" if is_one else "them"
     held = {
         "kept": f"kept as it is; adjusting {it} too",
-        "lock": f"locked ({bound.held_by}); adjusting {it}",
+        "lock": f"locked; adjusting {it}",
         "off": f"switched off, as asked; switching {it} on",
         "left out": f"left out, as only so many may be on; switching {it} on too",
         "tie": "on one dimmer; adjusting each by itself",

@@ -14,8 +14,8 @@ from lightpaint.screen import some_names
 #: What is asked beside the painting, as what holds the lights back.
 HOLDING: dict[Held, str] = {
     "hold": "what you did not paint is held as it is",
-    "colors": "lamps are held to their colours",
-    "constraints": "limits and locks hold the lights",
+    "colors": "lamps keep their colours",
+    "constraints": "some lights are locked or limited",
 }
 
 
@@ -85,7 +85,8 @@ def _why(seen: Seen) -> str:
     assert seen.place is not None
     if seen.held:
         said = HOLDING | {"views": _spoken_views(seen.held_by_views)}
-        return " and ".join(said[one] for one in seen.held)
+        *most, last = (said[one] for one in seen.held)
+        return f"{', '.join(most)}, and {last}" if most else last
     if not seen.there:
         return "no light gets there"
     some, is_one = some_names(seen.there[:2], joint=" and "), len(seen.there) == 1

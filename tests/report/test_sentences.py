@@ -121,7 +121,7 @@ def test_the_most_useful_comes_first(make_basis: Any):
     ("bound", "words"),
     [
         (_bound("kept", "rest"), "Light rest is kept as it is; adjusting it too would take away"),
-        (_bound("lock", "a"), "Light a is locked (as asked); adjusting it would"),
+        (_bound("lock", "a"), "Light a is locked; adjusting it would"),
         (_bound("off", "a"), "Light a is switched off, as asked; switching it on would"),
         (_bound("left out", "a"), "Light a is left out, as only so many may be on; switching it"),
         (_bound("left out", "a", "b"), "Lights a, b are left out, as only so many may be on"),

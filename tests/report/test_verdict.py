@@ -66,8 +66,8 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(5.0, held=("colors", "constraints")),
-            "Part of the way, but the brighter light in the middle is out of reach: lamps are held "
-            "to their colours and limits and locks hold the lights.",
+            "Part of the way, but the brighter light in the middle is out of reach: lamps keep "
+            "their colours, and some lights are locked or limited.",
         ),
         (
             _seen(5.0, on="figure_hollow"),
@@ -86,8 +86,8 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(5.0, held=("colors", "views"), held_by_views=("a", "b")),
-            "Part of the way, but the brighter light in the middle is out of reach: lamps are held "
-            "to their colours and views a and b ask for other light.",
+            "Part of the way, but the brighter light in the middle is out of reach: lamps keep "
+            "their colours, and views a and b ask for other light.",
         ),
         (
             Seen(14.0, 0.0, 20.0),

@@ -71,7 +71,7 @@ function listen({ engine, session, store }) {
     if (!state || isSized) return;
     isSized = true;
     store.set({
-      size: Math.max(4, Math.round(0.09 * state.size[0])),
+      size: Math.max(4, Math.round(0.14 * state.size[0])),
       show: {
         ...show,
         transform: state.transform?.name ?? show.transform,

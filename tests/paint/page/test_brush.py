@@ -177,3 +177,23 @@ def test_at_the_border_nothing_is_written_elsewhere(page: Any):
     assert importance[32, 5] > 0.5
     assert importance[32, 20] == 0
     np.testing.assert_array_equal(image[importance == 0], 0)
+
+
+def test_a_stroke_may_leave_the_picture_on_any_side(page: Any):
+    """Or begin beside it: what it touches lies within, also where that is nothing."""
+    for way in ((-60, 0), (60, 0), (0, -60), (0, 60), (70, 70), (-70, -70)):
+        inside, outside = place(40, 32), place(40 + 2 * way[0], 32 + 2 * way[1])
+        for begin, to in ((inside, outside), (outside, inside), (outside, outside)):
+            regions = page.evaluate(
+                f"""async ([H, W]) => {{
+                    const hand = await import("/engine/hand.js");
+                    const canvas = bench.plain(H, W, 0, null);
+                    const use = {{ ...hand.FIRST, size: 20 }};
+                    const stroke = new hand.Stroke(canvas, use, {begin}, 1);
+                    return [...stroke.begin(), ...stroke.move([{to}]), canvas.end()];
+                }}""",
+                [H, W],
+            )
+            for top, bottom, left, right in regions:
+                assert 0 <= top <= bottom <= H
+                assert 0 <= left <= right <= W

@@ -53,17 +53,11 @@ export class PaintCanvas {
    * @param {number} top @param {number} bottom @param {number} left @param {number} right
    * @returns {Region} */
   clipped(top, bottom, left, right) {
-    const [y0, x0] = [Math.max(0, Math.floor(top)), Math.max(0, Math.floor(left))];
-    const [y1, x1] = [
-      Math.min(this.height, Math.ceil(bottom)),
-      Math.min(this.width, Math.ceil(right)),
-    ];
-    return [
-      Math.min(y0, this.height),
-      Math.max(y0, y1),
-      Math.min(x0, this.width),
-      Math.max(x0, x1),
-    ];
+    const within = (/** @type {number} */ x, /** @type {number} */ most) =>
+      Math.min(most, Math.max(0, x));
+    const [y0, x0] = [within(Math.floor(top), this.height), within(Math.floor(left), this.width)];
+    const [y1, x1] = [within(Math.ceil(bottom), this.height), within(Math.ceil(right), this.width)];
+    return [y0, Math.max(y0, y1), x0, Math.max(x0, x1)];
   }
 
   begin() {

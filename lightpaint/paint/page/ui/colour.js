@@ -78,7 +78,9 @@ function White({ colour, set }) {
   // Of what is no white, the last one stays on the dials; black keeps them, too.
   const [last, setLast] = useState({ kelvin: 3200, green: 0 });
   const found = toKelvin(colour);
-  const dials = same(ofKelvin(last.kelvin, last.green), colour) ? last : (found ?? last);
+  const isLast = same(ofKelvin(last.kelvin, last.green), colour);
+  const dials = isLast ? last : (found ?? last);
+  const isWhite = isLast || found !== null || !Math.max(...colour);
   const level = Math.max(...colour) || 1;
   const dial = (/** @type {{kelvin?: number, green?: number}} */ changed) => {
     const made = { ...dials, ...changed };
@@ -88,13 +90,14 @@ function White({ colour, set }) {
   };
   const kelvin = Math.min(15000, Math.max(1500, dials.kelvin));
   const green = Math.min(20, Math.max(-20, dials.green));
-  return html`<${Slider} label="Kelvin" value=${kelvin} least=${1500} most=${15000} step=${100}
+  return html`<div class=${`white ${isWhite ? '' : 'is-dim'}`}>
+    <${Slider} label="Kelvin" value=${kelvin} least=${1500} most=${15000} step=${100}
       unit="K" curve=${MIRED} track=${KELVIN_TRACK}
       change=${(/** @type {number} */ made) => dial({ kelvin: made })} />
     <${Slider} label="Green" value=${green} least=${-20} most=${20} step=${1} digits=${0} rest=${0}
       track=${gradient([-20, 0, 20].map((by) => ofKelvin(kelvin, by)))}
       tip="Towards green, or to the left towards magenta: thousandths of (u, v)"
-      change=${(/** @type {number} */ made) => dial({ green: made })} />`;
+      change=${(/** @type {number} */ made) => dial({ green: made })} /></div>`;
 }
 
 /** Up to how bright they are. @param {RGB} a @param {RGB} b */

@@ -20,6 +20,8 @@ export function ring(
   y = Number(rings?.dataset.y),
 ) {
   if (!rings || !Number.isFinite(x)) return;
+  // What changes while no pointer is there brings no brush back.
+  if (rings.hidden && x === Number(rings.dataset.x) && y === Number(rings.dataset.y)) return;
   rings.dataset.x = String(x);
   rings.dataset.y = String(y);
   const pane = paneAt(engine, x, y);

@@ -1,6 +1,7 @@
 /** Windows over the painter: all keys, files to write, how a painting is answered. */
 
 import { html, useState } from '../vendor/preact.js';
+import { Bar } from './bar.js';
 import { Button, Check, Choice, Dialog, Number_ } from './controls.js';
 import { number } from './format.js';
 import { KEYS } from './keys.js';
@@ -39,7 +40,7 @@ function KeysDialog({ close }) {
 }
 
 const FILES = [
-  { key: 'target', label: 'Painting', about: 'target.exr, for lightpaint solve' },
+  { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
   { key: 'lighting', label: 'Lighting', about: 'lighting.json: every light, in numbers' },
   { key: 'relit', label: 'Scene', about: 'relit.xml: the scene with this lighting' },
   { key: 'report', label: 'Report', about: 'report.html: what was painted, what came of it' },
@@ -63,6 +64,7 @@ function ExportDialog({ ui, hands, close }) {
       <span class="faint">${about}</span></div>`,
     )}
     <div class="row"><span class="faint folder">into ${ui.state?.folder}</span>
+      ${isBusy && ui.writing && html`<${Bar} progress=${ui.writing} label="Writing" />`}
       <${Button} label=${isBusy ? 'Writing …' : 'Write'} primary disabled=${isBusy || !what.length}
         act=${write} /></div>
     ${

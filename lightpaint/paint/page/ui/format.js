@@ -33,8 +33,11 @@ export function percent(share) {
   return `${Math.round(value)} %`;
 }
 
-/** @param {number} kelvin @returns {string} */
-export const kelvinText = (kelvin) => `${Math.round(kelvin / 10) * 10} K`;
+/** No finer than an eye tells them apart. @param {number} kelvin @returns {string} */
+export const kelvinText = (kelvin) => {
+  const step = kelvin < 4000 ? 10 : kelvin < 8000 ? 50 : 500;
+  return `${Math.round(kelvin / step) * step} K`;
+};
 
 /** @param {number} count @param {string} one @param {string} [many] @returns {string} */
 export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;

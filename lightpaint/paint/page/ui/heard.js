@@ -84,7 +84,8 @@ export function answerOf(message, ui) {
 /** @param {any} message @returns {Partial<Ui>} */
 export function progressOf({ what, done, total, unit }) {
   const made = { what, done, total, unit };
-  if (!what) return { basis: null, verifying: null };
+  if (!what) return { basis: null, verifying: null, writing: null };
+  if (what === 'export') return { writing: made };
   if (/verif/i.test(what)) return { verifying: made };
   return { basis: total && done >= total ? null : made };
 }

@@ -74,7 +74,7 @@ export const KEYS = [
       {
         keys: 'escape',
         shown: ['Esc'],
-        does: 'leave the stroke',
+        does: 'give up the stroke',
         act: ({ engine, store }) => {
           engine.cancel();
           store.set({ asking: null, hovered: null });

@@ -97,7 +97,7 @@ export class LightRow extends Component {
     const hue = white ? kelvinText(white) : (lit?.hue ?? '');
     const parts = [
       hue,
-      [number(level), !isLive && lit?.error, light.unit].filter(Boolean).join(' '),
+      [number(level), light.unit, !isLive && lit?.error].filter(Boolean).join(' '),
     ].filter(Boolean);
     return html`<div class="light-numbers">
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"

@@ -12,10 +12,10 @@ import { LightRow } from './light.js';
 /** @typedef {import("./keys.js").Hands} Hands */
 
 const SORTS = [
-  { value: 'scene', label: 'As in the scene' },
+  { value: 'scene', label: 'Scene order' },
   { value: 'name', label: 'Name' },
-  { value: 'share', label: 'Share of the picture' },
-  { value: 'change', label: 'Change' },
+  { value: 'share', label: 'Largest share' },
+  { value: 'change', label: 'Most changed' },
 ];
 
 /** With more lights than these, only rows that are unfolded have their slider. */

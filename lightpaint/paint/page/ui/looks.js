@@ -90,17 +90,19 @@ function Mix({ ui, hands }) {
     hands.session.send('mix_looks', { first: a, second: b, part, name });
   };
   return html`<div class="mix" role="group" aria-label="Compare two looks">
-    <${Button} label=${ui.mix ? 'Back to the painting' : 'Compare looks'} on=${Boolean(ui.mix)}
-      act=${() => (ui.mix ? end() : set({}))} />
-    <div class="row"><${Select} label="First look" hidden value=${String(a)} choices=${choices}
+    <div class="row">
+      <${Button} label=${ui.mix ? 'Back to the painting' : 'Compare looks'} on=${Boolean(ui.mix)}
+        act=${() => (ui.mix ? end() : set({}))} />
+      <${Select} label="First look" hidden value=${String(a)} choices=${choices}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
       <${Select} label="Second look" hidden value=${String(b)} choices=${choices}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} /></div>
     ${
       ui.mix &&
-      html`<${Slider} label="Between" value=${100 * ui.mix.share} least=${0} most=${100}
-      unit="%" change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
-      <${Button} label="Keep this as a look" act=${keep} />`
+      html`<div class="row"><${Slider} label="Between" value=${100 * ui.mix.share} least=${0}
+          most=${100} unit="%"
+          change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
+        <${Button} label="Keep as look" act=${keep} /></div>`
     }
   </div>`;
 }

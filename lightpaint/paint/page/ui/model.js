@@ -1,5 +1,7 @@
 /** What the interface knows: of the session, and of itself. */
 
+import { ofKelvin } from './colours.js';
+
 /** @typedef {import("./engine.js").RGB} RGB */
 /** @typedef {import("./engine.js").Show} Show */
 /** @typedef {import("./engine.js").Tool} Tool */
@@ -21,6 +23,7 @@
  * @property {boolean} readonly
  * @property {string} waiting why there is nothing yet, if something went wrong
  * @property {boolean} isWriting files
+ * @property {Progress | null} writing how far that is, where it takes long
  * @property {any} state as the session said it last
  * @property {Light[]} lights
  * @property {Lit[]} lit the last exact answer
@@ -100,6 +103,7 @@ export function first() {
     readonly: false,
     waiting: '',
     isWriting: false,
+    writing: null,
     state: null,
     lights: [],
     lit: [],
@@ -127,14 +131,14 @@ export function first() {
     hint: false,
     tool: 'brush',
     size: 60,
-    hardness: 0.3,
-    flow: 0.7,
+    hardness: 0.2,
+    flow: 0.5,
     importance: 1,
     as: 'light',
     about: 'spot',
-    colour: [1, 0.45, 0.13],
+    colour: ofKelvin(3200),
     stops: 0,
-    second: { colour: [0.2, 0.4, 1], stops: 0 },
+    second: { colour: [0.35, 0.6, 1], stops: 0 },
     recent: [],
     mixer: 'white',
     asking: null,

@@ -75,7 +75,7 @@ export class Session {
         looks: m.looks,
         resources: { ...this.store.value.resources, ...m.resources },
       }),
-      exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false }),
+      exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false, writing: null }),
       verified: (/** @type {any} */ m) => ({ verified: m, verifying: null }),
       explained: (/** @type {any} */ m) => ({ explained: m.sentences }),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
@@ -97,14 +97,14 @@ export class Session {
 
   /** @param {string} text */
   failed(text) {
-    this.store.set({ verifying: null, isWriting: false });
+    this.store.set({ verifying: null, isWriting: false, writing: null });
     this.toast(text, 'warn');
   }
 
   /** What goes wrong beside the painting comes so, too. @param {string} text
    * @param {'info' | 'warn'} tone */
   say(text, tone) {
-    if (tone === 'warn') this.store.set({ isWriting: false });
+    if (tone === 'warn') this.store.set({ isWriting: false, writing: null });
     this.toast(text, tone);
   }
 

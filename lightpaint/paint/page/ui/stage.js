@@ -259,6 +259,7 @@ function byKeys(event, pointer, engine, store) {
   const rings = /** @type {HTMLElement} */ (element.querySelector('.rings'));
   const pane = engine.panes()[0];
   const step = event.shiftKey ? 1 : 12;
+  rings.hidden = false;
   const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
   const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
   pointer.moved(x, y);

@@ -35,7 +35,10 @@ export function TruthPanel({ ui, hands }) {
     look(store, { overlay: value });
     if (value === 'beyond' && ui.resources.beyond === undefined) session.send('explain');
   };
-  const sentences = ui.explained.length ? ui.explained : ui.sentences;
+  // The first of them stands below the pictures, too.
+  const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
+    (text) => text !== ui.headline,
+  );
   return html`<div class="truth">
     <${Choice} label="Over the pictures" value=${overlay} choices=${OVERLAYS} change=${choose} />
     ${
@@ -94,7 +97,9 @@ function Verified({ ui, hands }) {
 export function AnswerLine({ ui, hands }) {
   const { store, session } = hands;
   const first = ui.state?.first && !ui.history.undo.length;
-  const text = first ? 'Nothing is painted yet: the answer is the present lighting.' : ui.headline;
+  const text = first
+    ? 'Nothing is painted yet: the answer is the present lighting.'
+    : ui.headline || 'Finding the lighting …';
   return html`<div class="answer">
     <p class="headline" role="status">
       ${

@@ -1,0 +1,198 @@
+"""Records a session of the painter: the moving picture of the README, and one that stands still.
+
+    pip install '.[test]'
+    python docs/images/record.py [--spp 64] [--port 8431]
+
+writes beside itself
+
+    painting.webp   somebody paints the gallery: a warm wall, a cool one, light on a figure
+    painter.jpg     the painter when that is done
+
+The painter's own server, with a new session in a folder that is removed, and headless Chromium.
+The basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+
+from PIL import Image, ImageDraw
+from playwright.sync_api import Page, sync_playwright
+
+HERE = Path(__file__).resolve().parent
+SCENE = HERE.parent.parent / "scenes" / "gallery" / "scene.xml"
+
+#: Of the page, and of the recording.
+WINDOW, SIZE = (1360, 800), (1020, 600)
+
+#: Milliseconds that a frame is shown.
+FRAME = 90
+
+#: An arrow whose tip is its first point.
+POINTER = ((0, 0), (0, 19), (5, 15), (8, 22), (12, 20), (9, 14), (15, 14))
+
+Place = tuple[float, float]
+
+
+class Hand:
+    """Uses a page with a pointer that is seen, and takes a picture after every move."""
+
+    def __init__(self, page: Page) -> None:
+        self.page, self.at = page, (620.0, 30.0)
+        self.frames: list[Image.Image] = []
+        self.times: list[int] = []
+
+    def see(self, times: int = 1) -> None:
+        """What the window shows now, with the pointer."""
+        frame = Image.open(BytesIO(self.page.screenshot())).convert("RGB")
+        tip = [(self.at[0] + x, self.at[1] + y) for x, y in POINTER]
+        ImageDraw.Draw(frame).polygon(tip, fill="white", outline="black", width=1)
+        self.frames.append(frame)
+        self.times.append(times * FRAME)
+
+    def go(self, to: Place, moves: int = 6) -> None:
+        """Move there, slower at both ends."""
+        begin = self.at
+        for k in range(1, moves + 1):
+            t = k / moves
+            t = t * t * (3 - 2 * t)
+            self.at = tuple(a + t * (b - a) for a, b in zip(begin, to, strict=True))  # type: ignore[assignment]
+            self.page.mouse.move(*self.at)
+            time.sleep(0.05)
+            self.see()
+
+    def drag(self, *places: Place, moves: int = 7) -> None:
+        """Press at the first place, and let go at the last."""
+        self.go(places[0])
+        self.page.mouse.down()
+        for place in places[1:]:
+            self.go(place, moves)
+        self.page.mouse.up()
+
+    def press(self, name: str) -> None:
+        """Click on what has that label."""
+        box = self.page.get_by_role("button", name=name, exact=True).first.bounding_box()
+        assert box is not None, name
+        self.go((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
+        self.page.mouse.click(*self.at)
+        self.see(3)
+
+    def wait(self, times: int = 12) -> None:
+        """Until the answer is exact, and its sentence is there."""
+        said = self.page.locator(".headline .said")
+        until = time.time() + 60
+        while time.time() < until:
+            time.sleep(0.4)
+            is_live = self.page.locator(".headline .live").count()
+            if not is_live and "…" not in said.inner_text():
+                break
+        time.sleep(0.8)  # a toast, a sharp picture
+        self.see(times)
+
+    def of_painting(self, u: float, v: float) -> Place:
+        """A place of the left, or upper, picture, as shares of it."""
+        left, top, width, height = self.page.evaluate(
+            """() => {
+              const { engine } = document.getElementById('lightpaint').painter;
+              const { x, y } = engine.element.getBoundingClientRect();
+              const [pane] = engine.panes(), [height, width] = engine.screen.size;
+              return [x + pane.left, y + pane.top, width * pane.scale, height * pane.scale];
+            }"""
+        )
+        return left + u * width, top + v * height
+
+
+def session(hand: Hand) -> None:
+    """What somebody does."""
+    on = hand.of_painting
+    hand.see(12)
+    # A low sun on the wall to the right.
+    hand.drag(on(0.895, 0.25), on(0.905, 0.62), on(0.94, 0.74), on(0.93, 0.5))
+    hand.wait()
+    # The other colour, on the wall to the left.
+    hand.page.keyboard.press("x")
+    hand.see(3)
+    hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37), on(0.02, 0.33))
+    hand.wait()
+    # More light on the figure, and warmer.
+    hand.press("Ask by dragging: up is brighter, right is warmer")
+    x, y = on(0.295, 0.56)
+    hand.drag((x, y), (x + 50, y - 110), moves=14)
+    hand.wait()
+    hand.press("Wipe")
+    hand.see(16)
+    hand.press("Side by side")
+    hand.see(16)
+
+
+@contextmanager
+def painter(spp: int, port: int) -> Iterator[str]:
+    """The address of a painter with a session of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = [
+            "paint",
+            str(SCENE),
+            f"--spp={spp}",
+            f"--port={port}",
+            "--no-browser",
+            "-o",
+            folder,
+        ]
+        run = [sys.executable, "-m", "lightpaint", *words]
+        server = subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        assert server.stdout is not None
+        try:
+            yield next(word for line in server.stdout for word in line.split() if "?token=" in word)
+        finally:
+            server.terminate()
+            server.wait(60)
+
+
+def main() -> None:
+    """Record it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--port", type=int, default=8431)
+    asked = parser.parse_args()
+    with painter(asked.spp, asked.port) as url, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
+        )
+        page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
+        clean: list[str] = []
+        page.on("response", lambda it: clean.append(it.url) if "/data/clean/" in it.url else None)
+        page.goto(url)
+        lights = page.locator("[data-light]")
+        lights.first.wait_for(timeout=600_000)
+        # Nothing that is published has grain.
+        while len(clean) < lights.count():
+            page.wait_for_timeout(500)
+        page.wait_for_timeout(1500)
+        hand = Hand(page)
+        session(hand)
+        page.screenshot(path=HERE / "painter.jpg", type="jpeg", quality=88)
+        browser.close()
+    first, *others = (frame.resize(SIZE, Image.Resampling.LANCZOS) for frame in hand.frames)
+    first.save(
+        HERE / "painting.webp",
+        save_all=True,
+        append_images=others,
+        duration=hand.times,
+        loop=0,
+        quality=60,
+        method=4,
+    )
+    print(f"{len(hand.frames)} frames, {(HERE / 'painting.webp').stat().st_size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()
