@@ -191,6 +191,11 @@ class Studio:
                 self._say(Message("progress", {"what": "", "done": 1, "total": 1}))
             except LightpaintError as error:
                 self._say(Message("say", {"text": str(error), "tone": "warn"}))
+            except Exception as error:
+                # Nor does a mistake of our own leave a page waiting.
+                traceback.print_exception(error)
+                text = f"that could not be done: {first_line(error)}"
+                self._say(Message("say", {"text": text, "tone": "warn"}))
 
         Thread(target=run, name=f"lightpaint-{work.__name__}", daemon=True).start()
         return [Message("started", {"what": type(message).__name__.lower()})]
@@ -369,7 +374,8 @@ class Studio:
     def _export(self, message: protocol.Export) -> None:
         session, lighting = self._answer()
 
-        def hears(_: str, done: int, total: int, unit: str = "passes") -> None:
+        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+            del label  # what it is at within an export is no news to a page
             self._hears("export", done, total, unit)
 
         with self._render:
