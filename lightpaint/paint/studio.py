@@ -359,7 +359,7 @@ class Studio:
 
     # Long work
 
-    def _answer(self) -> tuple[Session, Lighting]:
+    def _answer(self) -> tuple[Session, Moment, Lighting]:
         """The exact answer to what is painted now."""
         with self._lock:
             session = self._session
@@ -367,19 +367,19 @@ class Studio:
             moment = session.moment()
         solution = moment.solution()
         if solution is None:
-            return session, Lighting.of_weights(session.basis, session.weights)
+            return session, moment, Lighting.of_weights(session.basis, session.weights)
         solution = with_findings(solution, analyse(solution))
-        return session, solution.lighting
+        return session, moment, solution.lighting
 
     def _export(self, message: protocol.Export) -> None:
-        session, lighting = self._answer()
+        session, moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label  # what it is at within an export is no news to a page
             self._hears("export", done, total, unit)
 
         with self._render:
-            files = export(self.subject, session.moment(), lighting, message.what, hears)
+            files = export(self.subject, moment, lighting, message.what, hears)
         command = self._command(session)
         self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
 
@@ -391,8 +391,8 @@ class Studio:
             raise PaintError("there is no scene to render: it was opened from a saved basis")
         return self._later(self._verified, message)
 
-    def _verified(self, _: protocol.Verify) -> None:
-        session, lighting = self._answer()
+    def _verified(self, _asked: protocol.Verify) -> None:
+        session, _, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
             if not self._renders:
