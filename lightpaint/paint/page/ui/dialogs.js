@@ -39,7 +39,7 @@ function KeysDialog({ close }) {
 }
 
 const FILES = [
-  { key: 'target', label: 'Painting', about: 'target.exr, for lightpaint solve' },
+  { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
   { key: 'lighting', label: 'Lighting', about: 'lighting.json: every light, in numbers' },
   { key: 'relit', label: 'Scene', about: 'relit.xml: the scene with this lighting' },
   { key: 'report', label: 'Report', about: 'report.html: what was painted, what came of it' },
