@@ -521,3 +521,5 @@ def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
     me.press("0").stroke((20, 20), (40, 20)).still("brush")
     np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
     assert me.look("return document.documentElement.scrollWidth <= innerWidth")
+    me.button("Write files").click()  # what does not fit is scrolled to
+    me.page.get_by_role("dialog", name="Write files").wait_for()
