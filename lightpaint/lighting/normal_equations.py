@@ -55,6 +55,11 @@ class NormalEquations:
             np.sum(across, axis=0) if across else None,
         )
 
+    def times(self, factor: float) -> "NormalEquations":
+        """The same, counting that many times as much."""
+        across = None if self.across is None else factor * self.across
+        return NormalEquations(factor * self.M, factor * self.b, factor * self.target_norm2, across)
+
     @property
     def reached(self) -> npt.NDArray[np.bool_]:
         """(n, 3), whether a light reaches something that counts in a channel."""

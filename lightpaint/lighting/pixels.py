@@ -28,7 +28,7 @@ class Pixels:
     """Pixels of a `PaintingLoss`, which says what it is.
 
     painted, current: (3, p), linear. importance, share: (p,). at_least: (3, p), None where brighter
-    is nowhere as good.
+    is nowhere as good. seen: V of painted and of current, where somebody has it.
     """
 
     painted: Doubles
@@ -37,6 +37,7 @@ class Pixels:
     current: Doubles
     at_least: Bools | None
     transform: ViewTransform | None
+    seen: tuple[Doubles, Doubles] | None = None
 
     def __len__(self) -> int:
         return len(self.importance)
@@ -50,6 +51,7 @@ class Pixels:
             share=self.share[which],
             current=self.current[:, which],
             at_least=None if self.at_least is None else self.at_least[:, which],
+            seen=None if self.seen is None else (self.seen[0][:, which], self.seen[1][:, which]),
         )
 
     def weighed(self, by: Doubles) -> "Pixels":
@@ -198,11 +200,11 @@ class Pixels:
 
     @cached_property
     def _shown_painting(self) -> Doubles:
-        return self.shown(self.painted)
+        return self.shown(self.painted) if self.seen is None else self.seen[0]
 
     @cached_property
     def _shown_current(self) -> Doubles:
-        return self.shown(self.current)
+        return self.shown(self.current) if self.seen is None else self.seen[1]
 
     @cached_property
     def _inevitable(self) -> Doubles:

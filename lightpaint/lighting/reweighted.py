@@ -152,12 +152,11 @@ def rounds(
     *,
     from_clipping: bool,
     until: float = STEP,
-    at_most: int = ROUNDS,
 ) -> Led:
     """Minimise the loss of some pixels and what is asked beside it, from weights (n, 3).
 
     from_clipping: first with what is drawn back from clipping, then with the loss's own slope.
-    until: the change of a light's picture that ends them; at_most: how many there may be.
+    until: the change of a light's picture that ends them.
     """
     pixels = lit.pixels
     is_display = pixels.transform is not None
@@ -186,7 +185,7 @@ def rounds(
             if part == 0:
                 continue
             done = False
-        if done or part == 0 or count >= at_most:
+        if done or part == 0 or count >= ROUNDS:
             small = done or (part == 0 and fall <= FLAT * value)
             weights = between(w, best, part) if is_worse else best
             return Led(weights, w, x, from_clipping, image, weight, equations, count, step, small)

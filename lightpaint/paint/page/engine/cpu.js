@@ -125,7 +125,7 @@ export class CpuView {
   liveStep() {
     const work = (this.planes.length * this.size[0] * this.size[1]) / MANY;
     const frames = Math.max(work, this.pace / BUDGET);
-    return frames <= 1 ? 1 : frames <= 5 ? 2 : 3;
+    return frames <= 1 ? 1 : frames <= 5 ? 2 : frames <= 9 ? 3 : 4;
   }
 
   /** The picture of a kind with its codes up to date; null where there is none.
