@@ -44,7 +44,7 @@ class FakeSession:
                 return [Message("answer", fields, {"weights": weights})]
         return [Message("done", {"of": type(said).__name__}), Message("say", {"text": "said"})]
 
-    def state(self) -> Message:
+    def greet(self, *, is_back: bool) -> Message:
         names = dict.fromkeys(self.pictures, 1)
         return Message("state", {"version": VERSION, "resources": names, "size": [2, 3]})
 

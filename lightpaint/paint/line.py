@@ -41,8 +41,8 @@ class Painted(Protocol):
     def said(self, said: Said, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
         """What is answered; the first answers the message. Raises LightpaintError."""
 
-    def state(self) -> Message:
-        """All that a page has to know."""
+    def greet(self, *, is_back: bool) -> Message:
+        """All that a page has to know; is_back: it had the session before, and nobody since."""
 
     def resource(self, name: str) -> npt.NDArray[Any]:
         """A picture. Raises PaintError if there is none of that name."""
@@ -60,6 +60,7 @@ class Line:
         self.session, self.store, self.say = session, store, say
         self.generations: dict[str, int] = {}
         self._holder: Client | None = None
+        self._last: Client | None = None
         self._clients: set[Client] = set()
         self._worker = ThreadPoolExecutor(1, "lightpaint-session")
         self._unsaved: str | None = None
@@ -142,8 +143,9 @@ class Line:
                     heard.takes_over or _same_page(self._holder, client)
                 ):
                     return [_taken("another tab has this session")]
+                is_back = self._last is client or _same_page(self._last, client)
                 self._give(client)
-                return [await self._done(self.session.state)]
+                return [await self._done(partial(self.session.greet, is_back=is_back))]
             if self._holder is not client:
                 return [_taken("this tab does not have the session")]
             assert heard.said is not None
@@ -158,7 +160,7 @@ class Line:
 
     def _give(self, client: Client) -> None:
         """`client` has the session from now on."""
-        before, self._holder = self._holder, client
+        before, self._holder, self._last = self._holder, client, client
         if before is None or before is client:
             return
         if _same_page(before, client):  # it is at the other end of a lost connection

@@ -135,6 +135,7 @@ class Server:
         self._host = _shown(host)
         pixels = MAX_FRAME if store is None or store.identity is None else prod(store.identity.size)
         self._largest = min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
+        self._serving: uvicorn.Server | None = None
 
     @property
     def url(self) -> str:
@@ -170,8 +171,14 @@ class Server:
             limit_concurrency=256,
             timeout_graceful_shutdown=5,
         )
-        with _hanging_up(server := Ending(config)):
-            server.run(sockets=[self._socket])
+        self._serving = Ending(config)
+        with _hanging_up(self._serving):
+            self._serving.run(sockets=[self._socket])
+
+    def stop(self) -> None:
+        """Let `run` end, from another thread."""
+        if self._serving is not None:
+            self._serving.should_exit = True
 
     def close(self) -> None:
         """Listen no more."""

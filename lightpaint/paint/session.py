@@ -263,6 +263,19 @@ class Session:
         self.weights = weights
         self._changed()
 
+    def left(self, *, with_stroke: bool) -> None:
+        """Whoever was at it has gone, or begins anew: a slider that was left moves back.
+
+        with_stroke: whether a stroke that is open is as it will stay, and kept so.
+        """
+        if self._moved is not None:
+            self.wishes, self._moved = self._moved, None
+            self._asks()
+            self._changed()
+        if with_stroke and self._open:
+            self._close("stroke")
+            self._changed()
+
     def load(self, image: Floats, importance: Floats, wishes: Wishes, label: str) -> Message:
         """Go on from another painting and what was asked with it: one step."""
         self._forget_open()

@@ -65,6 +65,7 @@ class Studio:
         self._session: Session | None = None
         self._looks: Looks | None = None
         self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
+        self._progress: Mapping[str, Any] | None = None  # of the first picture
         self._lock, self._bell = RLock(), Condition()
         self._unsettled, self._is_open, self._failed = False, True, ""
         self._render, self._renders = Lock(), False
@@ -112,7 +113,9 @@ class Studio:
                 "can_render": self.subject.scene is not None,
             }
             if session is None:
-                return Message("waiting", {**about, "text": self._failed})
+                return Message(
+                    "waiting", {**about, "text": self._failed, "progress": self._progress}
+                )
             basis = session.basis
             about |= self._of_basis(basis, session)
             known = self._known if self._known.get("version") == session.version else {}
@@ -120,10 +123,20 @@ class Studio:
             arrays = session.weights_array
             return Message("state", {**about, **session.about, "answer": answer}, arrays)
 
+    def greet(self, *, is_back: bool) -> Message:
+        """The state, for a page that begins; is_back: it was there before, and will send what it
+        has of a stroke again. What another one had begun is kept as it was left.
+        """
+        with self._lock:
+            if self._session is not None and self._session.is_open:
+                self._session.left(with_stroke=not is_back)
+                self._ring()
+            return self.state()
+
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
         """What comes of a message at once. Raises LightpaintError for what cannot be done."""
         if isinstance(message, protocol.Hello | protocol.TakeOver):
-            return [self.state()]
+            return [self.greet(is_back=True)]
         if isinstance(message, protocol.Fetch):
             return [
                 Message("fetched", {"name": message.name}, {"data": self.resource(message.name)})
@@ -178,7 +191,10 @@ class Studio:
     def _hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         if not self._is_open:
             raise StoppedError
-        self._say(Message("progress", {"what": label, "done": done, "total": total, "unit": unit}))
+        about = {"what": label, "done": done, "total": total, "unit": unit}
+        if self._session is None:
+            self._progress = about
+        self._say(Message("progress", about))
 
     def _later(self, work: Callable[[Any], None], message: Any) -> list[Message]:
         """Do it in a thread of its own; what fails is said."""
@@ -189,13 +205,8 @@ class Studio:
                 work(message)
             except StoppedError:
                 self._say(Message("progress", {"what": "", "done": 1, "total": 1}))
-            except LightpaintError as error:
-                self._say(Message("say", {"text": str(error), "tone": "warn"}))
             except Exception as error:
-                # Nor does a mistake of our own leave a page waiting.
-                traceback.print_exception(error)
-                text = f"that could not be done: {first_line(error)}"
-                self._say(Message("say", {"text": text, "tone": "warn"}))
+                self._say(Message("say", {"text": _told(error), "tone": "warn"}))
 
         Thread(target=run, name=f"lightpaint-{work.__name__}", daemon=True).start()
         return [Message("started", {"what": type(message).__name__.lower()})]
@@ -210,9 +221,11 @@ class Studio:
             self._clean()
         except StoppedError:
             pass
-        except LightpaintError as error:
-            self._failed = str(error)
+        except Exception as error:
+            self._failed = _told(error)
             self._say(Message("say", {"text": self._failed, "tone": "warn"}))
+            if self._session is None:
+                self._say(self.state())
 
     def _take(self, basis: Basis) -> None:
         """Paint on with this basis."""
@@ -286,13 +299,13 @@ class Studio:
             "has_noise": basis.knows_noise,
             "first": not session.store.steps,
             "stroke": session.stroke,
-            "command": self._command(session),
+            "command": self._command(session.wishes),
         }
 
-    def _command(self, session: Session) -> str:
+    def _command(self, wishes: Wishes) -> str:
         """The command that answers the exported painting alike, where there are commands."""
         subject = self.subject
-        return subject.command(str(subject.folder / PAINTING), session.wishes)
+        return subject.command(str(subject.folder / PAINTING), wishes)
 
     def _clean(self) -> None:
         """Planes without their grain, one after the other."""
@@ -330,13 +343,9 @@ class Studio:
                     continue
             try:
                 self._find()
-            except LightpaintError as error:
-                self._say(Message("say", {"text": str(error), "tone": "warn"}))
             except Exception as error:
                 # A mistake of our own ends no session: the next stroke is answered again.
-                traceback.print_exception(error)
-                text = f"this answer could not be made exact: {first_line(error)}"
-                self._say(Message("say", {"text": text, "tone": "warn"}))
+                self._say(Message("say", {"text": _told(error), "tone": "warn"}))
 
     def _find(self) -> None:
         with self._lock:
@@ -359,20 +368,20 @@ class Studio:
 
     # Long work
 
-    def _answer(self) -> tuple[Session, Moment, Lighting]:
-        """The exact answer to what is painted now."""
+    def _answer(self) -> tuple[Moment, Lighting]:
+        """What is painted now, and the exact answer to it."""
         with self._lock:
             session = self._session
             assert session is not None
-            moment = session.moment()
+            moment, weights = session.moment(), session.weights
         solution = moment.solution()
         if solution is None:
-            return session, moment, Lighting.of_weights(session.basis, session.weights)
+            return moment, Lighting.of_weights(moment.basis, weights)
         solution = with_findings(solution, analyse(solution))
-        return session, moment, solution.lighting
+        return moment, solution.lighting
 
     def _export(self, message: protocol.Export) -> None:
-        session, moment, lighting = self._answer()
+        moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label  # what it is at within an export is no news to a page
@@ -380,7 +389,7 @@ class Studio:
 
         with self._render:
             files = export(self.subject, moment, lighting, message.what, hears)
-        command = self._command(session)
+        command = self._command(moment.wishes)
         self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
 
     def _verify(self, message: protocol.Verify) -> list[Message]:
@@ -392,7 +401,7 @@ class Studio:
         return self._later(self._verified, message)
 
     def _verified(self, _asked: protocol.Verify) -> None:
-        session, _, lighting = self._answer()
+        moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
             if not self._renders:
@@ -401,7 +410,7 @@ class Studio:
 
         self._renders = True
         with self._render:
-            picture, said, agrees = verified(self.subject, session.basis, lighting, hears)
+            picture, said, agrees = verified(self.subject, moment.basis, lighting, hears)
         with self._lock:
             self.pictures.put("verified", pictures.as_halves(picture))
             new = {"verified": self.pictures.generations["verified"]}
@@ -418,6 +427,14 @@ class Studio:
             new = {"beyond": self.pictures.generations["beyond"]}
         self._say(Message("renewed", {"resources": new}))
         self._say(Message("explained", {"sentences": said}))
+
+
+def _told(error: Exception) -> str:
+    """What to say of it; a mistake of lightpaint's own is told at length where it was started."""
+    if isinstance(error, LightpaintError):
+        return str(error)
+    traceback.print_exception(error)
+    return f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
 
 
 def give_way() -> None:

@@ -212,3 +212,20 @@ def test_what_cannot_be_is_said_and_changes_nothing(
     np.testing.assert_array_equal(session.image, before[0])
     assert (session.wishes, session.version) == before[1:]
     session.said(*paint(1, (2, 9, 3, 12), 0.9))
+
+
+def test_who_leaves_in_the_middle_leaves_a_stroke_and_no_slider(basis: lp.Basis):
+    session = session_of(basis)
+    session.said(*paint(1, (2, 9, 3, 12), 0.8, done=False))
+    session.left(with_stroke=False)  # the same page will send it again
+    assert session.is_open
+    session.said(*paint(1, (2, 9, 3, 12), 0.8))
+    assert len(session.store.steps) == 1
+    session.said(protocol.Ask(0, {"lock": True}, done=False), {})
+    session.said(*paint(2, (9, 12, 3, 12), 0.8, done=False))
+    session.left(with_stroke=True)
+    assert not session.is_open
+    assert not session.wishes.lights
+    assert len(session.store.steps) == 2
+    session.said(*paint(2, (9, 12, 3, 12), 0.8))  # what comes again is there already
+    assert len(session.store.steps) == 2

@@ -1,5 +1,6 @@
 """A studio answers at once, says later what takes longer, and exports what `solve` finds."""
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -13,6 +14,7 @@ import lightpaint as lp
 from lightpaint.cli.spelling import solve_command
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
+from lightpaint.paint.session import Moment
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -212,3 +214,46 @@ def test_without_a_scene_there_is_nothing_to_render(heard: Heard):
         heard.studio.said(protocol.Verify(), {})
     with pytest.raises(lp.LightpaintError, match="no picture"):
         heard.studio.resource("../secret")
+
+
+def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
+    heard: Heard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    begun, goes_on = threading.Event(), threading.Event()
+    solution = Moment.solution
+
+    def slow(moment: Moment) -> Any:
+        begun.set()
+        goes_on.wait(30)
+        return solution(moment)
+
+    monkeypatch.setattr(Moment, "solution", slow)
+    heard.paint(1, 0.8)
+    heard.studio.said(protocol.Export(("target", "lighting")), {})
+    begun.wait(30)
+    time.sleep(0.05)  # the export, too, has begun with what there was
+    painted = heard.studio.session.image.copy()
+    answer = heard.paint(2, 0.1, (3, 12, 16, 30))
+    assert answer.fields["stroke"] == 2  # at once
+    goes_on.set()
+    exact = heard.exact()
+    np.testing.assert_array_equal(exact.arrays["weights"], heard.studio.session.weights)
+    heard.wait(lambda m: m.kind == "exported")
+    written = lp.read_target(tmp_path / "painting.exr")
+    np.testing.assert_allclose(written.image[10, 20], painted[10, 20], rtol=1e-3)
+
+
+def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
+    class Broken(Subject):
+        def bases(self, progress: Any = None) -> Any:
+            progress("lights", 1, 4)
+            raise ZeroDivisionError("of our own")
+            yield
+
+    heard: list[Message] = []
+    studio = Studio(Broken("room.xml", tmp_path), lambda _: Store.open(tmp_path / "x.db", _))
+    studio.on_message = heard.append
+    studio._obtain()
+    assert heard[0].fields["done"] == studio.state().fields["progress"]["done"] == 1
+    assert heard[-1].kind == "waiting"
+    assert "ZeroDivisionError: of our own" in heard[-1].fields["text"]

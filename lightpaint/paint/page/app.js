@@ -94,8 +94,8 @@ function Painter({ hands, root }) {
     ${!ui.readonly && html`<${ToolBar} ui=${ui} hands=${hands} />`}
     <main class=${`middle ${ui.side ? '' : 'is-wide'}`} aria-label="Painter">
       ${!ui.readonly && html`<${ToolOptions} ui=${ui} hands=${hands} />`}
-      <${Banner} ui=${ui} hands=${hands} />
       <div class="view"><${Stage} ui=${ui} hands=${hands} />
+        <${Banner} ui=${ui} hands=${hands} />
         <${Toasts} ui=${ui} hands=${hands} /></div>
       <div class="status"><${Here} ui=${ui} /><${Working} ui=${ui} /></div>
       <${AnswerLine} ui=${ui} hands=${hands} />

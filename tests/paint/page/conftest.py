@@ -1,6 +1,8 @@
 """One browser for all tests of the page, and a site that serves its modules and arrays."""
 
+import os
 import shutil
+import subprocess
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,8 +18,14 @@ from renderer import REPOSITORY
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
 HERE = Path(__file__).parent
 
-#: WebGL2 in software, so that both views are tried where there is no GPU.
-ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+#: WebGL2 in software, so that both views are tried where there is no GPU; pages themselves are put
+#: together without it, which takes a third of the time then.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+]
 KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": "text/css"}
 
 
@@ -33,6 +41,21 @@ def browser() -> Iterator[Any]:
         opened = started.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield opened
         opened.close()
+
+
+@pytest.fixture(scope="session")
+def axe() -> str:
+    """The source of axe-core: LIGHTPAINT_AXE, or where npm has it."""
+    places = [Path("node_modules")]
+    if npm := shutil.which("npm"):
+        found = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=False)
+        places.append(Path(found.stdout.strip()))
+    candidates = [Path(os.environ.get("LIGHTPAINT_AXE", "/nowhere"))]
+    candidates += [place / "axe-core" / "axe.min.js" for place in places]
+    for path in candidates:
+        if path.is_file():
+            return path.read_text(encoding="utf8")
+    pytest.skip("axe-core")
 
 
 @dataclass

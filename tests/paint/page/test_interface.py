@@ -3,11 +3,7 @@
 Session and picture engine are made up (`fake/`): here it counts what the interface sends to them.
 """
 
-import os
-import shutil
-import subprocess
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -528,23 +524,9 @@ def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
         assert cut == []
 
 
-def _axe() -> str:
-    """The source of axe-core: LIGHTPAINT_AXE, or where npm has it."""
-    places = [Path("node_modules")]
-    if npm := shutil.which("npm"):
-        found = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=False)
-        places.append(Path(found.stdout.strip()))
-    candidates = [Path(os.environ.get("LIGHTPAINT_AXE", "/nowhere"))]
-    candidates += [place / "axe-core" / "axe.min.js" for place in places]
-    for path in candidates:
-        if path.is_file():
-            return path.read_text(encoding="utf8")
-    pytest.skip("axe-core")
-
-
 @pytest.mark.parametrize("state", ["first", "busy", "keys", "export", "settings"])
-def test_axe_finds_nothing(opened: Any, state: str) -> None:
-    painter = opened("first&lights=12", init=_axe())
+def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
+    painter = opened("first&lights=12", init=axe)
     if state == "busy":
         painter.button("How true?").click()
         painter.button("False colour").click()

@@ -217,6 +217,13 @@ def test_the_wipe(make_basis: Any, opened: Any) -> None:
     assert part == pytest.approx(25, abs=1)
 
 
+def test_axe_finds_nothing_in_the_mixer(make_basis: Any, opened: Any, axe: str) -> None:
+    page = opened(report(lit(make_basis, 3)))
+    page.evaluate(axe)
+    found = page.evaluate("() => axe.run(document.querySelector('.mixer'))")
+    assert [(one["id"], [n["html"] for n in one["nodes"]]) for one in found["violations"]] == []
+
+
 def test_without_scripts_a_report_is_as_it_was(
     make_basis: Any, browser: Any, tmp_path: Path
 ) -> None:

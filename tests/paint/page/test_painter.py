@@ -182,6 +182,25 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
     assert [f["label"] for _, f in said if f.get("done")] == ["ask", "brush"]
 
 
+def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
+    light = run(
+        """
+        const fetch = host.fetch.bind(host);
+        let go; const gate = new Promise((done) => { go = done; });
+        host.fetch = async (name) => { const made = await fetch(name); await gate; return made; };
+        const synced = engine.work.sync();
+        await until(() => host.fetched.includes("importance"));
+        const arrays = { image: { data: new Float32Array(3 * H * W).fill(0.125), shape: [H, W, 3] },
+            importance: { data: new Float32Array(H * W), shape: [H, W] } };
+        host.tell("patch", { kind: "patch", region: [0, H, 0, W], arrays });
+        go();
+        await synced;
+        return engine.lightAt("painting", 5, 5)[0];
+        """
+    )
+    assert light == 0.125
+
+
 def test_what_is_pointed_at(run: Any, site: Any):
     found, outside = run("return [engine.pointed(25.7, 8.1), engine.pointed(-1, 3)];")
     levels = [

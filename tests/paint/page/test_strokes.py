@@ -160,6 +160,23 @@ def test_what_else_is_said_comes_after_strokes_that_are_done(told: Any):
     assert order in (["live", "undo", "done"], ["live", "done", "undo"])
 
 
+def test_what_another_page_did_not_let_through_waits(told: Any):
+    said, pending = told(
+        """
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
+        await host.answer();
+        await host.answer("closed");
+        const pending = strokes.isPending;
+        host.tell("connection", { state: "open" });
+        await host.answer();
+        return [host.told, [pending, strokes.isPending]];
+        """
+    )
+    assert [one["done"] for one in said] == [False, True, True]
+    assert said[-1]["region"] == [0, 2, 0, 2]  # whole
+    assert pending == [True, False]
+
+
 def test_frames_are_those_of_the_library(page: Any):
     image = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
     frame = page.evaluate(

@@ -108,14 +108,13 @@ export class SocketHost extends Hearers {
     const { kind, reply } = message;
     if (kind === 'state' || kind === 'renewed')
       this.generations = { ...this.generations, ...message.resources };
-    if (kind === 'state') {
-      this.generations = { ...message.resources };
-      this.wait = WAITS.first;
-    }
+    const isThere = kind === 'state' || kind === 'waiting';
+    if (isThere) this.wait = WAITS.first;
+    if (kind === 'state') this.generations = { ...message.resources };
     // Who is of another version, or has been told to leave, does not come back by itself.
     if (kind === 'closed' && message.reason === 'version') this.isOver = true;
     this.tell(kind, message);
-    if (kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' });
+    if (isThere) this.tell('connection', { kind: 'connection', state: 'open' });
     if (reply === undefined) return;
     this.asked.get(reply)?.resolve(message);
     this.asked.delete(reply);

@@ -39,6 +39,12 @@ export class Loader {
     this.pump();
   }
 
+  /** Which pictures there are, and no others. @param {Record<string, number>} resources */
+  begin(resources) {
+    this.resources = {};
+    this.know(resources);
+  }
+
   /** Have a picture in a slot, and its newer ones. @param {string} slot
    * @param {string | null} name null for none any more */
   want(slot, name) {

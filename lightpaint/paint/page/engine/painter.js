@@ -150,20 +150,21 @@ export class Painter extends Hearers {
     const { stroke, place } = this;
     if (!stroke || !place) return;
     const { stops, mired } = stroke.asked;
-    if (stroke.use.tool === 'ask' && !stops && !mired) return this.cancel();
+    if (stroke.use.tool === 'ask' && !stops && !mired) return void this.cancel();
     this.ended();
     place.canvas.end();
     place.strokes.end(LABELS[stroke.use.tool]);
   }
 
-  /** The stroke that has begun is none. */
+  /** The stroke that has begun is none. @returns {boolean} whether one had begun */
   cancel() {
     const { stroke, place } = this;
-    if (!stroke || !place) return;
+    if (!stroke || !place) return false;
     this.ended();
     const region = place.canvas.drop();
     place.strokes.drop();
     if (region) this.work.redraw([region]);
+    return true;
   }
 
   ended() {

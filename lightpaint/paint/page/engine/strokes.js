@@ -38,6 +38,8 @@ export class Strokes {
     this.isDropping = false;
     host.gate = () => this.settled();
     host.on('connection', ({ state }) => this.connected(state === 'open'));
+    // Another page has the session: what it has not heard waits until this one has it again.
+    host.on('closed', () => this.connected(false));
     // With another basis, a session begins anew with what is done.
     host.on('renewed', () => {
       if (this.live) this.live.dirty = this.live.whole;
@@ -137,7 +139,7 @@ export class Strokes {
     this.isDropping = kind === 'drop';
     try {
       const reply = await this.host.send(kind, fields, arrays);
-      if (left) this.left = this.left.filter((one) => one !== left);
+      if (left && reply.kind !== 'closed') this.left = this.left.filter((one) => one !== left);
       if (left && reply.kind === 'failed') this.refused();
     } catch {
       // The connection is lost; `connected` says when it is there again.

@@ -52,6 +52,8 @@ export class Work {
     /** Whether the present look is there, and whether the view has it. */
     this.knowsPresent = false;
     this.hasPresent = false;
+    /** How often the session has said what the canvas holds. */
+    this.patches = 0;
     /** Whether the canvas is what the session has. */
     this.isReady = false;
     /** Whether a stroke is in progress. */
@@ -89,7 +91,7 @@ export class Work {
       this.loader.forget();
     }
     this.answered(state);
-    this.loader.know(state.resources);
+    this.loader.begin(state.resources);
     this.want();
     if (this.loader.there.has('present')) this.sync();
   }
@@ -115,6 +117,7 @@ export class Work {
     if (strokes) strokes.isDropping = false;
     if (!canvas || !image || !importance || isOwn) return;
     const region = /** @type {Region} */ (message.region);
+    this.patches++;
     canvas.set(
       region,
       /** @type {Float32Array} */ (image.data),
@@ -129,12 +132,17 @@ export class Work {
     if (!canvas || !strokes) return;
     await strokes.settled();
     if (strokes.isPending) return;
+    const [{ count }, { patches }] = [strokes, this];
     try {
       const [image, importance] = await Promise.all(
         ['painting', 'importance'].map((name) => this.host.fetch(name)),
       );
-      // What has been painted since then is newer.
+      // What has been painted or undone since then is newer.
       if (strokes.isPending || canvas !== this.canvas) return;
+      if (strokes.count !== count || this.patches !== patches) {
+        if (!this.isReady) this.sync();
+        return;
+      }
       canvas.set(
         canvas.whole,
         /** @type {Float32Array} */ (image.data),

@@ -72,7 +72,7 @@
  * @property {(point: Point) => void} begin a stroke of the tool in the hand
  * @property {(points: Point[]) => void} move
  * @property {() => void} end
- * @property {() => void} cancel the stroke that has begun
+ * @property {() => boolean} cancel the stroke that has begun; whether there was one
  * @property {(from: Point, to: Point) => void} line a straight stroke, whole
  * @property {(asked: {stops: number, mired: number, object: number | null}) => void} ask
  *   brighter and warmer by so much, in an object or, for null, in the whole picture

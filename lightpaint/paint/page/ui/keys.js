@@ -84,7 +84,11 @@ export const KEYS = [
         keys: 'mod+z',
         shown: ['Ctrl', 'Z'],
         does: 'undo',
-        act: ({ session }) => void session.send('undo'),
+        // What is under the brush is the last thing that was done.
+        act: ({ engine, session, store }) => {
+          if (engine.cancel()) store.set({ asking: null });
+          else void session.send('undo');
+        },
       },
       {
         keys: 'mod+shift+z',

@@ -62,7 +62,12 @@ export class Session {
     this.done.add(origin);
     const told = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
       state: (/** @type {any} */ m) => stateOf(m, this.store.value),
-      waiting: (/** @type {any} */ m) => ({ ready: false, state: null, waiting: m.text ?? '' }),
+      waiting: (/** @type {any} */ m) => ({
+        ready: false,
+        state: null,
+        waiting: m.text ?? '',
+        basis: m.progress ?? null,
+      }),
       answer: (/** @type {any} */ m) => answerOf(m, this.store.value),
       patch: (/** @type {any} */ m) => answerOf(m, this.store.value),
       renewed: (/** @type {any} */ m) => ({

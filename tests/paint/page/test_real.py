@@ -1,0 +1,525 @@
+"""The painter as people have it: page, server, studio and session file, in a browser.
+
+What is shown is read back from the pixels that are truly on the canvas. No test leaves an error
+or a warning on a console.
+"""
+
+import shlex
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import REPOSITORY
+
+import lightpaint as lp
+from lightpaint.cli.spelling import solve_command
+from lightpaint.colour.display import to_8_bit
+from lightpaint.images.objects import Objects
+from lightpaint.paint.launch import subject_of
+from lightpaint.paint.server import Server
+from lightpaint.paint.store import Store
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.sources import BasisFile
+
+H, W, N = 54, 96, 3
+
+#: What goes wrong in the page and is none of its: a picture that a test reads has to be waited for.
+OURS = "ReadPixels"
+
+PAINTER = "document.getElementById('lightpaint').painter"
+
+
+def until(is_so: Callable[[], Any], what: str, seconds: float = 20) -> Any:
+    """What is looked for, once it is so."""
+    end = time.monotonic() + seconds
+    while not (found := is_so()):
+        assert time.monotonic() < end, what
+        time.sleep(0.02)
+    return found
+
+
+class Served:
+    """A painter on a port of its own, in threads of this process."""
+
+    def __init__(self, subject: Subject) -> None:
+        self.folder = subject.folder
+        self.store: Store | None = None
+        self.studio = Studio(subject, self._opened)
+        self.server = Server(self.studio, port=0)
+        self.thread = threading.Thread(target=self.server.run, daemon=True)
+        self.thread.start()
+        self.studio.start()
+
+    def _opened(self, identity: Any) -> Store:
+        self.store = Store.open(self.folder / "session.db", identity)
+        return self.store
+
+    @property
+    def steps(self) -> list[str]:
+        """What is done and not undone."""
+        store = self.studio.session.store
+        return [step.label for step in store.steps[: store.position]]
+
+    def close(self) -> None:
+        self.server.stop()
+        self.thread.join()
+        self.server.close()
+        self.studio.close()
+
+
+class Person:
+    """Somebody at a page, and what they do and see."""
+
+    def __init__(self, page: Any, served: Served) -> None:
+        self.page, self.served = page, served
+
+    def look(self, script: str, given: Any = None) -> Any:
+        """What a script finds in the page."""
+        names = f"const {{ host, engine }} = {PAINTER}; const {{ work, screen }} = engine;"
+        return self.page.evaluate(f"(given) => {{ {names} {script} }}", given)
+
+    def ready(self) -> "Person":
+        """Wait until all pictures are there, and what was done before."""
+        self.page.wait_for_selector(".lightpaint .tag")
+        there = (
+            "return work.isReady && !work.loader.missing().length && !work.loader.onTheWay.size"
+            "&& screen.width > 0 && screen.width === engine.element.clientWidth"
+        )
+        until(lambda: self.look(there), "the page is not ready")
+        return self.still(*self.served.steps)
+
+    def still(self, *steps: str) -> "Person":
+        """Wait until these steps are done, and the exact answer to them is on screen."""
+        studio = self.served.studio
+        until(lambda: self.served.steps == list(steps), f"not {steps}")
+        at_rest = "return !work.strokes.isPending && !screen.isLive && !screen.frame"
+        until(lambda: self.look(at_rest), "strokes are not answered")
+
+        def is_exact() -> bool:
+            with studio._lock:
+                session = studio.session
+                known = studio.state().fields["answer"]
+                weights = session.weights.tolist()
+            if session.is_painted and "headline" not in known:
+                return False
+            shown = self.look("return Array.from(work.weights)")
+            return bool(shown == [x for rgb in weights for x in rgb])
+
+        until(is_exact, "there is no exact answer")
+        until(lambda: self.look(at_rest), "the answer is not on screen")
+        return self
+
+    def at(self, x: float, y: float, pane: int = 0) -> tuple[float, float]:
+        """Where a place of the picture is on the screen."""
+        left, top, scale = self.look(
+            "const box = engine.element.getBoundingClientRect();"
+            "const pane = engine.panes()[given];"
+            "return [box.left + pane.left, box.top + pane.top, pane.scale]",
+            pane,
+        )
+        return left + (x + 0.5) * scale, top + (y + 0.5) * scale
+
+    def seen(self, x: int, y: int, pane: int = 0) -> list[int]:
+        """Codes on the canvas where a pixel of the picture is shown."""
+        return self.look(
+            "const { left, top, scale } = screen.panes()[given[2]]; screen.now();"
+            "const at = [left + (given[0] + 0.5) * scale, top + (given[1] + 0.5) * scale];"
+            "return Array.from(screen.view.read(Math.floor(at[0]), Math.floor(at[1]), 1, 1))"
+            ".slice(0, 3)",
+            [x, y, pane],
+        )  # type: ignore[no-any-return]
+
+    def drag(self, *places: tuple[float, float], hold: bool = False) -> "Person":
+        """Press the mouse and go from place to place of the screen."""
+        mouse = self.page.mouse
+        mouse.move(*places[0])
+        mouse.down()
+        for place in places[1:]:
+            mouse.move(*place, steps=3)
+        if not hold:
+            mouse.up()
+        return self
+
+    def stroke(self, *places: tuple[float, float]) -> "Person":
+        """Drag from place to place of the painting."""
+        return self.drag(*(self.at(*place) for place in places))
+
+    def press(self, *keys: str) -> "Person":
+        for key in keys:
+            self.page.keyboard.press(key)
+        return self
+
+    def button(self, name: str, **about: Any) -> Any:
+        return self.page.get_by_role("button", name=name, **about).first
+
+    @property
+    def paint(self) -> Any:
+        """Linear light of what is in the hand."""
+        return np.array(self.look("return engine.hand.rgb"))
+
+    def code(self, light: Any) -> Any:
+        """What a display shows of light in this session."""
+        shown = self.served.studio.session.transform.encode(np.asarray(light, float).reshape(1, 3))
+        return to_8_bit(shown)[0].astype(int)
+
+    def answered(self, x: int, y: int) -> Any:
+        """Codes of the answer at a pixel, from the planes that the page is given."""
+        studio = self.served.studio
+        planes = [
+            studio.resource(f"clean/{k}")[y, x].astype(float) * light["scale"]
+            for k, light in enumerate(studio.state().fields["lights"])
+        ]
+        return self.code((studio.session.weights * planes).sum(axis=0))
+
+
+@pytest.fixture(scope="module")
+def basis(make_basis: Any) -> lp.Basis:
+    """Three soft lights with a little noise, on a wall and a floor."""
+    rng = np.random.default_rng(2)
+    y, x = np.mgrid[:H, :W] / H
+    images = np.array(
+        [
+            (np.exp(-((y - a) ** 2 + (x - b) ** 2) / 0.3) + 0.05)[..., None] * colour
+            for (a, b), colour in zip(
+                ((0.2, 0.3), (0.6, 0.8), (0.4, 1.4)), rng.uniform(0.5, 1, (N, 3)), strict=True
+            )
+        ]
+    )
+    noise = 0.01 * images * rng.standard_normal(images.shape)
+    made = make_basis(images=images + noise, half_differences=noise, emission=[[0.5, 0.5, 0.5]] * N)
+    index = np.zeros((H, W), np.int32)
+    index[H // 2 :] = 1
+    return replace(made, objects=Objects(index, ("wall", "floor")))  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def served(basis: lp.Basis, tmp_path: Path) -> Iterator[Served]:
+    """A painter of a basis that was saved."""
+    path = tmp_path / "room.basis.exr"
+    lp.write_basis(path, basis)
+    subject = subject_of(
+        BasisFile(str(path)),
+        tmp_path / "room",
+        command=lambda painting, wishes: solve_command(str(path), painting, (), wishes),
+    )
+    made = Served(subject)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Callable[..., Person]]:
+    """Opens pages of a painter; of the same browser, if they are to know each other."""
+    contexts: list[Any] = []
+    wrong: list[str] = []
+
+    def open_(
+        served: Served, view: str | None = "cpu", beside: Person | None = None, **how: Any
+    ) -> Person:
+        about = {"viewport": {"width": 1280, "height": 720}, **how}
+        context = beside.page.context if beside else browser.new_context(**about)
+        contexts.append(context)
+        context.set_default_timeout(20_000)
+        page = context.new_page()
+        page.on("response", lambda r: wrong.append(r.url) if r.status >= 400 else None)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("console", lambda said: wrong.append(said.text) if is_wrong(said) else None)
+        if view:  # the cookie alone: the page is loaded once
+            context.request.get(served.server.url)
+            page.goto(f"{served.server.url.partition('?')[0]}?view={view}")
+        else:
+            page.goto(served.server.url)
+        return Person(page, served)
+
+    def is_wrong(said: Any) -> bool:
+        return said.type in ("error", "warning") and OURS not in said.text
+
+    yield open_
+    left = wrong.copy()
+    for context in contexts:
+        context.close()
+    assert left == []
+
+
+@pytest.mark.parametrize("view", ["cpu", "gl"])
+def test_what_is_painted_and_answered_is_on_the_screen(
+    served: Served, opened: Any, view: str
+) -> None:
+    me = opened(served, view).ready()
+    assert me.look("return screen.view.name") == view
+    before, far, now = me.seen(30, 10), me.seen(90, 50), me.seen(30, 10, 1)
+    me.press("0").stroke((20, 10), (40, 10)).still("brush")
+    np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
+    assert me.seen(90, 50) == far
+    for x, y in ((30, 10), (70, 40)):
+        np.testing.assert_allclose(me.seen(x, y, 1), me.answered(x, y), atol=1)
+    assert me.seen(30, 10, 1) != now
+    me.press("Control+z").still()
+    assert (me.seen(30, 10), me.seen(30, 10, 1)) == (before, now)
+    # While the brush is down, what is under it is taken back.
+    me.drag(me.at(60, 10), me.at(70, 10), hold=True)
+    me.press("Control+z").page.mouse.up()
+    me.still()
+    assert me.seen(70, 10) == me.code(served.studio.session.present[10, 70]).tolist()
+    me.press("Control+Shift+Z").still("brush")
+    np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
+    fill_and_ask(me)
+    me.page.keyboard.press("v")
+    box = me.page.locator(".wipe").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    me.drag((x, y), (x - 150, y)).still("brush", "fill", "ask")  # and the wipe has painted nothing
+    assert me.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
+    np.testing.assert_allclose(me.seen(5, 50, 1), me.code(me.paint), atol=1)
+    np.testing.assert_allclose(me.seen(90, 50, 0), me.answered(90, 50), atol=1)
+
+
+def fill_and_ask(me: Person) -> None:
+    """Fill the floor; then, by a drag, ask for a place of the wall to be two stops darker."""
+    wall = me.seen(10, H // 2 - 1)
+    me.press("g").stroke((50, 40)).still("brush", "fill")
+    np.testing.assert_allclose(me.seen(3, H // 2), me.code(me.paint), atol=1)
+    assert me.seen(10, H // 2 - 1) == wall
+    light = me.served.studio.session.image[15, 80] / 4
+    me.press("a")
+    x, y = me.at(80, 15)
+    me.drag((x, y), (x, y + 160), hold=True)
+    assert me.page.get_by_text("2.0 stops darker").is_visible()
+    me.page.mouse.up()
+    me.still("brush", "fill", "ask")
+    np.testing.assert_allclose(me.seen(80, 15), me.code(light), atol=2)
+
+
+def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None:
+    me = opened(served).ready()
+    session = served.studio.session
+    me.press("0").stroke((60, 30), (80, 30)).still("brush")
+    me.button("Hold light 1 as it is in the answer").click()
+    me.still("brush", "light 1")
+    held = session.weights[1].copy()
+    slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
+    slider.focus()
+    slider.press("ArrowRight")
+    me.still("brush", "light 1", "light 1")
+    assert 1 < session.weights[1].max() / held.max() < 1.1
+    np.testing.assert_allclose(me.seen(40, 10, 1), me.answered(40, 10), atol=1)
+    me.press("Control+z", "Control+z", "Control+z")  # as fast as fingers are
+    me.still()
+    assert not session.wishes.lights
+    # A page that goes in the middle of it leaves nothing.
+    box = slider.bounding_box()
+    y = box["y"] + box["height"] / 2
+    me.drag((box["x"] + 40, y), (box["x"] + box["width"], y), hold=True)
+    until(lambda: session.is_open, "the slider is not heard")
+    me.page.reload()
+    me.ready()
+    assert not session.is_open
+    assert not session.wishes.lights
+
+
+def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
+    served: Served, opened: Any
+) -> None:
+    me = opened(served, has_touch=True, viewport={"width": 1024, "height": 768}).ready()
+    me.press("0")
+    screen = me.page.context.new_cdp_session(me.page)
+
+    def pen(y: float, force: float) -> None:
+        for kind, x in (("Pressed", 20), ("Moved", 30), ("Moved", 40), ("Released", 40)):
+            at = dict(zip("xy", me.at(x, y), strict=True))
+            how = {"pointerType": "pen", "button": "left", "buttons": 1, "clickCount": 1}
+            about = {"type": f"mouse{kind}", **at, **how, "force": force}
+            screen.send("Input.dispatchMouseEvent", about)
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        made = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        screen.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": made})
+
+    before = me.seen(30, 45)
+    pen(10, 1.0)
+    pen(45, 0.25)
+    me.still("brush", "brush")
+    hard, soft = (served.studio.session.importance[y, 30] for y in (10, 45))
+    assert 0 < soft < 0.8 * hard
+    np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
+    assert me.seen(30, 45) not in (before, me.seen(30, 10))
+    for kind, *places in (
+        ("touchStart", (20, 27)), ("touchMove", (30, 27)), ("touchMove", (40, 27)), ("touchEnd",)
+    ):  # fmt: skip
+        touch(kind, *(me.at(*place) for place in places))
+    me.still("brush", "brush", "brush")
+    np.testing.assert_allclose(me.seen(30, 27), me.code(me.paint), atol=1)
+    scale = me.look("return engine.panes()[0].scale")
+    x, y = me.at(30, 27)
+    touch("touchStart", (x - 20, y))
+    touch("touchStart", (x - 20, y), (x + 20, y))
+    touch("touchMove", (x - 40, y), (x + 40, y))
+    touch("touchEnd")
+    me.still("brush", "brush", "brush")
+    assert me.look("return engine.panes()[0].scale") == pytest.approx(2 * scale, rel=0.1)
+    np.testing.assert_allclose(me.at(30, 27), (x, y), atol=3)
+    np.testing.assert_allclose(me.seen(30, 27), me.code(me.paint), atol=1)
+
+
+def test_strokes_outlive_their_connection(served: Served, opened: Any) -> None:
+    me = opened(served).ready()
+    lost = me.page.get_by_text("The connection is lost")
+    me.press("0").drag(me.at(20, 20), me.at(30, 20), hold=True)
+    me.look("host.socket.close()")
+    lost.wait_for()
+    me.page.mouse.move(*me.at(40, 20), steps=3)
+    me.page.mouse.up()
+    lost.wait_for(state="detached")
+    me.still("brush")
+    for x in (20, 30, 40):
+        np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
+        np.testing.assert_allclose(served.studio.session.image[20, x], me.paint, rtol=1e-6)
+    # A stroke that was kept, and whose answer never came, comes again and is kept once.
+    me.look(
+        "const receive = host.receive.bind(host);"
+        "host.receive = (message) => {"
+        "  if (message.kind === 'answer' && message.history) {"
+        "    host.receive = receive; host.socket.close();"
+        "  } else receive(message); }"
+    )
+    me.stroke((60, 40), (80, 40))
+    lost.wait_for()
+    lost.wait_for(state="detached")
+    me.still("brush", "brush")
+    me.press("Control+z", "Control+z")
+    me.still()
+    assert not served.studio.session.is_painted
+
+
+def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
+    served: Served, opened: Any
+) -> None:
+    me = opened(served, view=None).ready()  # as the terminal's address leads there
+    before = me.seen(60, 30)
+    me.press("0").stroke((20, 20), (40, 20)).still("brush")
+    me.press("Control+s")
+    me.button("Go on from Look 1").wait_for()
+    me.stroke((60, 20), (60, 40)).still("brush", "brush")
+    shown = [me.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)]
+    me.page.reload()
+    me.ready()
+    assert [me.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)] == shown
+    me.press("Control+z").still("brush")
+    assert me.seen(60, 30) == before
+    me.press("Control+Shift+Z").still("brush", "brush")
+    me.button("Go on from Look 1").click()
+    me.still("brush", "brush", "look Look 1")
+    me.button("Hold light 2 as it is in the answer").click()
+    me.still("brush", "brush", "look Look 1", "light 2")
+    np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
+    assert me.seen(60, 30) == before
+    me.button("Write files").click()
+    me.page.get_by_label("Report").uncheck()
+    me.button("Write", exact=True).click()
+    command = shlex.split(me.page.locator(".command code").inner_text())
+    again = [sys.executable, "-m", *command, "--output", str(served.folder / "again")]
+    made = subprocess.run(again, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert made.returncode == 0, made.stderr
+    session = served.studio.session
+    for path in (served.folder / "lighting.json", served.folder / "again" / "lighting.json"):
+        emission = lp.read_lighting(path).emission
+        found = [emission[name] for name in session.basis.names]
+        np.testing.assert_allclose(found, session.weights, rtol=1e-9)
+
+
+def test_a_second_tab_takes_over_and_the_first_takes_back(served: Served, opened: Any) -> None:
+    first = opened(served).ready()
+    first.press("0").stroke((20, 20), (40, 20)).still("brush")
+    second = opened(served, beside=first)
+    second.page.get_by_text("another tab has this session").wait_for()
+    second.button("Take over").click()
+    second.ready()
+    first.page.get_by_text("another tab has taken this session over").wait_for()
+    second.press("0").stroke((60, 40), (80, 40)).still("brush", "brush")
+    first.page.bring_to_front()
+    first.stroke((10, 5), (20, 5))
+    assert served.steps == ["brush", "brush"]
+    first.button("Take over").click()
+    second.page.get_by_text("another tab has taken this session over").wait_for(state="attached")
+    first.ready()
+    np.testing.assert_allclose(first.seen(70, 40), first.code(first.paint), atol=1)
+
+
+class Rendering(Subject):
+    """A scene whose first picture takes a while, and which then gets better."""
+
+    steps: list[threading.Event]
+
+    def bases(self, progress: Any = None) -> Iterator[lp.Basis]:
+        first, better, told = self.folder.events  # type: ignore[attr-defined]
+        progress("rendering lights", 1, 4, "passes")
+        first.wait(60)
+        assert self.basis is not None
+        yield self.basis
+        better.wait(60)
+        images = self.basis.images * np.float32(1.25)
+        yield replace(self.basis, images=images)
+        told.set()
+
+
+class Folder(type(Path())):  # type: ignore[misc]
+    """A folder that carries what its test waits for."""
+
+    events: tuple[threading.Event, ...]
+
+
+def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
+    basis: lp.Basis, tmp_path: Path, opened: Any
+) -> None:
+    folder = Folder(tmp_path)
+    folder.events = threading.Event(), threading.Event(), threading.Event()
+    served = Served(Rendering("room.xml", folder, basis=basis))
+    try:
+        me = opened(served)
+        me.page.get_by_text("Rendering the first picture …").wait_for()
+        me.page.reload()
+        me.page.get_by_text("Rendering the first picture …").wait_for()
+        assert me.page.get_by_role("progressbar").first.get_attribute("aria-valuenow") == "1"
+        folder.events[0].set()
+        me.ready()
+        now = me.seen(90, 50)
+        me.press("0").drag(me.at(20, 20), me.at(30, 20), hold=True)
+        folder.events[1].set()
+        folder.events[2].wait(20)
+        until(lambda: me.seen(90, 50) != now, "the page has the old picture")
+        me.page.mouse.move(*me.at(40, 20), steps=3)
+        me.page.mouse.up()
+        me.still("brush").ready()
+        session = served.studio.session
+        for x in (20, 30, 40):
+            np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
+            np.testing.assert_allclose(session.image[20, x], me.paint, rtol=1e-6)
+        np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
+        me.press("Control+z").still()
+        np.testing.assert_allclose(me.seen(30, 20), me.code(session.present[20, 30]), atol=1)
+    finally:
+        for event in folder.events:
+            event.set()
+        served.close()
+
+
+def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
+    served: Served, opened: Any
+) -> None:
+    """At 200 % a window of 1280x720 has half the room, and two pixels for each of its own."""
+    size = {"width": 640, "height": 360}
+    me = opened(served, viewport=size, device_scale_factor=2).ready()
+    width = me.look("return screen.view.canvas.width / engine.element.clientWidth")
+    assert width == pytest.approx(2, rel=0.01)
+    me.press("0").stroke((20, 20), (40, 20)).still("brush")
+    np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
+    assert me.look("return document.documentElement.scrollWidth <= innerWidth")
+    me.button("Write files").click()  # what does not fit is scrolled to
+    me.page.get_by_role("dialog", name="Write files").wait_for()
