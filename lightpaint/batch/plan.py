@@ -1,20 +1,18 @@
 """What is to be done of a manifest, and what is done already; all checked before any sample."""
 
-import hashlib
-import json
-import os
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from fnmatch import fnmatchcase
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry, entries_of
+from lightpaint.batch.fingerprint import Fingerprints
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.manifest import Manifest, read_manifest
-from lightpaint.batch.task import Kind, Task, answer_task, bases_of, render_task
+from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
+from lightpaint.batch.task import answer_task, bases_of, render_task
 from lightpaint.batch.variations import varied
 from lightpaint.batch.work import Held, made_folder
 from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
@@ -28,78 +26,9 @@ from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
-from lightpaint.version import __version__
 
 #: Mistakes in a painting, or in what lies where its answer goes, are of that look alone.
 ALONE = (ImageError, TargetError, OutputError)
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of one look. made_of: fingerprint of all that goes in. is_done: earlier."""
-
-    task: Task
-    made_of: str
-    is_done: bool
-
-
-@dataclass(frozen=True)
-class PlannedLook:
-    """One look. failure: why it cannot be done; it is the only one. remarks: worth knowing."""
-
-    entry: Entry
-    folder: Path
-    steps: tuple[Step, ...]
-    failure: str = ""
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def is_done(self) -> bool:
-        """Whether nothing is left to do."""
-        return not self.failure and all(step.is_done for step in self.steps)
-
-
-@dataclass(frozen=True)
-class Cost:
-    """Of a basis that is to be obtained. samples: of all pixels; memory: bytes at the peak."""
-
-    scene: str
-    lights: int
-    size: tuple[int, int]
-    spp: int
-    memory: int
-
-    @property
-    def samples(self) -> int:
-        """Of all pixels."""
-        return self.size[0] * self.size[1] * self.spp
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Looks of a manifest. costs: of each basis, by its key. order: of all steps of all looks."""
-
-    manifest: Path
-    folder: Path
-    looks: tuple[PlannedLook, ...]
-    costs: Mapping[str, Cost]
-    order: tuple[tuple[str, Kind], ...]
-
-    def only(self, pattern: str | None) -> "Plan":
-        """The plan of the looks whose names match, and of those that these are made of.
-
-        Raises BatchError if there is none.
-        """
-        if pattern is None:
-            return self
-        wanted = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
-        if not wanted:
-            names = some_names(look.entry.name for look in self.looks)
-            raise BatchError(f"no look matches only={pattern!r}: there are {names}")
-        for look in reversed(self.looks):  # what others are made of stands before them
-            if look.entry.name in wanted:
-                wanted |= set(look.entry.of)
-        return replace(self, looks=tuple(x for x in self.looks if x.entry.name in wanted))
 
 
 def plan(
@@ -126,9 +55,8 @@ def plan(
     looks = tuple(planner.planned(entry) for entry in entries)
     if read.mistakes.found:
         raise BatchError(*read.mistakes.found)
-    steps = [step.task for look in looks for step in look.steps]
-    order = tuple((task.look, task.kind) for task in steps)
-    return Plan(read.path, folder, looks, planner.costs, order)
+    names = frozenset(look.entry.name for look in looks)
+    return Plan(read.path, folder, looks, planner.costs, names)
 
 
 class _Planner:
@@ -144,11 +72,10 @@ class _Planner:
         command: str,
     ) -> None:
         self._mistakes: Mistakes = manifest.mistakes
-        self._base, self._force, self._command = manifest.folder, force, command
+        self._force, self._command = force, command
         self._folders = {entry.name: folder / entry.name for entry in entries}
         self._held, self._journal = Held(), Journal(folder)
-        self._sums: dict[Path, str] = {}
-        self._made_of: dict[str, str] = {}
+        self._prints = Fingerprints(manifest.folder)
         self._failed: set[str] = set()
         self.costs: dict[str, Cost] = {}
 
@@ -156,7 +83,9 @@ class _Planner:
         """What is to be done for one look. What is wrong with the manifest is added to its
         mistakes; what is wrong with the look's own files is its failure.
         """
-        failure, remarks, reads = "", (), ()
+        failure = ""
+        remarks: tuple[str, ...] = ()
+        reads: tuple[Path, ...] = ()
         try:
             entry, reads, remarks = self._looked_at(entry)
         except ALONE as error:
@@ -171,18 +100,14 @@ class _Planner:
         steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
 
-    def _steps(
-        self, entry: Entry, reads: Sequence[Path], *, is_possible: bool
-    ) -> tuple[Step, ...]:
+    def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
         """The answer, and its render if that is wanted."""
         how: dict[str, Any] = {"force": self._force, "command": self._command}
         tasks = [answer_task(entry, self._folders, **how)]
-        answer = self._fingerprint(entry, reads)
-        self._made_of[entry.name] = answer
-        made_of = [answer]
+        made_of = [self._prints.answer(entry, reads)]
         if "render" in entry.want:
             tasks.append(render_task(entry, self._folders, **how))
-            made_of.append(_sum(json.dumps([answer, asdict(entry.final)])))
+            made_of.append(self._prints.render(entry))
         is_whole = is_possible and is_as_written(self._folders[entry.name])
         steps = []
         for task, its in zip(tasks, made_of, strict=True):
@@ -242,8 +167,8 @@ class _Planner:
                 scene_of(scene, lighting)
                 if (have := set(lighting)) != (want := {light.name for light in scene.lights}):
                     raise BatchError(
-                        f"{entry.lighting} has the lights {some_names(sorted(have))}, and the scene "
-                        f"{some_names(sorted(want))}: load it with the same lights and groups"
+                        f"{entry.lighting} has the lights {some_names(sorted(have))}, and the "
+                        f"scene {some_names(sorted(want))}: load it with the same lights and groups"
                     )
             elif lights is not None and set(lighting) != {light.name for light in lights}:
                 raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
@@ -258,9 +183,7 @@ class _Planner:
                 on_film(scene, None, entry.final.resolution)
         return entry, reads, ()
 
-    def _note_costs(
-        self, entry: Entry, films: Sequence[Scene | None], settings: Settings
-    ) -> None:
+    def _note_costs(self, entry: Entry, films: Sequence[Scene | None], settings: Settings) -> None:
         """What each basis costs that is to be obtained. films: on which it is rendered."""
         for key, film in zip(bases_of(entry), films, strict=True):
             if film is None or entry.basis is not None or key in self.costs:
@@ -274,38 +197,6 @@ class _Planner:
                 memory_needed(film),
             )
 
-    def _fingerprint(self, entry: Entry, reads: Sequence[Path]) -> str:
-        """Of all that goes into an answer: what is asked, the content of files, our version.
-
-        Paths are told from the manifest's folder, so that a project may be moved.
-        """
-        told = asdict(replace(entry, where="", want=(), final=entry.final.__class__()))
-        told["verify"], told["report"] = entry.settings.verify, entry.settings.report
-        return _sum(
-            json.dumps(
-                [
-                    __version__,
-                    _relative(told, self._base),
-                    sorted(self._content(file) for file in reads),
-                    [self._made_of[name] for name in entry.of],
-                ],
-                default=str,
-            )
-        )
-
-    def _content(self, file: Path) -> str:
-        """SHA-256 of a file; each is read once."""
-        if file not in self._sums:
-            found = hashlib.sha256()
-            try:
-                with file.open("rb") as opened:
-                    while data := opened.read(2**24):
-                        found.update(data)
-            except OSError as error:
-                raise OutputError(f"cannot read {file}: {error.strerror or error}") from error
-            self._sums[file] = found.hexdigest()
-        return self._sums[file]
-
 
 def _adjusted(job: Job) -> int:
     """How many lights are adjusted."""
@@ -316,20 +207,3 @@ def _adjusted(job: Job) -> int:
     elif first.scene is not None:
         lights = first.scene.lights
     return sum(not light.is_fixed for light in lights)
-
-
-def _relative(told: Any, base: Path) -> Any:
-    """Paths in plain values, from `base`."""
-    if isinstance(told, dict):
-        return {key: _relative(value, base) for key, value in told.items()}
-    if isinstance(told, list | tuple):
-        return [_relative(value, base) for value in told]
-    if isinstance(told, str) and base.parts and told.startswith(f"{base}{os.sep}"):
-        return os.path.relpath(told, base)
-    return told
-
-
-def _sum(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-

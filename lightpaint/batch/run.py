@@ -12,8 +12,10 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.batch.executor import Executor, InProcess, Processes
+from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.journal import Journal, Line
-from lightpaint.batch.plan import Plan, PlannedLook, Step
+from lightpaint.batch.planned import Plan, PlannedLook, Step
+from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Done, Task
 from lightpaint.batch.work import Held, fields_of, is_full
 from lightpaint.errors import LightpaintError, OutputError
@@ -39,13 +41,14 @@ class How:
 class Outcome:
     """What a run came to. done, failed: names of looks, and why. skipped: done earlier.
 
-    waiting: what was not come to.
+    waiting: what was not come to. rows: of all looks, as the summary has them.
     """
 
     done: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     waiting: list[str] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
 
 
 def run_batch(
@@ -77,7 +80,8 @@ def run_batch(
             raise Interrupted(f"{left} looks are left; the same command goes on") from None
         finally:
             with suppress(LightpaintError):
-                run.journal.settle(plan.order)
+                run.journal.settle(plan.steps)
+        run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
         return run.outcome
 
 
@@ -102,7 +106,7 @@ class _Run:
 
     def all(self, stack: ExitStack) -> None:
         """Every step that is left, in an order in which each has what it needs."""
-        for look in self._plan.looks:
+        for look in self._plan.chosen_looks:
             if look.failure:
                 self._fail(look, look.steps[0], look.failure)
             elif look.is_done:
@@ -111,7 +115,9 @@ class _Run:
                 self.outcome.waiting.append(look.entry.name)
         if self._is_stopped():
             return
-        left = [s for x in self._plan.looks if not x.failure for s in x.steps if not s.is_done]
+        left = [
+            s for x in self._plan.chosen_looks if not x.failure for s in x.steps if not s.is_done
+        ]
         self._total = len(left)
         self._listen("steps", 0, self._total, "steps")
         executor: Executor = InProcess(self._held, self._listen)
@@ -201,8 +207,8 @@ class _Run:
             if step.task.kind == look.steps[-1].task.kind:
                 self.outcome.done.append(done.look)
                 self.outcome.waiting.remove(done.look)
-            self._told(look, done)
-        self._finished += 1
+            self._finished += 1
+            self._told(look, replace(done, left_s=self._left_s))
         self._listen("steps", self._finished, self._total, "steps")
 
     def _fail(self, look: PlannedLook, step: Step, why: str, done: Done | None = None) -> None:
@@ -219,7 +225,7 @@ class _Run:
         return bool(self.outcome.failed) and not self._how.keep_going
 
     @property
-    def left_s(self) -> float | None:
+    def _left_s(self) -> float | None:
         """Seconds that are left, if steps go on as they did; None before the first."""
         if not self._finished:
             return None
@@ -278,4 +284,3 @@ def _waves(steps: Sequence[Step], looks: dict[str, PlannedLook]) -> list[list[St
         waves.append(wave)
         left = [step for step in left if step not in wave]
     return waves
-

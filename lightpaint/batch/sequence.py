@@ -69,7 +69,7 @@ def _in_stops(one: Doubles, other: Doubles, share: float) -> Doubles:
     ends = np.maximum(one, floor_), np.maximum(other, floor_)
     # Of what is off at both ends there is no logarithm.
     ratio = np.divide(ends[1], ends[0], out=np.ones(3), where=ends[0] > 0)
-    return ends[0] * ratio**share
+    return np.asarray(ends[0] * ratio**share)
 
 
 def _in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:

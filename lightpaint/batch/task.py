@@ -63,7 +63,7 @@ class Done:
     """What came of a task. failure: why it came to nothing; "" where it is done.
 
     is_full: whether the disk is, and nothing more can be kept. is_lost: whether the worker died,
-    and the same may well succeed elsewhere. spent_s: seconds.
+    and the same may well succeed elsewhere. spent_s: seconds. left_s: of all that is left.
     """
 
     look: str
@@ -72,6 +72,7 @@ class Done:
     is_full: bool = False
     is_lost: bool = False
     spent_s: float = 0.0
+    left_s: float | None = None
 
 
 def answer_task(entry: Entry, folders: Mapping[str, Path], *, force: bool, command: str) -> Task:

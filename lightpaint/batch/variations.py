@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def varied(
 ) -> tuple[Settings, Constraints]:
     """What is asked for instead. lights: how many are adjusted."""
     if word == "fewer lights":
-        few = max(1, int(FEWER * lights))
+        few = max(1, ceil(FEWER * lights))
         most = few if constraints.sparse is None else min(few, constraints.sparse)
         return settings, replace(constraints, sparse=most)
     if word == "white only":

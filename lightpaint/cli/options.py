@@ -14,6 +14,7 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
+from lightpaint.batch.run import How
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
@@ -62,6 +63,8 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
         case "solve":
             wanted = Wanted(options.max_miss, options.min_fit)
             return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
+        case "batch":
+            return _to_do(options, given)
         case "paint":
             return _to_paint(options, settings, given)
         case "relight":
@@ -149,6 +152,21 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _to_do(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
+    """What `batch` is asked for."""
+    return {
+        "paths": options.paths,
+        "output": Path(options.output) if options.output else None,
+        "is_first": options.init,
+        "is_dry": options.dry_run,
+        "only": options.only,
+        "how": How(options.workers, options.keep_going, options.retry),
+        "force": options.force,
+        "log": Path(options.log) if options.log else None,
+        "command": shlex.join(["lightpaint", *given]),
+    }
 
 
 def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:

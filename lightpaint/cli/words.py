@@ -19,6 +19,7 @@ OPTIONS = {
     "mask": "--mask",
     "new": "--new",
     "noise_correction": "--correct-noise",
+    "only": "--only",
     "paint": "--paint",
     "parameters": "-D",
     "pattern": "--pattern",
