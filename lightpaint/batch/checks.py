@@ -31,28 +31,34 @@ def check_together(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> N
         mistakes.add(where, f"{' and '.join(subjects)} at once: give one of them")
     if "scene" not in look and "basis" not in look:
         mistakes.add(where, "no scene and no basis: give one, here or in [defaults]")
+    several = "views" in look or "sensors" in look
     if "sensor" in look and "sensors" in look:
         mistakes.add(where, "sensor and sensors at once: give one of them")
-    if "views" in look and ("sensor" in look or "sensors" in look):
+    elif "views" in look and ("sensor" in look or "sensors" in look):
         mistakes.add(where, "views name their sensors: leave sensor and sensors out")
-    several = "views" in look or "sensors" in look
-    if several and "basis" in look:
+    elif several and "basis" in look:
         mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
-    if several and "scene" not in look and "basis" not in look:
-        return
+    elif "scene" not in look and "basis" in look:
+        _check_of_basis(mistakes, where, look)
     want = look.get("want", ())
-    if "scene" not in look and "basis" in look:
-        for step in ("verify", "render"):
-            if step in want:
-                mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
-        idle = [key for key in SOURCE if key in look and key not in ("basis", "scene")]
-        if idle:
-            mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
     if ("lighting" in look or "lightings" in look) and (
         idle := [x for x in ("solve", "verify", "report") if x in want]
     ):
         mistakes.add(where, f"want has {idle[0]!r}, and its lighting is given: leave it out")
-    if "render" in look and want and "render" not in want:
+
+
+def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """What a saved basis has no use of."""
+    for step in ("verify", "render"):
+        if step in look.get("want", ()):
+            mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
+    if idle := [key for key in SOURCE if key in look and key != "basis"]:
+        mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
+
+
+def check_final(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """That a render which is told of is wanted."""
+    if "render" in look and "render" not in look.get("want", ()):
         mistakes.add(where, "[render] says how, and want does not have 'render': add it there")
 
 

@@ -10,6 +10,7 @@ from lightpaint.batch.checks import (
     SHOWN,
     WANTED,
     check_files,
+    check_final,
     check_together,
     constraints_of,
     matching,
@@ -108,10 +109,13 @@ def _of_look(
     mistakes = manifest.mistakes
     before = len(mistakes.found)
     check_together(mistakes, where, look)
+    if len(mistakes.found) == before:
+        check_files(manifest, where, look)
     settings = settings_of(mistakes, where, look)
     constraints = constraints_of(manifest, where, look)
     final = mistakes.final(look.get("render", {}), where)
-    check_files(manifest, where, look)
+    if len(mistakes.found) == before:
+        check_final(mistakes, where, look)
     if len(mistakes.found) > before:
         return []
     basis = sources.basis(look["basis"]) if "basis" in look else None

@@ -20,6 +20,9 @@ TABLES: Mapping[str, Check] = {
     "sequence": a(list, "tables, [[sequence]]"),
 }
 
+#: What can be wanted of a lighting that is there already.
+GIVEN = ("predict", "render")
+
 #: Keys that say what a look is of: a look's own replace all of those by default.
 PLACES = ("scene", "basis"), ("sensor", "sensors")
 
@@ -60,12 +63,15 @@ def read_manifest(path: str | Path) -> Manifest:
     defaults = data["defaults"] if "defaults" in right else {}
     known = mistakes.keys(defaults, DEFAULTS, "defaults")
     defaults = {key: value for key, value in defaults.items() if key in known}
+    # Of what defaults with mistakes lead to nothing is said.
+    is_clear = not mistakes.found
     looks = _tables(data["look"] if "look" in right else [], LOOK, "look", mistakes)
     merged = tuple((where, _merged(defaults, look)) for where, look in looks)
-    sequences = data["sequence"] if "sequence" in right else []
-    if not data.get("look") and not mistakes.found:
+    given = data["sequence"] if "sequence" in right else []
+    sequences = _tables(given, SEQUENCE, "sequence", mistakes)
+    if not data.get("look") and is_clear:
         mistakes.add("", "it has no look: begin one with [[look]]")
-    return Manifest(path, merged, _tables(sequences, SEQUENCE, "sequence", mistakes), mistakes)
+    return Manifest(path, merged if is_clear else (), sequences if is_clear else (), mistakes)
 
 
 def _tables(
@@ -103,7 +109,16 @@ def _merged(defaults: Mapping[str, Any], look: Mapping[str, Any]) -> dict[str, A
         if key == "constraints" and key in said:
             value = [said[key], value]
         said[key] = value
-    return {"constraints": [], **said, **_listed(said)}
+    _leave_idle(said, look)
+    return {**said, **_listed(said)}
+
+
+def _leave_idle(said: dict[str, Any], look: Mapping[str, Any]) -> None:
+    """Take out what is wanted by default, and a look like this has no use of."""
+    if "want" in said and "want" not in look and {"lighting", "lightings"} & set(look):
+        said["want"] = [step for step in said["want"] if step in GIVEN] or list(GIVEN[:1])
+    if "render" not in look and "render" not in said.get("want", ()):
+        said.pop("render", None)
 
 
 def _listed(said: Mapping[str, Any]) -> dict[str, Any]:
