@@ -20,6 +20,7 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing
 from lightpaint.images.blocks import block_mean
+from lightpaint.images.denoise import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.lighting.file import read_lighting
 from lightpaint.records import strict_json
@@ -188,9 +189,12 @@ def _with_picture(
     path = base / name
     with suppress(LightpaintError, OSError):
         if not path.is_file():
-            image = read_estimate(folder / "predicted.exr")[0].image
-            small = block_mean(image, max(1, -(-image.shape[1] // WIDEST)))
-            transform = ViewTransform(*view) if view else ViewTransform("srgb", _stops(image))
+            predicted = read_estimate(folder / "predicted.exr")[0]
+            small = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // WIDEST)))
+            if predicted.half_difference.any():
+                small = denoised(small)
+            stops = choose_exposure(predicted.image)
+            transform = ViewTransform(*view) if view else ViewTransform("srgb", stops)
             with replacing(path) as beside:
                 shown = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
                 shown.save(beside, "JPEG", quality=QUALITY, subsampling=0)
@@ -198,10 +202,6 @@ def _with_picture(
             size = opened.size
         return Row(**{**vars(row), "picture": name, "size": size, "view": view})
     return row
-
-
-def _stops(image: Any) -> float:
-    return choose_exposure(image)
 
 
 def drop_pictures(folder: Path, rows: Iterable[Row]) -> None:
