@@ -19,12 +19,15 @@ from lightpaint.settings import Settings
 SOLVED = ("fewer lights", "white only", "held harder")
 
 #: Words that change an answer, and by how many mireds; more is warmer.
-SHIFTED = {"warmer": 40.0, "cooler": -40.0}
+SHIFTED = {"warmer": 60.0, "cooler": -60.0}
 
 VARIATIONS = (*SHIFTED, *SOLVED)
 
 #: Part of the lights that `fewer lights` leaves on, and how much harder `held harder` holds.
 FEWER, HARDER = 0.5, 4.0
+
+#: Between which colour temperatures a light is moved, in kelvin: below, lamps have no blue.
+WARMEST, COOLEST = 2000.0, 15000.0
 
 #: Colour temperature of what has none of its own, in kelvin.
 NEUTRAL = 6504.0
@@ -59,13 +62,13 @@ def _warmer(light: LightSetting, mireds: float) -> LightSetting:
     if light.is_fixed or not any(light.emission) or not all(light.reached):
         return light
     kelvin = photometry(light.emission, unit=light.unit).kelvin or NEUTRAL
-    ends = [kelvin_to_rgb(min(max(x, 1500.0), 15000.0)) for x in (kelvin, _moved(kelvin, mireds))]
+    ends = [kelvin_to_rgb(min(max(x, WARMEST), COOLEST)) for x in (kelvin, _moved(kelvin, mireds))]
     ratio = np.array(ends[1]) / np.maximum(ends[0], 1e-6)
     return with_emission(light, np.array(light.emission) * ratio, keeps_luminance=True)
 
 
 def _moved(kelvin: float, mireds: float) -> float:
-    return 1e6 / max(1e6 / kelvin + mireds, 1e6 / 15000.0)
+    return 1e6 / max(1e6 / kelvin + mireds, 1e6 / COOLEST)
 
 
 def with_emission(

@@ -35,7 +35,6 @@ def batch(
     how: How,
     force: bool,
     log: Path | None,
-    command: str,
 ) -> Outcome:
     """`lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`"""
     if is_first:
@@ -47,6 +46,8 @@ def batch(
     if len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
     folder = output or Path(called(Path(paths[0])))
+    # The same in all reports, however often it was stopped, and by how many it is done.
+    command = shlex.join(["lightpaint", "batch", paths[0], "-o", str(folder)])
     planned = plan(paths[0], folder, force=force, command=command).only(only)
     if is_dry:
         return _dry(planned)

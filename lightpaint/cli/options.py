@@ -64,7 +64,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             wanted = Wanted(options.max_miss, options.min_fit)
             return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
         case "batch":
-            return _to_do(options, given)
+            return _to_do(options)
         case "paint":
             return _to_paint(options, settings, given)
         case "relight":
@@ -154,7 +154,7 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
     return jobs
 
 
-def _to_do(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
+def _to_do(options: Namespace) -> dict[str, Any]:
     """What `batch` is asked for."""
     return {
         "paths": options.paths,
@@ -165,7 +165,6 @@ def _to_do(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
         "how": How(options.workers, options.keep_going, options.retry),
         "force": options.force,
         "log": Path(options.log) if options.log else None,
-        "command": shlex.join(["lightpaint", *given]),
     }
 
 
