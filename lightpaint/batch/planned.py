@@ -82,7 +82,7 @@ class Plan:
         wanted = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
         if not wanted:
             names = some_names(look.entry.name for look in self.looks)
-            raise BatchError(f"no look matches only={pattern!r}: there are {names}")
+            raise BatchError(f"no look matches {pattern!r}: there are {names}")
         for look in reversed(self.looks):  # what others are made of stands before them
             if look.entry.name in wanted:
                 wanted |= set(look.entry.of)

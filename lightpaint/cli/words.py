@@ -19,7 +19,6 @@ OPTIONS = {
     "mask": "--mask",
     "new": "--new",
     "noise_correction": "--correct-noise",
-    "only": "--only",
     "paint": "--paint",
     "parameters": "-D",
     "pattern": "--pattern",

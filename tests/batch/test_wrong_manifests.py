@@ -194,7 +194,7 @@ def test_a_manifest_that_is_not_there_and_other_things_of_the_command(here: Path
     assert "2 manifests" in refused(here, "batch", "a.toml", "b.toml")
     (here / "looks.toml").write_text(FIRST, encoding="utf-8")
     line = refused(here, "batch", "looks.toml", "--only", "two*", "-o", "out")
-    assert "no look matches --only 'two*': there are one" in line
+    assert "no look matches 'two*': there are one" in line
     (here / "file").write_text("", encoding="utf-8")
     assert "cannot write into file" in refused(here, "batch", "looks.toml", "-o", "file")
     (here / "file").unlink()
