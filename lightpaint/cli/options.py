@@ -65,6 +65,15 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
         case "batch":
             return _to_do(options)
+        case "export":
+            return {
+                "lighting": Path(options.lighting),
+                "to": options.to,
+                "scene": _scene_to_export(options),
+                "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
+                "output": output,
+                "force": options.force,
+            }
         case "paint":
             return _to_paint(options, settings, given)
         case "relight":
@@ -152,6 +161,15 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _scene_to_export(options: Namespace) -> SceneFile | None:
+    """The scene that a lighting is exported for, if one was given; its lights are all told of."""
+    if options.scene is None:
+        return None
+    parameters = dict(options.parameters)
+    how: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
+    return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **how)
 
 
 def _to_do(options: Namespace) -> dict[str, Any]:

@@ -206,6 +206,32 @@ def _batch(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
 
 
+def _export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("lighting", metavar="lighting.json", help="as solve left it")
+    parser.add_argument(
+        "--to",
+        type=arguments.names_of,
+        action="extend",
+        required=True,
+        metavar="csv,json,mitsuba,blender,nuke",
+        help="one or several. csv, json: fixtures with colour, kelvin, lumen and DMX; mitsuba: a "
+        "patch of the scene's XML; blender: Python that sets lights by their names; nuke: a script "
+        "that multiplies light groups",
+    )
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--scene", metavar="SCENE.xml", help="scene that it was solved for")
+    what.add_argument(
+        "--lights",
+        dest="groups",
+        metavar="FILE.exr",
+        help="light groups of another renderer that it was solved from, or a folder of them",
+    )
+    add_pattern(parser)
+    add_view(parser)
+    add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
+    add_force(parser)
+
+
 def _relight(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument("lightings", metavar="lighting.json", nargs="+", help="as solve left them")
@@ -245,6 +271,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "solve": ("find the lighting that comes closest to a painting", _solve),
     "paint": ("paint in the browser, and see the lighting that comes closest at once", _paint),
     "batch": ("find many looks from one manifest, and go on where it was stopped", _batch),
+    "export": ("write a lighting for other programs, fixtures and consoles", _export),
     "relight": ("write lightings into the scene and render it", _relight),
     "verify": ("render results anew and compare with the prediction", _verify),
     "cache": ("list or delete the bases kept from earlier runs", _cache),
