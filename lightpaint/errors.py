@@ -11,6 +11,7 @@
     │   └── SizeError    … because its size differs from the basis
     ├── ConstraintError  what is asked of a light, and cannot be understood or had
     ├── PaintError       what a page says to the painter, and cannot be understood or done
+    ├── BatchError       a manifest of looks; it may have several mistakes, a line each
     ├── LightingError    a lighting.json, or weights that are none
     │   └── UnknownLightError … or a name that none of its lights has; a KeyError as well
     └── OutputError      a place that cannot be written
@@ -70,6 +71,17 @@ class ConstraintError(LightpaintError):
 
 class PaintError(LightpaintError):
     """A message to the painter that means nothing, or a session that cannot be had."""
+
+
+class BatchError(LightpaintError):
+    """A manifest of looks that cannot be done as it stands.
+
+    mistakes: one line each; the message is all of them.
+    """
+
+    def __init__(self, *mistakes: str) -> None:
+        super().__init__("; ".join(mistakes))
+        self.mistakes = mistakes
 
 
 class LightingError(LightpaintError):

@@ -197,7 +197,7 @@ def _finished(
             pixels, checked = (size[0] * size[1] for size in (basis.size, relit.size))
             spp = max(FEWEST, basis.origin.spp * pixels // checked)
     write_predicted(place / "predicted.exr", predicted, origin=basis.origin, spp=spp)
-    if relit is not None:
+    if relit is not None and settings.verify:
         verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=listen)
         write_estimate(place / "verified.exr", verification.verified, {})
         listen.note(f"verified with {spp} samples per pixel")
@@ -216,7 +216,7 @@ def _finished(
         analysis=analysis,
         suggestions=suggestions,
     )
-    write_report(place, look, command=settings.command)
+    write_report(place, look, command=settings.command, is_shown=settings.report)
     listen.note("report written")
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")

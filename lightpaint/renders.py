@@ -23,7 +23,7 @@ from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.remarks import remarks_of_pictures
 from lightpaint.report.sheet import light_sheet
 from lightpaint.result_folder import ResultFolder
-from lightpaint.scene.quality import Preset
+from lightpaint.scene.quality import Preset, on_film
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_features, render_surfaces
@@ -247,14 +247,18 @@ def relight_look(
     *,
     spp: int | None = None,
     seed: int = 0,
+    resolution: str | None = None,
     progress: Progress = silent,
 ) -> None:
-    """Write relit.xml, and its render as relit.exr and, denoised, as relit.png."""
+    """Write relit.xml, and its render as relit.exr and, denoised, as relit.png.
+
+    resolution: part of the film that is rendered, as of `Settings`.
+    """
     for remark in remarks_of_pictures():
         listener(progress).say(remark)
     results.check()
     with results.filled() as folder:
-        relit = relight(scene, lighting, folder / "relit.xml")
+        relit = on_film(relight(scene, lighting, folder / "relit.xml"), None, resolution)
         image = render(
             relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
         )

@@ -179,6 +179,14 @@ class ResultFolder:
         return OutputError(f"{there[0]} is there, and no result of lightpaint: {REMEDY}")
 
 
+def is_as_written(folder: Path) -> bool:
+    """Whether all that the record of `folder` names is there, as it was written."""
+    record = ResultFolder(folder, (), (), ())._read_record()
+    return record is not None and all(
+        is_below(name) and _checksum(folder / name) == known for name, known in record.files.items()
+    )
+
+
 def earlier_results(folder: Path) -> list[Path]:
     """What a version of lightpaint that kept no record left in `folder`."""
     if not (folder / "lighting.json").is_file():

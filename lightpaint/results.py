@@ -158,11 +158,15 @@ def write_predicted(path: Path, predicted: Estimate, *, origin: Origin, spp: int
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
 
 
-def write_report(folder: Path, look: Look, *, command: str) -> None:
+def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = True) -> None:
     """Write what people look at, denoised, and its numbers.
 
-    These are comparison.png and report.html, and report.json.
+    These are comparison.png and report.html, and report.json. is_shown: whether people look.
     """
+    how = _reported(look, command)
+    if not is_shown:
+        write_text(folder / "report.json", report_numbers(**how))
+        return
     verified = look.verification.verified.image if look.verification else None
     larger = None
     if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
@@ -181,7 +185,18 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         )
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
-    how: dict[str, Any] = {
+    def page() -> None:
+        write_text(folder / "report.html", report_page(**how, looks=looks))
+
+    def numbers() -> None:
+        write_text(folder / "report.json", report_numbers(**how))
+
+    side_by_side(lambda write: write(), (page, comparison, numbers))
+
+
+def _reported(look: Look, command: str) -> dict[str, Any]:
+    """What page and numbers tell of."""
+    return {
         "basis": look.basis,
         "target": look.target,
         "solution": look.solution,
@@ -195,14 +210,6 @@ def write_report(folder: Path, look: Look, *, command: str) -> None:
         "seen": look.analysis.seen,
         "color_choices": look.analysis.color_choices,
     }
-
-    def page() -> None:
-        write_text(folder / "report.html", report_page(**how, looks=looks))
-
-    def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(**how))
-
-    side_by_side(lambda write: write(), (page, comparison, numbers))
 
 
 def verify_result(

@@ -47,6 +47,8 @@ class Settings(Fit):
         suggest: How many point lights that would help most are looked for at most; needs a scene,
             and one view only.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
+        verify: Whether the scene as it was relit is rendered, to see that the prediction holds.
+        report: Whether there are report.html and comparison.png beside the numbers.
         force: Whether results of something else, or changed by hand, are replaced.
         command: The shell command that asks for this, for the report.
 
@@ -74,6 +76,8 @@ class Settings(Fit):
     refine: int = 0
     suggest: int = 0
     cd_per_unit: float | None = None
+    verify: bool = True
+    report: bool = True
     force: bool = False
     command: str = ""
 
@@ -92,6 +96,8 @@ class Settings(Fit):
         "refine": whole(0, MAX_REFINE),
         "suggest": whole(0),
         "cd_per_unit": number("cd/m²"),
+        "verify": SWITCH,
+        "report": SWITCH,
         "force": SWITCH,
         "command": a(str, "the text of a shell command"),
     }

@@ -14,7 +14,7 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FILES = {"/" + path.relative_to(ROOT).as_posix() for path in ROOT.glob("[a-z]*/**/*.py")}
 
 #: A file that is written, and an option of another program.
-ELSEWHERE = {"set_lights.py", "--colorconvert"}
+ELSEWHERE = {"set_lights.py", "set_scene.py", "--colorconvert"}
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

@@ -31,6 +31,8 @@ WRONG = {
     "refine": (-1, 101, 1.0, "1", None, True),
     "suggest": (-1, 1.5, None, True),
     "cd_per_unit": (0, -100, math.nan, math.inf, "100", True),
+    "verify": ("no", 0, None),
+    "report": ("no", 1, None),
     "command": (None, ["lightpaint"]),
 }
 
@@ -56,6 +58,8 @@ RIGHT = {
     "refine": (0, 100),
     "suggest": (0, 3),
     "cd_per_unit": (None, 100, 0.5),
+    "verify": (True, False),
+    "report": (True, False),
     "command": ("", "lightpaint solve a b"),
 }
 

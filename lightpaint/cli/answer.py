@@ -93,7 +93,9 @@ def spoken_settings(settings: Settings) -> str:
     told = {field.name: getattr(settings, field.name) for field in fields(settings)}
     transform = told.pop("transform")
     told |= {"view": transform and spoken_view(transform), "command": None}
+    # What is left out is worth a word, and not what is always there.
     said = {name: value for name, value in told.items() if value not in (None, "")}
+    said = {name: value for name, value in said.items() if name not in ("verify", "report")}
     return ", ".join(f"{name} {value}" for name, value in said.items() if value is not False)
 
 

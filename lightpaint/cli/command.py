@@ -11,7 +11,7 @@ from lightpaint.cli import lines
 from lightpaint.cli.manner import Manner, Outcome, speaking
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
-from lightpaint.errors import LightpaintError
+from lightpaint.errors import BatchError, LightpaintError
 
 
 def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
@@ -59,7 +59,8 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
 def _failed(command: str, error: Exception) -> int:
     """Say what went wrong, and return the exit code."""
     if isinstance(error, LightpaintError):
-        lines.err(f"lightpaint {command}: {spoken(str(error))}")
+        for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
+            lines.err(f"lightpaint {command}: {spoken(line)}")
         return 2
     # A mistake of lightpaint's own, told whole; its text may repeat what a file says.
     for line in traceback.format_exception(error):

@@ -9,6 +9,8 @@ from typing import Any
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.answer import Table, show_look, spoken_settings
+from lightpaint.cli.batch import batch as batch
+from lightpaint.cli.export import export as export
 from lightpaint.cli.listing import lights as lights
 from lightpaint.cli.listing import note_scene
 from lightpaint.cli.manner import Outcome

@@ -14,6 +14,7 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
+from lightpaint.batch.run import How
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
@@ -62,6 +63,17 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
         case "solve":
             wanted = Wanted(options.max_miss, options.min_fit)
             return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
+        case "batch":
+            return _to_do(options)
+        case "export":
+            return {
+                "lighting": Path(options.lighting),
+                "to": options.to,
+                "scene": _scene_to_export(options),
+                "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
+                "output": output,
+                "force": options.force,
+            }
         case "paint":
             return _to_paint(options, settings, given)
         case "relight":
@@ -149,6 +161,29 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _scene_to_export(options: Namespace) -> SceneFile | None:
+    """The scene that a lighting is exported for, if one was given; its lights are all told of."""
+    if options.scene is None:
+        return None
+    parameters = dict(options.parameters)
+    how: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
+    return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **how)
+
+
+def _to_do(options: Namespace) -> dict[str, Any]:
+    """What `batch` is asked for."""
+    return {
+        "paths": options.paths,
+        "output": Path(options.output) if options.output else None,
+        "is_first": options.init,
+        "is_dry": options.dry_run,
+        "only": options.only,
+        "how": How(options.workers, options.keep_going, options.retry),
+        "force": options.force,
+        "log": Path(options.log) if options.log else None,
+    }
 
 
 def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Callable
 
+from lightpaint.cli import arguments
 from lightpaint.cli.option_groups import (
     add_budget,
     add_cache,
@@ -151,6 +152,86 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 
 
+def _batch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "paths",
+        metavar="looks.toml",
+        nargs="+",
+        help="manifest of looks; with --init a scene, then paintings",
+    )
+    add_output(
+        parser,
+        "DIR",
+        "folder for all looks (default: named after the manifest); with --init the file to write "
+        "(default: looks.toml)",
+    )
+    parser.add_argument(
+        "--init", action="store_true", help="write a first manifest, and do nothing else"
+    )
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="only check it, and say what would be done, with time and memory",
+    )
+    parser.add_argument("--only", metavar="PATTERN", help="only looks of such names, like 'dusk-*'")
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "--keep-going",
+        dest="keep_going",
+        action="store_true",
+        default=True,
+        help="a look that fails stops no other (default)",
+    )
+    group.add_argument(
+        "--stop-early",
+        dest="keep_going",
+        action="store_false",
+        help="begin nothing more once a look has failed",
+    )
+    parser.add_argument(
+        "--retry",
+        type=arguments.at_least(0, most=100),
+        default=0,
+        metavar="N",
+        help="try what fails so often again (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--workers",
+        type=arguments.at_least(1, most=1024),
+        default=1,
+        metavar="N",
+        help="processes that share the looks; 1 for this one alone (default: %(default)s)",
+    )
+    parser.add_argument("--log", metavar="FILE", help="add a line with its time for each step")
+    add_force(parser)
+
+
+def _export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("lighting", metavar="lighting.json", help="as solve left it")
+    parser.add_argument(
+        "--to",
+        type=arguments.names_of,
+        action="extend",
+        required=True,
+        metavar="csv,json,mitsuba,blender,nuke",
+        help="one or several. csv, json: fixtures with colour, kelvin, lumen and DMX; mitsuba: a "
+        "patch of the scene's XML; blender: Python that sets lights by their names; nuke: a script "
+        "that multiplies light groups",
+    )
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--scene", metavar="SCENE.xml", help="scene that it was solved for")
+    what.add_argument(
+        "--lights",
+        dest="groups",
+        metavar="FILE.exr",
+        help="light groups of another renderer that it was solved from, or a folder of them",
+    )
+    add_pattern(parser)
+    add_view(parser)
+    add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
+    add_force(parser)
+
+
 def _relight(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument("lightings", metavar="lighting.json", nargs="+", help="as solve left them")
@@ -189,6 +270,8 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "template": ("render the current look, to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
     "paint": ("paint in the browser, and see the lighting that comes closest at once", _paint),
+    "batch": ("find many looks from one manifest, and go on where it was stopped", _batch),
+    "export": ("write a lighting for other programs, fixtures and consoles", _export),
     "relight": ("write lightings into the scene and render it", _relight),
     "verify": ("render results anew and compare with the prediction", _verify),
     "cache": ("list or delete the bases kept from earlier runs", _cache),

@@ -59,7 +59,7 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
             write_rgb(file, content)
     relit = load_scene(path, sensor=scene.sensor, use_lights_file=False)
     taken = {emitter.name: emitter.emission for emitter in relit.emitters}
-    for emitter, wanted in _settings(scene, lighting.emission):
+    for emitter, wanted in settings_of(scene, lighting.emission):
         if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
             continue  # as authored means something else there
         if not np.array_equal(
@@ -127,7 +127,7 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     return tied
 
 
-def _settings(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
+def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
     """What each emitter that is adjusted is set to. emission: by name of light."""
     for light in scene.lights:
         if not light.is_fixed:
@@ -156,7 +156,7 @@ def relit_files(
     """
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
-    changed = dict(_settings(scene, emission))
+    changed = dict(settings_of(scene, emission))
     kept = [emitter for emitter in scene.emitters if emitter not in changed]
     # Mitsuba refuses a scene in which no emitter may be sampled.
     sampled = any(any(rgb) and not emitter.by_chance for emitter, rgb in changed.items())

@@ -1,0 +1,1 @@
+"""Many looks in one run: a manifest is read, planned, done and shown."""

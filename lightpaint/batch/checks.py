@@ -1,0 +1,114 @@
+"""What a table asks for, before files are read: what lacks, contradicts itself, is not there."""
+
+from collections.abc import Mapping
+from glob import glob, has_magic
+from pathlib import Path
+from typing import Any
+
+from lightpaint.batch.keys import SOURCE, Mistakes
+from lightpaint.batch.manifest import Manifest, subject
+from lightpaint.errors import LightpaintError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.screen import some_names
+from lightpaint.settings import Settings
+
+#: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
+WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)
+
+#: Keys of `Constraints.of`, as they stand in a lights file.
+CONSTRAINED = ("light", "tie", "prefer_current", "sparse")
+
+
+def check_together(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """What is missing, or contradicts itself."""
+    subjects = subject(look)
+    if not subjects:
+        mistakes.add(
+            where, "nothing to show: give painting, paintings, views, lighting or lightings"
+        )
+    elif len(subjects) > 1:
+        mistakes.add(where, f"{' and '.join(subjects)} at once: give one of them")
+    if "scene" not in look and "basis" not in look:
+        mistakes.add(where, "no scene and no basis: give one, here or in [defaults]")
+    several = "views" in look or "sensors" in look
+    if "sensor" in look and "sensors" in look:
+        mistakes.add(where, "sensor and sensors at once: give one of them")
+    elif "views" in look and ("sensor" in look or "sensors" in look):
+        mistakes.add(where, "views name their sensors: leave sensor and sensors out")
+    elif several and "basis" in look:
+        mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
+    elif "scene" not in look and "basis" in look:
+        _check_of_basis(mistakes, where, look)
+    want = look.get("want", ())
+    if ("lighting" in look or "lightings" in look) and (
+        idle := [x for x in ("solve", "verify", "report") if x in want]
+    ):
+        mistakes.add(where, f"want has {idle[0]!r}, and its lighting is given: leave it out")
+
+
+def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """What a saved basis has no use of."""
+    for step in ("verify", "render"):
+        if step in look.get("want", ()):
+            mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
+    if idle := [key for key in SOURCE if key in look and key != "basis"]:
+        mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
+
+
+def check_final(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """That a render which is told of is wanted."""
+    if "render" in look and "render" not in look.get("want", ()):
+        mistakes.add(where, "[render] says how, and want does not have 'render': add it there")
+
+
+def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:
+    said = mistakes.settings(look.get("settings", {}), where)
+    want = look.get("want", WANTED)
+    return Settings(**said, verify="verify" in want, report="report" in want)
+
+
+def constraints_of(manifest: Manifest, where: str, look: Mapping[str, Any]) -> Constraints:
+    """What is asked of the lights, by tables and files; what is said last goes before."""
+    asked = Constraints()
+    for given in look["constraints"]:
+        try:
+            if isinstance(given, str):
+                asked = asked.and_then(read_constraints(manifest.folder / given))
+                continue
+            if unknown := [key for key in given if key not in CONSTRAINED]:
+                manifest.mistakes.add(
+                    f"{where}, constraints",
+                    f"unknown key {unknown[0]!r}; known are {', '.join(CONSTRAINED)}",
+                )
+                continue
+            said = dict(given)
+            asked = asked.and_then(Constraints.of(said.pop("light", None), **said))
+        except LightpaintError as error:
+            manifest.mistakes.add(f"{where}, constraints", str(error))
+    return asked
+
+
+def check_files(manifest: Manifest, where: str, look: Mapping[str, Any]) -> None:
+    """What is named is there, so that a slip of the pen is no failed look at midnight."""
+    for key in ("scene", "basis", "mask", "lights_file"):
+        if key in look and not (manifest.folder / look[key]).is_file():
+            manifest.mistakes.add(where, f"{key}: no such file: {look[key]}")
+    if "template" in look and not (manifest.folder / look["template"]).is_dir():
+        manifest.mistakes.add(where, f"template: no such folder: {look['template']}")
+    for key in ("painting", "lighting"):
+        given = [look[key]] if key in look else look.get(f"{key}s", [])
+        for path in given:
+            if not matching(manifest.folder, path):
+                manifest.mistakes.add(where, f"{key}: no such file: {path}")
+    for sensor, path in look.get("views", {}).items():
+        if not (manifest.folder / path).is_file():
+            manifest.mistakes.add(where, f"views.{sensor}: no such file: {path}")
+
+
+def matching(base: Path, path: str) -> list[str]:
+    """The files that a path or a pattern names, in the order of their names."""
+    given = str(base / path)
+    if not has_magic(path) or Path(given).is_file():
+        return [given] if Path(given).is_file() else []
+    return sorted(x for x in glob(given, recursive=True) if Path(x).is_file())

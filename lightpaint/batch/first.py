@@ -1,0 +1,47 @@
+"""A first manifest, to be gone on from."""
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from lightpaint.errors import BatchError, OutputError
+from lightpaint.files import check_files, write_text
+
+HEAD = """\
+# Looks to be found in one go:  lightpaint batch {name} -o looks/
+# docs/batch.md has all keys. Paths are relative to this file.
+
+[defaults]
+scene = {scene}
+want = ["solve", "predict", "verify", "report"]  # and "render": a final render
+
+[defaults.settings]
+quality = "preview"
+
+"""
+
+
+def write_first(path: Path, scene: str, paintings: Sequence[str], *, force: bool = False) -> None:
+    """Write a manifest to `path` with a look for each painting of one scene.
+
+    Raises BatchError without a painting, and for what is not there; OutputError for a file that is.
+    """
+    if not paintings:
+        raise BatchError("no painting to begin with: give the scene, then paintings")
+    for given in (scene, *paintings):
+        if not Path(given).is_file():
+            raise BatchError(f"no such file: {given}")
+    check_files([path], map(Path, (scene, *paintings)))
+    if path.exists() and not force:
+        raise OutputError(f"{path} is there: choose another name with folder=..., or force=True")
+    base = path.parent
+    text = HEAD.format(name=path.name, scene=_quoted(scene, base))
+    write_text(
+        path, text + "\n".join(f"[[look]]\npainting = {_quoted(x, base)}\n" for x in paintings)
+    )
+
+
+def _quoted(file: str, base: Path) -> str:
+    """A path from `base` as TOML writes it, which is how JSON does."""
+    return json.dumps(os.path.relpath(file, base), ensure_ascii=False).replace("\x7f", "\\u007f")

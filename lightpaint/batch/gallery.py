@@ -1,0 +1,132 @@
+"""index.html, one self-contained page of all looks, and contact.png, a sheet of them."""
+
+import base64
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from html import escape
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.batch.journal import Line
+from lightpaint.batch.planned import Plan
+from lightpaint.batch.summary import (
+    Row,
+    drop_pictures,
+    rows_of,
+    summary_csv,
+    summary_json,
+)
+from lightpaint.batch.task import Kind
+from lightpaint.files import write_bytes, write_text
+from lightpaint.images.png import png_bytes
+from lightpaint.report.comparison import fitted
+from lightpaint.screen import visible
+from lightpaint.version import __version__
+
+#: What a batch writes beside its looks.
+FILES = ("index.html", "contact.png", "summary.csv", "summary.json")
+
+#: Pictures of the sheet, at most, and in a row; width of each, gap, and height of the words.
+MOST, COLUMNS, WIDTH, GAP, BELOW = 120, 6, 240, 14, 22
+
+#: A dark ground, and what is written on it.
+GROUND, TEXT, FAINT, WARNING = (24, 24, 26), (226, 226, 226), (142, 142, 146), (255, 140, 120)
+
+
+def write_gallery(folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
+    """Write index.html, contact.png, summary.csv and summary.json of what there is by now.
+
+    Returns the rows, failures first.
+    """
+    rows = rows_of(plan, lines)
+    rows.sort(key=lambda row: ("failed", "waiting", "done").index(row.state))
+    drop_pictures(folder, rows)
+    write_text(folder / "summary.json", summary_json(rows))
+    write_text(folder / "summary.csv", summary_csv(rows))
+    write_text(folder / "index.html", gallery_page(folder, plan.manifest.name, rows))
+    write_bytes(folder / "contact.png", png_bytes(contact_sheet(folder, rows)))
+    return rows
+
+
+def gallery_page(folder: Path, title: str, rows: list[Row]) -> str:
+    """The page as HTML text. folder: where the small pictures are."""
+    told = []
+    for row in rows:
+        its = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
+        its["links"] = [[Path(x).name, quote(x)] for x in row.files]
+        its.pop("files", None)
+        if row.picture:
+            data = base64.b64encode((folder / row.picture).read_bytes()).decode("ascii")
+            its["picture"] = f"data:image/jpeg;base64,{data}"
+        told.append(its)
+    # In a script nothing is escaped, and only `<` can end it.
+    text = json.dumps(told, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    template = resources.files("lightpaint.batch").joinpath("gallery.html.in")
+    return Template(template.read_text(encoding="utf-8")).substitute(
+        title=escape(visible(title)),
+        about=escape(spoken_counts(rows)),
+        looks=text.replace("<", "\\u003c"),
+        version=escape(__version__),
+    )
+
+
+def spoken_counts(rows: list[Row]) -> str:
+    """`12 looks: 1 failed, 2 not done yet`."""
+    counts = {state: sum(row.state == state for row in rows) for state in ("failed", "waiting")}
+    told = [f"{counts['failed']} failed"] * bool(counts["failed"])
+    told += [f"{counts['waiting']} not done yet"] * bool(counts["waiting"])
+    looks = f"{len(rows)} look{'s' * (len(rows) != 1)}"
+    return f"{looks}: {', '.join(told) or 'all done'}"
+
+
+def contact_sheet(folder: Path, rows: list[Row]) -> Any:
+    """Small pictures side by side with their names, (H, W, 3) uint8; of very many the first."""
+    shown = rows[:MOST]
+    columns = max(1, min(COLUMNS, len(shown)))
+    height = max([round(WIDTH * row.size[1] / row.size[0]) for row in shown], default=WIDTH)
+    height = min(height, 2 * WIDTH)
+    count = -(-len(shown) // columns)
+    size = (columns * (WIDTH + GAP) + GAP, count * (height + BELOW + GAP) + 2 * GAP + BELOW)
+    sheet = Image.new("RGB", size, GROUND)
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
+    told = spoken_counts(rows)
+    if len(rows) > MOST:
+        told += f"; the first {MOST} are shown"
+    draw.text((GAP, GAP), fitted(told, font, size[0] - 2 * GAP), FAINT, font)
+    for k, row in enumerate(shown):
+        x = GAP + k % columns * (WIDTH + GAP)
+        y = 2 * GAP + BELOW + k // columns * (height + BELOW + GAP)
+        _draw(sheet, folder, row, (x, y, WIDTH, height), font)
+    return np.asarray(sheet)
+
+
+def _draw(
+    sheet: Image.Image, folder: Path, row: Row, box: tuple[int, int, int, int], font: Any
+) -> None:
+    """One look in its box (x, y, width, height), with its name below and what it misses."""
+    (x, y, width, height), draw = box, ImageDraw.Draw(sheet)
+    if row.picture:
+        with Image.open(folder / row.picture) as opened:
+            scale = min(width / opened.width, height / opened.height)
+            size = max(1, round(scale * opened.width)), max(1, round(scale * opened.height))
+            how = Image.Resampling.NEAREST if scale > 2 else Image.Resampling.LANCZOS
+            small = opened.resize(size, how)
+        sheet.paste(small, (x + (width - size[0]) // 2, y + (height - size[1]) // 2))
+    else:
+        draw.rectangle((x, y, x + width - 1, y + height - 1), outline=FAINT)
+        said = "failed" if row.state == "failed" else "not done yet"
+        color = WARNING if row.state == "failed" else FAINT
+        draw.text((x + width // 2, y + height // 2), said, color, font, anchor="mm")
+    said = "" if row.delta_e is None else f"dE {row.delta_e:.1f}"
+    baseline = y + height + round(0.75 * BELOW)
+    draw.text((x + width, baseline), said, FAINT, font, anchor="rs")
+    room = width - round(font.getlength(said)) - 8
+    name = row.look if row.folder == row.look else f"{row.look} {row.sensor}"
+    draw.text((x, baseline), fitted(visible(name), font, room), TEXT, font, anchor="ls")

@@ -1,0 +1,209 @@
+"""What is to be done of a manifest, and what is done already; all checked before any sample."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.render.render import memory_needed
+from lightpaint.batch.entries import Entry, entries_of
+from lightpaint.batch.fingerprint import Fingerprints
+from lightpaint.batch.journal import Journal
+from lightpaint.batch.keys import Mistakes
+from lightpaint.batch.manifest import Manifest, read_manifest
+from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
+from lightpaint.batch.task import answer_task, bases_of, render_task
+from lightpaint.batch.variations import varied
+from lightpaint.batch.work import Held, made_folder
+from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
+from lightpaint.files import check_writable
+from lightpaint.job import Job
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.file import read_lighting
+from lightpaint.relit.relight import scene_of
+from lightpaint.result_folder import is_as_written
+from lightpaint.scene.quality import on_film, samples
+from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
+from lightpaint.settings import Settings
+
+#: Mistakes in a painting, or in what lies where its answer goes, are of that look alone.
+ALONE = (ImageError, TargetError, OutputError)
+
+
+def plan(
+    manifest: str | Path, folder: str | Path, *, force: bool = False, command: str = ""
+) -> Plan:
+    """Read `manifest` (docs/batch.md), and check every look of it, before anything is rendered.
+
+    Args:
+        manifest: TOML.
+        folder: Receives a folder for each look.
+        force: Whether results of something else, or changed by hand, are replaced.
+        command: The shell command that asks for this, for the reports.
+
+    Raises:
+        BatchError: With all mistakes, one line each.
+        OutputError: If `folder` cannot be written.
+    """
+    read, folder = read_manifest(manifest), Path(folder)
+    entries = entries_of(read)
+    if read.mistakes.found:
+        raise BatchError(*read.mistakes.found)
+    check_writable(folder)
+    planner = _Planner(read, folder, entries, force=force, command=command)
+    looks = tuple(planner.planned(entry) for entry in entries)
+    if read.mistakes.found:
+        raise BatchError(*read.mistakes.found)
+    names = frozenset(look.entry.name for look in looks)
+    return Plan(read.path, folder, looks, planner.costs, names)
+
+
+class _Planner:
+    """Looks at one entry after the other, with what several of them share."""
+
+    def __init__(
+        self,
+        manifest: Manifest,
+        folder: Path,
+        entries: Sequence[Entry],
+        *,
+        force: bool,
+        command: str,
+    ) -> None:
+        self._mistakes: Mistakes = manifest.mistakes
+        self._force, self._command = force, command
+        self._folders = {entry.name: folder / entry.name for entry in entries}
+        self._held, self._journal = Held(), Journal(folder)
+        self._prints = Fingerprints(manifest.folder)
+        self._failed: set[str] = set()
+        self.costs: dict[str, Cost] = {}
+
+    def planned(self, entry: Entry) -> PlannedLook:
+        """What is to be done for one look. What is wrong with the manifest is added to its
+        mistakes; what is wrong with the look's own files is its failure.
+        """
+        failure = ""
+        remarks: tuple[str, ...] = ()
+        reads: tuple[Path, ...] = ()
+        try:
+            entry, reads, remarks = self._looked_at(entry)
+        except ALONE as error:
+            failure = str(error)
+        except LightpaintError as error:
+            self._mistakes.add(entry.where, str(error))
+            failure = str(error)
+        if not failure and (gone := self._failed & set(entry.of)):
+            failure = f"it is made of {some_names(sorted(gone))}, which failed"
+        if failure:
+            self._failed.add(entry.name)
+        steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
+        return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
+
+    def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
+        """The answer, and its render if that is wanted."""
+        how: dict[str, Any] = {"force": self._force, "command": self._command}
+        tasks = [answer_task(entry, self._folders, **how)]
+        made_of = [self._prints.answer(entry, reads)]
+        if "render" in entry.want:
+            tasks.append(render_task(entry, self._folders, **how))
+            made_of.append(self._prints.render(entry))
+        is_whole = is_possible and is_as_written(self._folders[entry.name])
+        steps = []
+        for task, its in zip(tasks, made_of, strict=True):
+            line = self._journal.lines.get((task.look, task.kind))
+            is_done = line is not None and (line.state, line.made_of) == ("done", its)
+            # What was rendered of an earlier answer went with it.
+            is_whole = is_whole and is_done
+            steps.append(Step(task, its, is_whole))
+        return tuple(steps)
+
+    def _looked_at(self, entry: Entry) -> tuple[Entry, tuple[Path, ...], tuple[str, ...]]:
+        """With all decided that follows from its files; what it reads; what is worth saying."""
+        scenes = tuple(map(self._held.scene, entry.scenes))
+        basis = None if entry.basis is None else self._held.saved(entry.basis)
+        if not entry.is_solved:
+            return self._made(replace(entry, scenes=scenes, basis=basis))
+        settings, asked = entry.settings, entry.constraints
+        job = self._job(entry, scenes, basis, settings, asked)
+        if entry.variation:
+            lights = _adjusted(job)
+            settings, asked = varied(
+                entry.variation, replace(settings, hold=job.fit.hold), asked, lights
+            )
+            job = self._job(entry, scenes, basis, settings, asked)
+        self._note_costs(entry, [view.scene for view in job.views], job.settings)
+        if entry.final.resolution is not None and "render" in entry.want:
+            on_film(scenes[0].content, None, entry.final.resolution)
+        reads = tuple(dict.fromkeys(job.results.reads))
+        entry = replace(entry, settings=settings, constraints=asked)
+        return entry, reads, job.remarks
+
+    def _job(
+        self,
+        entry: Entry,
+        scenes: Sequence[Any],
+        basis: Any,
+        settings: Settings,
+        asked: Constraints,
+    ) -> Job:
+        """The job of a look, which checks it; its painting is read anew, and let go of again."""
+        paintings = tuple(replace(painting) for painting in entry.paintings)
+        settings = replace(settings, force=self._force, command=self._command)
+        folder = self._folders[entry.name]
+        return Job(tuple(scenes), paintings, folder, basis, asked, settings, entry.by_sensor)
+
+    def _made(self, entry: Entry) -> tuple[Entry, tuple[Path, ...], tuple[str, ...]]:
+        """Of a look that is made of lightings: those of files are looked at."""
+        scene: Scene | None = entry.scenes[0].content if entry.scenes else None
+        lights = entry.basis.content.lights if entry.basis is not None else None
+        reads: tuple[Path, ...] = () if scene is None else scene.read_files
+        if entry.basis is not None:
+            reads += (Path(entry.basis.path),)
+        if entry.lighting:
+            lighting = read_lighting(entry.lighting)
+            reads += (Path(entry.lighting),)
+            if scene is not None:
+                scene_of(scene, lighting)
+                if (have := set(lighting)) != (want := {light.name for light in scene.lights}):
+                    raise BatchError(
+                        f"{entry.lighting} has the lights {some_names(sorted(have))}, and the "
+                        f"scene {some_names(sorted(want))}: load it with the same lights and groups"
+                    )
+            elif lights is not None and set(lighting) != {light.name for light in lights}:
+                raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
+        folders = [str(self._folders[name] / "lighting.json") for name in entry.of]
+        lightings = tuple([entry.lighting] if entry.lighting else folders)
+        folder = self._folders[entry.name]
+        made_folder(folder, scene, lightings, force=self._force).check()
+        if scene is not None:
+            film = on_film(scene, entry.settings.quality, entry.settings.resolution)
+            self._note_costs(entry, [film], entry.settings)
+            if entry.final.resolution is not None and "render" in entry.want:
+                on_film(scene, None, entry.final.resolution)
+        return entry, reads, ()
+
+    def _note_costs(self, entry: Entry, films: Sequence[Scene | None], settings: Settings) -> None:
+        """What each basis costs that is to be obtained. films: on which it is rendered."""
+        for key, film in zip(bases_of(entry), films, strict=True):
+            if film is None or entry.basis is not None or key in self.costs:
+                continue
+            asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+            self.costs[key] = Cost(
+                f"{film.path.name} through {film.sensor_names[film.sensor]}",
+                len(film.lights),
+                film.size,
+                film.spp if asked is None else asked,
+                memory_needed(film),
+            )
+
+
+def _adjusted(job: Job) -> int:
+    """How many lights are adjusted."""
+    first = job.views[0]
+    lights: Sequence[Any] = ()
+    if first.basis is not None:
+        lights = first.basis.lights
+    elif first.scene is not None:
+        lights = first.scene.lights
+    return sum(not light.is_fixed for light in lights)

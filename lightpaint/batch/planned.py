@@ -1,0 +1,89 @@
+"""What is planned: looks, their steps, what they cost."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from lightpaint.batch.entries import Entry
+from lightpaint.batch.task import Kind, Task
+from lightpaint.errors import BatchError
+from lightpaint.screen import some_names
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of one look. made_of: fingerprint of all that goes in. is_done: earlier."""
+
+    task: Task
+    made_of: str
+    is_done: bool
+
+
+@dataclass(frozen=True)
+class PlannedLook:
+    """One look. failure: why it cannot be done; it is the only one. remarks: worth knowing."""
+
+    entry: Entry
+    folder: Path
+    steps: tuple[Step, ...]
+    failure: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left to do."""
+        return not self.failure and all(step.is_done for step in self.steps)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of a basis that is to be obtained. samples: of all pixels; memory: bytes at the peak."""
+
+    scene: str
+    lights: int
+    size: tuple[int, int]
+    spp: int
+    memory: int
+
+    @property
+    def samples(self) -> int:
+        """Of all pixels."""
+        return self.size[0] * self.size[1] * self.spp
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All looks of a manifest. costs: of each basis, by its key. chosen: names of those to do."""
+
+    manifest: Path
+    folder: Path
+    looks: tuple[PlannedLook, ...]
+    costs: Mapping[str, Cost]
+    chosen: frozenset[str]
+
+    @property
+    def chosen_looks(self) -> tuple[PlannedLook, ...]:
+        """Those to do."""
+        return tuple(look for look in self.looks if look.entry.name in self.chosen)
+
+    @property
+    def steps(self) -> list[tuple[str, Kind]]:
+        """All steps, in the order of the looks."""
+        return [(step.task.look, step.task.kind) for look in self.looks for step in look.steps]
+
+    def only(self, pattern: str | None) -> "Plan":
+        """The plan of the looks whose names match, and of those that these are made of.
+
+        Raises BatchError if there is none.
+        """
+        if pattern is None:
+            return self
+        wanted = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
+        if not wanted:
+            names = some_names(look.entry.name for look in self.looks)
+            raise BatchError(f"no look matches {pattern!r}: there are {names}")
+        for look in reversed(self.looks):  # what others are made of stands before them
+            if look.entry.name in wanted:
+                wanted |= set(look.entry.of)
+        return replace(self, chosen=frozenset(wanted))

@@ -1,0 +1,286 @@
+"""Doing a plan: bases first, then the looks that share each, then final renders."""
+
+import fcntl
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import write_basis
+from lightpaint.batch.executor import Executor, InProcess, Processes
+from lightpaint.batch.gallery import write_gallery
+from lightpaint.batch.journal import Journal, Line
+from lightpaint.batch.planned import Plan, PlannedLook, Step
+from lightpaint.batch.summary import Row
+from lightpaint.batch.task import Done, Task
+from lightpaint.batch.work import Held, fields_of, is_full
+from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
+from lightpaint.scene.quality import on_film
+from lightpaint.settings import Settings
+
+
+@dataclass(frozen=True)
+class How:
+    """How a plan is done.
+
+    workers: processes; 1 for none beside this. keep_going: whether what fails stops nothing else.
+    retry: how often a step that failed is tried again.
+    """
+
+    workers: int = 1
+    keep_going: bool = True
+    retry: int = 0
+
+
+@dataclass
+class Outcome:
+    """What a run came to. done, failed: names of looks, and why. skipped: done earlier.
+
+    waiting: what was not come to. rows: of all looks, as the summary has them.
+    """
+
+    done: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+    skipped: list[str] = field(default_factory=list)
+    waiting: list[str] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
+
+
+def run_batch(
+    plan: Plan,
+    how: How | None = None,
+    progress: Progress = silent,
+    *,
+    told: Callable[[PlannedLook, Done], None] | None = None,
+) -> Outcome:
+    """Do what is left of `plan`. What is done is on the disk, and is not done again.
+
+    Args:
+        plan: As `plan` made it.
+        how: Workers, and what a failure stops.
+        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
+        told: Hears of each step that was done or failed.
+
+    Raises:
+        OutputError: Where the disk is full, or another batch is at work in the folder.
+        Interrupted: For Ctrl-C; the same call goes on from there.
+    """
+    how = how or How()
+    with _alone(plan.folder), ExitStack() as stack:
+        run = _Run(plan, how, listener(progress), told or (lambda look, done: None))
+        try:
+            run.all(stack)
+        except KeyboardInterrupt:
+            left = len(run.outcome.waiting)
+            raise Interrupted(f"{left} looks are left; the same command goes on") from None
+        finally:
+            with suppress(LightpaintError):
+                run.journal.settle(plan.steps)
+        run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
+        return run.outcome
+
+
+class _Run:
+    """One run of a plan."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        how: How,
+        listen: Listener,
+        told: Callable[[PlannedLook, Done], None],
+    ) -> None:
+        self.journal = Journal(plan.folder)
+        self.outcome = Outcome()
+        self._plan, self._how, self._listen, self._told = plan, how, listen, told
+        self._looks = {look.entry.name: look for look in plan.looks}
+        self._held = Held()
+        self._tries: dict[tuple[str, str], int] = {}
+        self._begun_s = time.monotonic()
+        self._finished = 0
+
+    def all(self, stack: ExitStack) -> None:
+        """Every step that is left, in an order in which each has what it needs."""
+        for look in self._plan.chosen_looks:
+            if look.failure:
+                self._fail(look, look.steps[0], look.failure)
+            elif look.is_done:
+                self.outcome.skipped.append(look.entry.name)
+            else:
+                self.outcome.waiting.append(look.entry.name)
+        if self._is_stopped():
+            return
+        left = [
+            s for x in self._plan.chosen_looks if not x.failure for s in x.steps if not s.is_done
+        ]
+        self._total = len(left)
+        self._listen("steps", 0, self._total, "steps")
+        executor: Executor = InProcess(self._held, self._listen)
+        if self._how.workers > 1:
+            executor = stack.enter_context(Processes(self._how.workers))
+        answers = [step for step in left if step.task.kind == "answer"]
+        for keys in dict.fromkeys(step.task.bases for step in answers):
+            self._of_bases([x for x in answers if x.task.bases == keys], executor)
+        self._held.only(())
+        self._together([x for x in left if x.task.kind == "render"], executor)
+
+    def _of_bases(self, steps: Sequence[Step], executor: Executor) -> None:
+        """Looks that share their bases; those that are made of others come after them."""
+        task = steps[0].task
+        self._held.only(task.bases)
+        with ExitStack() as stack:
+            files = task.files
+            try:
+                obtained = self._obtained(task)
+                if executor.is_apart and obtained:
+                    # Workers read what this process rendered, and is done with.
+                    files = _saved(obtained, stack)
+                    self._held.only(())
+            except LightpaintError as error:
+                if is_full(error):
+                    raise
+                for step in steps:
+                    self._fail(self._looks[step.task.look], step, str(error))
+                return
+            for wave in _waves(steps, self._looks):
+                given = [replace(step, task=replace(step.task, files=files)) for step in wave]
+                self._together(given, executor)
+                if self._is_stopped():
+                    return
+
+    def _obtained(self, task: Task) -> list[Basis]:
+        """The bases of a task that are no files already: kept or rendered, once for all looks."""
+        fields = fields_of(task, self._held)
+        if fields["basis"] is not None:
+            return []
+        settings: Settings = fields["settings"]
+        bases = []
+        for key, scene in zip(task.bases, fields["scenes"], strict=True):
+            film = on_film(scene.content, settings.quality, settings.resolution)
+            bases.append(self._held.basis(film, key, settings, self._listen))
+        return bases
+
+    def _together(self, steps: Sequence[Step], executor: Executor) -> None:
+        """Steps that do not wait for each other, and again those that failed and may be tried."""
+        by_look = {step.task.look: step for step in steps}
+        waiting = [step for step in steps if self._can_begin(step)]
+        while waiting and not self._is_stopped():
+            again = []
+            for done in _closing(executor.run([step.task for step in waiting])):
+                step = by_look[done.look]
+                if done.is_full:
+                    raise OutputError(f"{done.failure}: make room; the same command goes on")
+                if done.failure and self._may_try_again(done):
+                    self._listen.say(f"{done.look}: {done.failure}; trying again")
+                    again.append(step)
+                    continue
+                self._record(step, done)
+                if self._is_stopped():
+                    return
+            waiting = again
+
+    def _can_begin(self, step: Step) -> bool:
+        """Whether the look has not failed by now, nor what it is made of."""
+        look = self._looks[step.task.look]
+        gone = [name for name in look.entry.of if name in self.outcome.failed]
+        if gone:
+            self._fail(look, step, f"it is made of {gone[0]}, which failed")
+        return look.entry.name not in self.outcome.failed
+
+    def _may_try_again(self, done: Done) -> bool:
+        key = (done.look, done.kind)
+        self._tries[key] = self._tries.get(key, 0) + 1
+        return self._tries[key] <= self._how.retry
+
+    def _record(self, step: Step, done: Done) -> None:
+        """Keep what came of a step, and tell it."""
+        look = self._looks[done.look]
+        if done.failure:
+            self._fail(look, step, done.failure, done)
+        else:
+            self.journal.add(Line(done.look, done.kind, "done", step.made_of))
+            if step.task.kind == look.steps[-1].task.kind:
+                self.outcome.done.append(done.look)
+                self.outcome.waiting.remove(done.look)
+            self._finished += 1
+            self._told(look, replace(done, left_s=self._left_s))
+        self._listen("steps", self._finished, self._total, "steps")
+
+    def _fail(self, look: PlannedLook, step: Step, why: str, done: Done | None = None) -> None:
+        name = look.entry.name
+        if name in self.outcome.failed:
+            return
+        self.outcome.failed[name] = why
+        if name in self.outcome.waiting:
+            self.outcome.waiting.remove(name)
+        self.journal.add(Line(name, step.task.kind, "failed", step.made_of, why))
+        self._told(look, done or Done(name, step.task.kind, why))
+
+    def _is_stopped(self) -> bool:
+        return bool(self.outcome.failed) and not self._how.keep_going
+
+    @property
+    def _left_s(self) -> float | None:
+        """Seconds that are left, if steps go on as they did; None before the first."""
+        if not self._finished:
+            return None
+        spent_s = time.monotonic() - self._begun_s
+        return spent_s / self._finished * (self._total - self._finished)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Raise OutputError where another batch is at work in `folder`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+    try:
+        with suppress(PermissionError):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise OutputError(
+                    f"another batch is at work in {folder}: wait for it, or name another folder "
+                    "(folder=...)"
+                ) from None
+            except OSError:
+                pass  # a disk that knows no locks
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _saved(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
+    """Files with these bases, as long as `stack` is open."""
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lightpaint-")))
+    files = [folder / f"{k}.basis.exr" for k in range(len(bases))]
+    for file, basis in zip(files, bases, strict=True):
+        write_basis(file, basis)
+    return tuple(map(str, files))
+
+
+def _closing(done: Iterator[Done]) -> Iterator[Done]:
+    """`done`, which is ended with whoever stops asking."""
+    try:
+        yield from done
+    finally:
+        if hasattr(done, "close"):
+            done.close()
+
+
+def _waves(steps: Sequence[Step], looks: dict[str, PlannedLook]) -> list[list[Step]]:
+    """Steps that wait for none of the others; those that wait for these; and so on."""
+    left, waves = list(steps), []
+    while left:
+        names = {step.task.look for step in left}
+        wave = [step for step in left if not names & set(looks[step.task.look].entry.of)]
+        waves.append(wave)
+        left = [step for step in left if step not in wave]
+    return waves

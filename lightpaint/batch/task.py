@@ -1,0 +1,131 @@
+"""One step of one look, as text that can be sent, and what came of it."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from lightpaint.batch.entries import Entry
+from lightpaint.batch.keys import Final, Space
+from lightpaint.batch.variations import SHIFTED
+from lightpaint.errors import BatchError
+from lightpaint.records import read_record, strict_json
+from lightpaint.settings import Settings
+from lightpaint.sources import BasisFile, SceneFile, to_json
+
+FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
+
+#: The answer, and its final render.
+Kind = Literal["answer", "render"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One step of one look, of files and plain values.
+
+    look: name. kind: step. job: as `Job.to_json` writes it; of an answer that is made of others
+    without a target. lightings: files that it is made of; share, space: between two of them;
+    mireds: how much warmer. final: how it is rendered. bases: keys of what it is solved with, and
+    files where that is kept, "" where it is to be obtained.
+    """
+
+    look: str
+    kind: Kind
+    job: str
+    lightings: tuple[str, ...] = ()
+    share: float = 0.0
+    space: Space = "log"
+    mireds: float = 0.0
+    final: Final = field(default_factory=Final)
+    bases: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    format: Literal["lightpaint-task 1"] = FORMAT
+
+    def to_json(self) -> str:
+        """This task as text, to be done elsewhere."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "Task":
+        """The task that `to_json` wrote. Raises BatchError for what is none."""
+        try:
+            data = strict_json(text)
+            signed = {key: data.pop(key) for key in ("mireds", "share") if key in data}
+            return read_record(Task, {**data, **{k: float(v) for k, v in signed.items()}})
+        except (AttributeError, TypeError, ValueError) as error:
+            said = " ".join(str(error).split())
+            raise BatchError(f"this is no task: {said}; make one with Task.to_json") from None
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of a task. failure: why it came to nothing; "" where it is done.
+
+    is_full: whether the disk is, and nothing more can be kept. is_lost: whether the worker died,
+    and the same may well succeed elsewhere. spent_s: seconds. left_s: of all that is left.
+    """
+
+    look: str
+    kind: Kind
+    failure: str = ""
+    is_full: bool = False
+    is_lost: bool = False
+    spent_s: float = 0.0
+    left_s: float | None = None
+
+
+def answer_task(entry: Entry, folders: Mapping[str, Path], *, force: bool, command: str) -> Task:
+    """The answer of a look. folders: of all looks, by name."""
+    settings = {**_plain(entry.settings), "force": force, "command": command}
+    lightings = [str(folders[name] / "lighting.json") for name in entry.of]
+    return Task(
+        entry.name,
+        "answer",
+        to_json(
+            entry.scenes,
+            entry.paintings,
+            entry.basis,
+            entry.constraints,
+            Settings(**settings),
+            folder=str(folders[entry.name]),
+            by_sensor=entry.by_sensor,
+        ),
+        tuple([entry.lighting] if entry.lighting else lightings),
+        entry.share,
+        entry.space,
+        SHIFTED.get(entry.variation, 0.0),
+        entry.final,
+        bases_of(entry),
+        ("",) * len(bases_of(entry)),
+    )
+
+
+def render_task(entry: Entry, folders: Mapping[str, Path], *, force: bool, command: str) -> Task:
+    """The final render of a look."""
+    answer = answer_task(entry, folders, force=force, command=command)
+    lighting = str(folders[entry.name] / "lighting.json")
+    return Task(entry.name, "render", answer.job, (lighting,), final=entry.final)
+
+
+def bases_of(entry: Entry) -> tuple[str, ...]:
+    """The key of each basis that a look is solved with: equal keys, equal bases."""
+    if entry.basis is not None:
+        return (key_of_basis(entry.basis),)
+    return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
+
+
+def key_of_basis(basis: BasisFile) -> str:
+    """Of a saved one."""
+    return json.dumps({"basis": basis.path})
+
+
+def key_of_scene(scene: SceneFile, settings: Settings) -> str:
+    """Of one that is rendered: the scene through its sensor, and what settings make of it."""
+    rendered = ("spp", "time_s", "seed", "resolution", "quality", "use_cache", "exact_spp")
+    how = {name: getattr(settings, name) for name in rendered}
+    return json.dumps({"scene": asdict(scene), **how})
+
+
+def _plain(settings: Settings) -> dict[str, Any]:
+    return {name: getattr(settings, name) for name in Settings.expected}

@@ -1,0 +1,133 @@
+"""A lighting as a list of fixtures: colour, kelvin, lumen, and DMX for each channel.
+
+Neutral of any program, and of any display: emissions are linear Rec.709 in the scene's own unit.
+DMX is what a fixture of linear response is sent, 0 to 255: its colour with the brightest channel at
+full, and a dimmer. At full is the brightest channel of all fixtures of that unit.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from lightpaint.arrays import RGB
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import LightSetting
+from lightpaint.relit.export.exports import plain_cell
+from lightpaint.version import __version__
+
+FORMAT: Literal["lightpaint-fixtures 1"] = "lightpaint-fixtures 1"
+
+#: Codes of a DMX channel, less one.
+FULL = 255
+
+
+@dataclass(frozen=True)
+class Dmx:
+    """What a fixture is sent: 0 to 255 each."""
+
+    dimmer: int
+    red: int
+    green: int
+    blue: int
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A light as it is set.
+
+    red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: where the
+    lighting has a scale. kelvin, duv, hex: None where it has no such colour. dmx: None of what is
+    kept as it is. emitters: of the scene, that it consists of.
+    """
+
+    name: str
+    emitters: tuple[str, ...]
+    unit: str
+    red: float
+    green: float
+    blue: float
+    y: float
+    hex: str | None
+    kelvin: float | None
+    duv: float | None
+    luminous: float | None
+    luminous_unit: str
+    lumen: float | None
+    dmx: Dmx | None
+
+
+def fixtures_of(lighting: Lighting) -> list[Fixture]:
+    """Every light of `lighting`, in its order."""
+    full: dict[str, float] = {}
+    for light in lighting.lights:
+        if not light.is_fixed:
+            full[light.unit] = max(full.get(light.unit, 0.0), *light.emission)
+    return [_fixture(lighting, light, full) for light in lighting.lights]
+
+
+def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float]) -> Fixture:
+    seen = lighting.photometry(light)
+    dmx = None if light.is_fixed else dmx_of(light.emission, full[light.unit])
+    return Fixture(
+        light.name,
+        light.members,
+        light.unit,
+        *light.emission,
+        seen.y,
+        seen.hex,
+        seen.kelvin,
+        seen.duv,
+        seen.luminous,
+        seen.luminous_unit,
+        seen.flux_lm,
+        dmx,
+    )
+
+
+def dmx_of(emission: RGB, full: float) -> Dmx:
+    """Codes of an emission. full: of the brightest channel at 255."""
+    brightest = max(emission)
+    if brightest <= 0 or full <= 0:
+        return Dmx(0, 0, 0, 0)
+    red, green, blue = (round(FULL * channel / brightest) for channel in emission)
+    return Dmx(round(FULL * min(brightest / full, 1.0)), red, green, blue)
+
+
+COLUMNS = (
+    *("fixture", "emitters", "unit", "red", "green", "blue", "luminance", "hex", "kelvin", "duv"),
+    *("luminous", "luminous_unit", "lumen", "dmx_dimmer", "dmx_red", "dmx_green", "dmx_blue"),
+)
+
+
+def fixtures_csv(lighting: Lighting) -> str:
+    """A line for each fixture; cells are empty where there is no such number."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for one in fixtures_of(lighting):
+        its = asdict(one)
+        sent = its.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
+        its["emitters"] = " ".join(one.emitters)
+        table.writerow([_cell(value) for value in (*its.values(), *sent.values())])
+    return text.getvalue()
+
+
+def fixtures_json(lighting: Lighting) -> str:
+    """The same as an object of JSON."""
+    told: dict[str, Any] = {
+        "format": FORMAT,
+        "lightpaint": __version__,
+        "target": lighting.target,
+        "cd_per_unit": lighting.cd_per_unit,
+        "fixtures": [asdict(one) for one in fixtures_of(lighting)],
+    }
+    return json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.9g}" if isinstance(value, float) else plain_cell(str(value))

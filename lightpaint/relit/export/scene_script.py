@@ -1,0 +1,40 @@
+"""Python for Blender that sets the lights of a scene by their names, as they were solved."""
+
+from collections.abc import Iterable
+from importlib import resources
+from string import Template
+
+from lightpaint.arrays import RGB
+
+#: What of Mitsuba's emission stands for what in Blender.
+KINDS = {
+    "radiance": "radiance",
+    "intensity": "intensity",
+    "irradiance": "irradiance",
+}
+
+
+def scene_script(target: str, source: str, emitters: Iterable[tuple[str, str, RGB]]) -> str:
+    """The script. emitters: name, Mitsuba's parameter and emission of each that is adjusted.
+
+    Those whose emission is no plain colour, like a scaled sky, are left to who runs it.
+    """
+    rows, left = [], []
+    for name, parameter, emission in emitters:
+        if parameter not in KINDS:
+            left.append(name)
+            continue
+        numbers = ", ".join(f"{channel:.9g}" for channel in emission)
+        rows.append(f"    {name!r}: ({KINDS[parameter]!r}, ({numbers})),\n")
+    template = resources.files("lightpaint.relit.export").joinpath("set_scene.py.in")
+    return Template(template.read_text(encoding="utf-8")).substitute(
+        target=_in_docstring(target),
+        source=_in_docstring(source),
+        lights="{\n" + "".join(rows) + "}",
+        left=repr(tuple(left)),
+    )
+
+
+def _in_docstring(text: str) -> str:
+    """A name from elsewhere that cannot end the string it stands in."""
+    return repr(text).replace('"', "'").replace("\\", "/")

@@ -1,0 +1,361 @@
+"""A batch from a saved basis: what it leaves, what a second run does, and what a failure costs."""
+
+import csv
+import json
+import os
+import random
+import signal
+import time
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_batch
+from command import run, succeed
+
+from lightpaint.batch import executor as executors
+from lightpaint.batch import work
+from lightpaint.batch.executor import Processes
+from lightpaint.batch.gallery import FILES, contact_sheet, gallery_page
+from lightpaint.batch.plan import plan
+from lightpaint.batch.run import How, run_batch
+from lightpaint.batch.summary import LightRow, Row
+from lightpaint.batch.task import Done, Task
+from lightpaint.errors import BatchError, OutputError
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.file import read_lighting
+from lightpaint.progress import Interrupted, silent
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes]]:
+    """A manifest, and what its batch leaves."""
+    here = tmp_path_factory.mktemp("batch")
+    manifest = write_batch(here)
+    run_all(str(manifest), str(here / "out"))
+    return manifest, contents(here / "out")
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    write_batch(tmp_path)
+    return tmp_path
+
+
+def do(here: Path, **how: Any) -> Any:
+    return run_batch(plan(here / "looks.toml", here / "out"), How(**how))
+
+
+def test_every_look_is_what_solve_makes_of_it(
+    undisturbed: tuple[Path, dict[str, bytes]], tmp_path: Path
+) -> None:
+    manifest, found = undisturbed
+    assert {name.split("/")[0] for name in found if "/" in name} == {*NAMES, "thumbnails"}
+    assert {*FILES, "journal.jsonl"} == {name for name in found if "/" not in name}
+    write_batch(tmp_path)
+    succeed(tmp_path, "solve", "b.basis.exr", "p0.exr")
+    ours, its = (
+        np.array(list(read_lighting(path).emission.values()))
+        for path in (
+            manifest.parent / "out" / "p0" / "lighting.json",
+            tmp_path / "p0/lighting.json",
+        )
+    )
+    np.testing.assert_array_equal(ours, its)
+    assert set(json.loads(found["p0/result.json"])["files"]) == {
+        "lighting.json",
+        "predicted.exr",
+        "report.json",
+    }
+
+
+def test_a_sequence_begins_and_ends_with_its_looks(
+    undisturbed: tuple[Path, dict[str, bytes]],
+) -> None:
+    out = undisturbed[0].parent / "out"
+    lights = {name: read_lighting(out / name / "lighting.json").emission for name in NAMES}
+    assert lights["dusk-0"] == lights["p0"]
+    assert lights["dusk-2"] == lights["third"]
+    assert lights["p0"] != lights["p0-warmer"] != lights["dusk-1"]
+
+
+def test_a_second_run_does_nothing_and_a_change_only_what_hangs_on_it(here: Path) -> None:
+    assert do(here).done == [x for x in NAMES if not do_last(x)] + [x for x in NAMES if do_last(x)]
+    before = contents(here / "out")
+    outcome = do(here)
+    assert (outcome.done, sorted(outcome.skipped)) == ([], sorted(NAMES))
+    assert contents(here / "out") == before
+    # Another painting under the same name.
+    write_rgb(here / "p1.exr", 0.5 * small_basis().images.sum(axis=0))
+    outcome = do(here)
+    assert sorted(outcome.done) == ["p1", "p1-warmer", "p1-white-only"]
+    # A result that is lost, and what is made of it stays: it would come out the same.
+    (here / "out" / "third" / "predicted.exr").unlink()
+    assert do(here).done == ["third"]
+    # And one that is asked for otherwise.
+    text = LOOKS.replace('painting = "p2.exr"', 'painting = "p2.exr"\nsettings = { hold = 0.1 }')
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    assert sorted(do(here).done) == ["dusk-0", "dusk-1", "dusk-2", "third"]
+
+
+def do_last(name: str) -> bool:
+    """Whether a look is made of others."""
+    return "warmer" in name or "dusk" in name
+
+
+def test_a_project_that_was_moved_is_done_still(here: Path) -> None:
+    do(here)
+    moved = here.parent / f"{here.name}-moved"
+    here.rename(moved)
+    assert do(moved).done == []
+
+
+def test_only_some(here: Path) -> None:
+    some = plan(here / "looks.toml", here / "out").only("dusk-1")
+    outcome = run_batch(some)
+    assert outcome.done == ["p0", "third", "dusk-1"]
+    assert [row.state for row in outcome.rows].count("waiting") == 7
+    assert len(do(here).done) == 7
+    with pytest.raises(BatchError, match="no look matches"):
+        some.only("x*")
+
+
+def test_one_bad_painting_fails_alone(here: Path) -> None:
+    (here / "p1.exr").write_bytes(b"no picture")
+    done = run(here, "batch", "looks.toml", "-o", "out", "--log", "log.txt")
+    assert done.returncode == 1
+    complaints = [x for x in done.stderr.splitlines() if x.startswith("lightpaint batch: ")]
+    assert [x.split()[2] for x in complaints] == ["p1:", "p1-warmer:", "p1-white-only:"]
+    assert "10 looks: 3 failed" in done.stdout
+    told = json.loads((here / "out" / "summary.json").read_text())
+    assert [look["look"] for look in told["looks"]][:3] == ["p1", "p1-warmer", "p1-white-only"]
+    assert "p1.exr" in told["looks"][0]["why"]
+    assert (told["done"], told["failed"]) == (7, 3)
+    log = (here / "log.txt").read_text().splitlines()
+    assert sum("failed: " in line for line in log) == 3
+    assert all(line[:4].isdigit() for line in log)
+    # Mended, it is done, and nothing else is.
+    write_rgb(here / "p1.exr", small_basis().images.sum(axis=0))
+    told = json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "-q", "--json"))
+    assert (told["done"], told["failed"]) == (10, 0)
+    # Or nothing is begun.
+    (here / "p1.exr").write_bytes(b"no picture")
+    done = run(here, "batch", "looks.toml", "-o", "other", "--stop-early", "-q")
+    assert done.returncode == 1
+    assert not (here / "other" / "p0").exists()
+
+
+def test_what_was_changed_by_hand_is_kept(here: Path) -> None:
+    do(here)
+    (here / "out" / "p0" / "lighting.json").write_text("mine", encoding="utf-8")
+    outcome = do(here)
+    assert "was changed since lightpaint wrote it" in outcome.failed["p0"]
+    assert (here / "out" / "p0" / "lighting.json").read_text() == "mine"
+    assert run(here, "batch", "looks.toml", "-o", "out", "--force", "-q").returncode == 0
+
+
+def test_a_plan_is_only_told(here: Path) -> None:
+    output = succeed(here, "batch", "looks.toml", "-o", "out", "--dry-run")
+    assert [line.split()[0] for line in output.splitlines()[1:-1]] == NAMES
+    assert "GB of memory" in output
+    assert not (here / "out").exists()
+    told = json.loads(succeed(here, "batch", "looks.toml", "--dry-run", "--json"))
+    assert [look["look"] for look in told["looks"]] == NAMES
+
+
+def test_what_fails_is_tried_again_as_often_as_is_asked(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tries: list[str] = []
+    answer = work._answer
+
+    def sometimes(task: Task, *others: Any) -> None:
+        tries.append(task.look)
+        if task.look == "p1" and tries.count("p1") < 3:
+            raise RuntimeError("a library's\nown words")
+        answer(task, *others)
+
+    monkeypatch.setattr(work, "_answer", sometimes)
+    outcome = do(here, retry=1)
+    assert outcome.failed["p1"] == "RuntimeError: a library's"
+    assert outcome.failed["p1-warmer"] == "it is made of p1, which failed"
+    assert tries.count("p1") == 2
+    assert sorted(do(here, retry=1).done) == ["p1", "p1-warmer"]
+
+
+def test_a_full_disk_stops_with_one_line_and_goes_on_after(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer, count = work._answer, 0
+
+    def full(task: Task, *others: Any) -> None:
+        nonlocal count
+        if (count := count + 1) > 3:
+            try:
+                raise OSError(28, "No space left on device")
+            except OSError as error:
+                raise OutputError("cannot write it: No space left on device") from error
+        answer(task, *others)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(work, "_answer", full)
+        done = run(here, "batch", "looks.toml", "-o", "out", "-q")
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "No space left" in line
+    assert "the same command goes on" in line
+    again = run(here, "batch", "looks.toml", "-o", "out", "--workers", 1)
+    assert "3 looks were done earlier" in again.stderr
+    (here / "other").mkdir()
+    write_batch(here / "other")
+    succeed(here / "other", "batch", "looks.toml", "-o", "out")
+    assert contents(here / "out") == contents(here / "other" / "out")
+
+
+def test_an_interrupt_says_how_to_go_on(
+    here: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: tuple[Path, dict[str, bytes]]
+) -> None:
+    def interrupted(*_: Any) -> Done:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(executors, "do", interrupted)
+        with pytest.raises(Interrupted, match="10 looks are left; the same command goes on"):
+            do(here)
+    do(here)
+    assert contents(here / "out") == undisturbed[1]
+
+
+def test_two_batches_do_not_work_in_one_folder(here: Path) -> None:
+    planned, told = plan(here / "looks.toml", here / "out"), []
+
+    def other(*_: Any) -> None:
+        with pytest.raises(OutputError, match="another batch is at work"):
+            run_batch(planned)
+        told.append(1)
+
+    run_batch(planned.only("p0"), told=other)
+    assert told == [1]
+
+
+def test_tasks_are_the_same_wherever_they_are_sent(here: Path) -> None:
+    for look in plan(here / "looks.toml", here / "out").looks:
+        for step in look.steps:
+            assert Task.from_json(step.task.to_json()) == step.task
+    for text in ("", "[]", "{}", '{"format": "lightpaint-task 1", "share": "a"}'):
+        with pytest.raises(BatchError, match="this is no task"):
+            Task.from_json(text)
+
+
+def test_workers_make_the_same_and_one_that_dies_costs_nothing(
+    here: Path, undisturbed: tuple[Path, dict[str, bytes]]
+) -> None:
+    planned, died = plan(here / "looks.toml", here / "out"), []
+
+    def told(*_: Any) -> None:
+        if not died:  # the first answer is here, and another is on its way
+            [pool] = [x for x in started if x._pool is not None]
+            victim = next(iter(pool._pool._processes))
+            died.append(victim)
+            os.kill(victim, signal.SIGKILL)
+
+    started: list[Any] = []
+    begin = Processes.__enter__
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Processes, "__enter__", lambda it: started.append(it) or begin(it))
+        outcome = run_batch(planned, How(workers=2), told=told)
+    assert died
+    assert not outcome.failed
+    assert contents(here / "out") == undisturbed[1]
+
+
+def test_killed_at_twenty_moments_it_ends_as_if_undisturbed(
+    here: Path, undisturbed: tuple[Path, dict[str, bytes]]
+) -> None:
+    chance, kills, batches = random.Random(1), 0, 0
+    begun_s = time.monotonic()
+    assert killed(here / "looks.toml", here / "first", 60) == 0
+    run_s = time.monotonic() - begun_s
+    while kills < 20:
+        folder, batches = here / f"out{batches}", batches + 1
+        while killed(here / "looks.toml", folder, chance.uniform(0, 0.6 * run_s)):
+            kills += 1
+            assert kills < 200
+        assert contents(folder) == undisturbed[1]
+
+
+class _Page(HTMLParser):
+    """What a page would load from elsewhere, and the data in it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.data, self._is_data = "", False
+
+    def handle_starttag(self, tag: str, attributes: Any) -> None:
+        given = dict(attributes)
+        self._is_data = given.get("type") == "application/json"
+        if tag in ("script", "img", "link", "iframe"):
+            loaded = given.get("src") or given.get("href") or "data:"
+            self.loads += [] if loaded.startswith("data:") else [loaded]
+
+    def handle_endtag(self, tag: str) -> None:
+        self._is_data = False
+
+    def handle_data(self, data: str) -> None:
+        self.data += data if self._is_data else ""
+
+
+def test_the_page_holds_all_and_loads_nothing(
+    undisturbed: tuple[Path, dict[str, bytes]],
+) -> None:
+    found = undisturbed[1]
+    page = _Page()
+    page.feed(found["index.html"].decode())
+    assert page.loads == []
+    looks = json.loads(page.data)
+    assert [look["look"] for look in looks] == NAMES
+    assert all(look["picture"].startswith("data:image/jpeg;base64,") for look in looks)
+    for look in looks:
+        assert all((undisturbed[0].parent / "out" / to).is_file() for _, to in look["links"])
+    rows = list(csv.DictReader(found["summary.csv"].decode().splitlines()))
+    assert [row["look"] for row in rows] == NAMES
+    assert float(rows[0]["lamp 1"]) > 0
+    told = json.loads(found["summary.json"])
+    assert [light["name"] for light in told["looks"][0]["lights"]] == ["lamp 0", "lamp 1", "lamp 2"]
+
+
+def test_a_page_of_a_thousand_looks_with_names_that_mean_mischief(tmp_path: Path) -> None:
+    bad = "</script><img src=x onerror=alert(1)>\u202e$title"
+    lights = tuple(LightRow(f"{bad}{k}", 1.0, "#ffffff") for k in range(12))
+    rows = [Row(f"{bad}{k}", "failed", bad, f"look {k}", lights=lights) for k in range(1000)]
+    text = gallery_page(tmp_path, bad, rows)
+    assert text.count("</script>") == 2
+    assert "<img src=x" not in text
+    page = _Page()
+    page.feed(text)
+    assert page.loads == []
+    assert json.loads(page.data)[0]["look"] == f"{bad}0"
+    sheet = contact_sheet(tmp_path, rows)
+    assert sheet.dtype == np.uint8
+    assert sheet.shape[1] < 2000
+
+
+def test_a_first_manifest_is_one_that_can_be_run(here: Path) -> None:
+    (here / "room.xml").write_text("", encoding="utf-8")
+    (here / "sub").mkdir()
+    output = succeed(here, "batch", "--init", "room.xml", "p0.exr", "p1.exr", "-o", "sub/l.toml")
+    assert "lightpaint batch sub/l.toml" in output
+    text = (here / "sub" / "l.toml").read_text()
+    text = text.replace('scene = "../room.xml"', 'basis = "../b.basis.exr"')
+    text = text.replace('"verify", ', "").replace('quality = "preview"', "")
+    (here / "sub" / "l.toml").write_text(text, encoding="utf-8")
+    planned = plan(here / "sub" / "l.toml", here / "out")
+    assert [look.entry.name for look in planned.looks] == ["p0", "p1"]
+    assert not any(look.failure for look in planned.looks)
+
+
+def test_without_anybody_listening(here: Path) -> None:
+    assert run_batch(plan(here / "looks.toml", here / "out").only("third"), None, silent).done

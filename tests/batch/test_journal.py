@@ -1,0 +1,66 @@
+"""The journal of a batch: whatever a kill leaves of it, whole lines count and no others."""
+
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.batch.journal import JOURNAL, Journal, Line
+
+LINES = [
+    Line("evening", "answer", "done", "a" * 64),
+    Line("Ærø · 夜", "answer", "failed", "b" * 64, "no such file: ø.exr"),
+    Line("evening", "render", "done", "c" * 64),
+    Line("evening", "answer", "done", "d" * 64),
+]
+
+
+def written(folder: Path) -> bytes:
+    journal = Journal(folder)
+    for line in LINES:
+        journal.add(line)
+    return (folder / JOURNAL).read_bytes()
+
+
+def test_cut_off_anywhere_it_has_the_lines_before_and_goes_on(tmp_path: Path) -> None:
+    data = written(tmp_path)
+    ends = [k + 1 for k, byte in enumerate(data) if byte == ord("\n")]
+    for cut in range(0, len(data), 7):
+        (tmp_path / JOURNAL).write_bytes(data[:cut])
+        journal = Journal(tmp_path)
+        # A line without its end is whole, too.
+        whole = sum(end - 1 <= cut for end in ends)
+        expected = {(line.look, line.kind): line for line in LINES[:whole]}
+        assert journal.lines == expected
+        journal.add(LINES[-1])
+        assert Journal(tmp_path).lines == {**expected, ("evening", "answer"): LINES[-1]}
+
+
+def test_settled_it_does_not_tell_how_it_came_about(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "other").mkdir()
+    order = [("Ærø · 夜", "answer"), ("evening", "answer"), ("evening", "render")]
+    found = []
+    for folder, lines in ((tmp_path / "one", LINES), (tmp_path / "other", LINES[1:])):
+        journal = Journal(folder)
+        for line in lines:
+            journal.add(line)
+        journal.settle(order)  # type: ignore[arg-type]
+        found.append((folder / JOURNAL).read_bytes())
+    assert found[0] == found[1]
+    journal.settle(order[:1])  # type: ignore[arg-type]
+    assert [*Journal(tmp_path / "other").lines] == order[:1]
+
+
+@given(st.binary(max_size=300))
+def test_what_somebody_else_wrote_is_passed_over(junk: bytes) -> None:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / JOURNAL
+        text = junk.decode("utf-8", "replace")
+        path.write_text(text + "\n", encoding="utf-8", newline="")
+        journal = Journal(Path(folder))
+        assert not journal.lines
+        journal.add(LINES[0])
+        assert [*Journal(Path(folder)).lines.values()] == LINES[:1]

@@ -1,0 +1,147 @@
+"""A batch of a small scene: one basis for all looks of a sensor, and what is rendered of each."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import run, succeed
+from renderer import LIGHTS, write_room
+
+from lightpaint.batch import work
+from lightpaint.images.estimate import read_estimate
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.file import read_lighting
+from lightpaint.scene.scene import load_scene
+
+SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
+    <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">
+    <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
+
+LOOKS = """
+[defaults]
+scene = "room.xml"
+want = ["predict"]
+settings = { spp = 8 }
+
+[[look]]
+paintings = ["bright.exr", "dark.exr"]
+sensors = ["camera", "side"]
+
+[[look]]
+name = "both"
+views = { camera = "bright.exr", side = "dark.exr" }
+
+[[look]]
+name = "final"
+painting = "dark.exr"
+want = ["solve", "verify", "report", "render"]
+render = { spp = 4, resolution = "1/2" }
+variations = ["warmer"]
+
+[[look]]
+name = "preset"
+lighting = "preset.json"
+"""
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("rendered")
+    write_room(folder, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SIDE)
+    for name, light in (("bright", 0.8), ("dark", 0.2)):
+        write_rgb(folder / f"{name}.exr", np.full((20, 24, 3), light, np.float32))
+    succeed(folder, "solve", "room.xml", "bright.exr", "--spp", "8", "-o", "solved")
+    (folder / "preset.json").write_bytes((folder / "solved" / "lighting.json").read_bytes())
+    (folder / "looks.toml").write_text(LOOKS, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(here: Path) -> dict[str, Any]:
+    """What the batch says of itself; and how often a basis was asked for."""
+    asked: list[str] = []
+    obtain = work.obtain
+
+    def counting(scene: Any, *others: Any, **how: Any) -> Any:
+        asked.append(scene.sensor_names[scene.sensor])
+        return obtain(scene, *others, **how)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work, "obtain", counting)
+        told = json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q"))
+    return {**told, "asked": asked}
+
+
+def test_each_basis_is_obtained_once_for_all_its_looks(done: dict[str, Any]) -> None:
+    assert done["failed"] == 0
+    names = [look["look"] for look in done["looks"]]
+    assert names == [
+        *("bright-camera", "bright-side", "dark-camera", "dark-side", "both", "both"),
+        *("final", "final-warmer", "preset"),
+    ]
+    # The first sensor by its name, by default, and both for the design in two views.
+    assert len(done["asked"]) <= 5
+    assert {look["sensor"] for look in done["looks"] if look["look"] == "both"} == {
+        "camera",
+        "side",
+    }
+
+
+def test_only_what_is_wanted_is_rendered(here: Path, done: dict[str, Any]) -> None:
+    out = here / "out"
+    assert not (out / "dark-side" / "verified.exr").exists()
+    assert not (out / "dark-side" / "report.html").exists()
+    assert (out / "final" / "report.html").is_file()
+    assert (out / "both" / "side" / "predicted.exr").is_file()
+    for name in ("final", "final-warmer"):
+        render = read_estimate(out / name / "relit.exr")[0]
+        assert render.size == (10, 12)
+        assert (out / name / "relit.png").is_file()
+    by_name = {look["look"]: look for look in done["looks"]}
+    assert by_name["final"]["agrees"] is True
+    assert "agrees" not in by_name["dark-side"]
+
+
+def test_relit_scenes_load_in_plain_mitsuba_with_their_lights(
+    here: Path, done: dict[str, Any]
+) -> None:
+    import mitsuba as mi
+
+    for name in ("dark-side", "both", "final-warmer", "preset"):
+        path = here / "out" / name / "relit.xml"
+        wanted = read_lighting(path.with_name("lighting.json")).emission
+        found = {light.name: light.emission for light in load_scene(path).lights}
+        for light, emission in wanted.items():
+            np.testing.assert_allclose(found[light], emission, rtol=1e-6)  # float32
+        loaded = mi.load_file(str(path))
+        assert len(loaded.emitters()) == 2
+        del loaded
+    preset = read_lighting(here / "out" / "preset" / "lighting.json").emission
+    assert preset == read_lighting(here / "preset.json").emission
+
+
+def test_other_samples_of_a_final_render_render_it_alone_again(
+    here: Path, done: dict[str, Any]
+) -> None:
+    (here / "looks.toml").write_text(LOOKS.replace("spp = 4,", "spp = 6,"), encoding="utf-8")
+    again = run(here, "batch", "looks.toml", "-o", "out")
+    assert again.returncode == 0, again.stderr
+    assert "steps: 2 steps" in again.stderr
+    assert "final: render done" in again.stderr
+    assert "answer done" not in again.stderr
+
+
+def test_a_scene_is_checked_before_its_first_sample(here: Path) -> None:
+    for text, said in (
+        (LOOKS.replace('"side"]', '"back"]'), "back"),
+        (LOOKS.replace('resolution = "1/2"', 'resolution = "7x5"'), "7x5"),
+        (LOOKS.replace("preset.json", "other.json"), "other.json"),
+    ):
+        (here / "looks.toml").write_text(text, encoding="utf-8")
+        found = run(here, "batch", "looks.toml", "-o", "none")
+        assert found.returncode == 2, found.stderr
+        assert all(x.startswith("lightpaint batch: ") for x in found.stderr.splitlines())
+        assert said in found.stderr
+        assert not (here / "none").exists()

@@ -1,0 +1,122 @@
+"""Lightings between lightings, and lightings varied by a word."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from batches import small_basis
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.batch.sequence import DARK, at_frame, between
+from lightpaint.batch.variations import SHIFTED, SOLVED, VARIATIONS, shifted, varied
+from lightpaint.colour.color import luminance
+from lightpaint.errors import LightingError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.settings import Settings
+
+#: float64 through logarithms, cube roots and the inverse of a 3 x 3 matrix.
+PRECISION = 1e-9
+
+AMOUNT = st.floats(1e-3, 1e3)
+WEIGHTS = st.lists(st.tuples(AMOUNT, AMOUNT, AMOUNT), min_size=3, max_size=3)
+SHARE = st.floats(0, 1)
+
+
+def lighting(weights: Any) -> Lighting:
+    return Lighting.of_weights(small_basis(), np.array(weights, dtype=np.float64))
+
+
+def emissions(of: Lighting) -> Any:
+    return np.array(list(of.emission.values()))
+
+
+@given(WEIGHTS, WEIGHTS, st.sampled_from(["log", "oklab"]))
+def test_the_ends_are_the_lightings_themselves(one: Any, other: Any, space: Any) -> None:
+    ends = [lighting(one), lighting(other)]
+    for share, end in ((0.0, ends[0]), (1.0, ends[1])):
+        np.testing.assert_array_equal(emissions(between(ends, share, space=space)), emissions(end))
+
+
+@given(WEIGHTS, WEIGHTS, SHARE)
+def test_in_stops_it_is_the_geometric_mean(one: Any, other: Any, share: float) -> None:
+    ends = [lighting(one), lighting(other)]
+    # Within DARK stops of each other, beyond which the darker one is cut off.
+    logs = np.log2(emissions(ends[0])), np.log2(emissions(ends[1]))
+    near = np.abs(logs[0] - logs[1]) < DARK - 0.01
+    found = np.log2(emissions(between(ends, share, space="log")))
+    expected = (1 - share) * logs[0] + share * logs[1]
+    np.testing.assert_allclose(found[near], expected[near], atol=PRECISION)
+
+
+@given(WEIGHTS, st.floats(0.05, 0.95), st.sampled_from(["log", "oklab"]))
+def test_there_and_back_are_the_same_frames(one: Any, share: float, space: Any) -> None:
+    ends = [lighting(one), lighting(np.array(one)[::-1] * 1.5)]
+    there = emissions(between(ends, share, space=space))
+    back = emissions(between(ends[::-1], 1 - share, space=space))
+    np.testing.assert_allclose(there, back, rtol=1e-6, atol=1e-9 * there.max())
+
+
+@pytest.mark.parametrize("space", ["log", "oklab"])
+def test_what_can_only_be_dimmed_stays_grey_and_what_is_off_comes_up(space: Any) -> None:
+    ends = [
+        lighting([[0.3] * 3, [0.0] * 3, [1, 0.5, 0]]),
+        lighting([[7.0] * 3, [2.0] * 3, [0] * 3]),
+    ]
+    frames = [emissions(between(ends, x, space=space)) for x in np.linspace(0, 1, 9)]
+    for frame in frames:
+        assert np.ptp(frame[0]) == np.ptp(frame[1]) == 0
+        assert frame[2, 2] <= PRECISION
+    for k in (0, 1):
+        assert (np.diff([frame[k, 0] for frame in frames]) > 0).all()
+    assert (np.diff([frame[2, 0] for frame in frames]) < 0).all()
+
+
+def test_oklab_is_that_of_its_paper() -> None:
+    # Ottosson 2020: the middle of white and black is the cube of half, in linear light.
+    ends = [lighting(np.ones((3, 3))), lighting(np.zeros((3, 3)))]
+    np.testing.assert_allclose(emissions(between(ends, 0.5, space="oklab")), 1 / 8)
+
+
+@given(st.integers(2, 200), st.integers(2, 9))
+def test_frames_go_evenly_from_the_first_to_the_last(frames: int, keys: int) -> None:
+    found = [sum(at_frame(k, frames, keys)) for k in range(frames)]
+    np.testing.assert_allclose(found, np.linspace(0, keys - 1, frames), atol=PRECISION)
+    firsts = [at_frame(k, frames, keys)[0] for k in range(frames)]
+    assert min(firsts) == 0
+    assert max(firsts) == keys - 2
+
+
+def test_other_lights_are_refused() -> None:
+    one = lighting(np.ones((3, 3)))
+    other = Lighting(one.lights[:2])
+    with pytest.raises(LightingError, match="of different lights"):
+        between([one, other], 0.5, space="log")
+
+
+@given(WEIGHTS, st.sampled_from(sorted(SHIFTED)))
+def test_warmer_is_as_bright_and_redder(weights: Any, word: str) -> None:
+    before = lighting(weights)
+    after = shifted(before, SHIFTED[word], dimmed={"lamp 2"})
+    one, other = emissions(before), emissions(after)
+    np.testing.assert_allclose(luminance(other), luminance(one), rtol=PRECISION)
+    np.testing.assert_array_equal(one[2], other[2])
+    redder = np.log(other[:2, 0] / other[:2, 2]) - np.log(one[:2, 0] / one[:2, 2])
+    assert (redder * SHIFTED[word] >= -PRECISION).all()
+    # A white of the middle of the range does turn.
+    white = shifted(lighting([[1.0, 0.8, 0.6]] * 3), SHIFTED[word])
+    ratio = emissions(white)[0, 0] / emissions(white)[0, 2]
+    assert (ratio - 1 / 0.6) * SHIFTED[word] > 0.1
+
+
+def test_words_that_ask_for_another_solve() -> None:
+    assert set(VARIATIONS) == {*SHIFTED, *SOLVED}
+    settings, asked = Settings(hold=2.0, unpainted=0.0), Constraints()
+    assert varied("fewer lights", settings, asked, 5)[1].sparse == 3
+    assert varied("fewer lights", settings, asked, 1)[1].sparse == 1
+    few = Constraints.of(sparse=2)
+    assert varied("fewer lights", settings, few, 12)[1].sparse == 2
+    assert varied("white only", settings, asked, 5)[0].colors == "white"
+    assert varied("held harder", settings, asked, 5)[0].hold == 8.0
+    assert varied("held harder", Settings(unpainted=0.5), asked, 5)[0].hold == 12.0

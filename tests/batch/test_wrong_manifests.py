@@ -1,0 +1,203 @@
+"""Each mistake in a manifest is one clear line that names look and key; nothing is rendered."""
+
+from pathlib import Path
+
+import pytest
+from batches import write_batch
+from command import refused, run
+
+HEAD = '[defaults]\nbasis = "b.basis.exr"\nwant = ["predict"]\n'
+LOOK = '[[look]]\npainting = "p0.exr"\n'
+FIRST = HEAD + '[[look]]\nname = "one"\npainting = "p0.exr"\n'
+SEQUENCE = FIRST + '[[look]]\nname = "two"\npainting = "p1.exr"\n[[sequence]]\nname = "seq"\n'
+
+#: The manifest, and what its line says.
+WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
+    "no TOML": ("look = = 3", ("is not TOML", "line 1")),
+    "a key that stands twice": (HEAD + 'want = ["solve"]\n', ("is not TOML",)),
+    "no look": (HEAD, ("has no look", "[[look]]")),
+    "an unknown table": (FIRST + "[loks]\n", ("unknown key 'loks'", "'look'")),
+    "looks that are no tables": ("look = 3\n", ("look is 3", "[[look]]")),
+    "a look that is no table": ("look = [3]\n", ("look 1", "no table")),
+    "defaults that are no table": ("defaults = 1\n" + LOOK, ("defaults is 1",)),
+    "an unknown default": ('[defaults]\nscen = "a"\n' + LOOK, ("defaults", "mean 'scene'")),
+    "a painting by default": (
+        '[defaults]\npainting = "p0.exr"\n' + LOOK,
+        ("defaults", "unknown key 'painting'"),
+    ),
+    "an unknown key": (FIRST + "masc = 'a'\n", ("look 'one'", "'masc'", "mean 'mask'")),
+    "a painting that is a number": (HEAD + "[[look]]\npainting = 3\n", ("painting is 3",)),
+    "an empty name": (HEAD + LOOK + 'name = ""\n', ("look ''", "name is ''")),
+    "nothing to show": (HEAD + '[[look]]\nname = "a"\n', ("look 'a'", "nothing to show")),
+    "painting and lighting": (
+        FIRST + 'lighting = "l.json"\n',
+        ("look 'one'", "painting and lighting at once"),
+    ),
+    "neither scene nor basis": (LOOK, ("look 'p0.exr'", "no scene and no basis")),
+    "a painting that is not there": (
+        HEAD + '[[look]]\npainting = "gone.exr"\n',
+        ("look 'gone.exr'", "painting: no such file: gone.exr"),
+    ),
+    "a pattern that fits nothing": (
+        HEAD + '[[look]]\nname = "a"\npaintings = ["q*.exr"]\n',
+        ("look 'a'", "no such file: q*.exr"),
+    ),
+    "no paintings in the list": (HEAD + "[[look]]\npaintings = []\n", ("paintings is []",)),
+    "a scene that is not there": (
+        '[[look]]\nscene = "s.xml"\npainting = "p0.exr"\n',
+        ("scene: no such file: s.xml",),
+    ),
+    "a basis that is not there": (FIRST + 'basis = "s.exr"\n', ("basis: no such file: s.exr",)),
+    "a basis that is none": (FIRST + 'basis = "p1.exr"\n', ("look 'one'", "p1.exr")),
+    "a mask that is not there": (FIRST + 'mask = "m.png"\n', ("mask: no such file: m.png",)),
+    "a template that is not there": (FIRST + 'template = "t"\n', ("template: no such folder: t",)),
+    "a lighting that is not there": (
+        HEAD + '[[look]]\nlighting = "l.json"\n',
+        ("lighting: no such file: l.json",),
+    ),
+    "a lighting that is none": (
+        HEAD + '[[look]]\nname = "a"\nlighting = "looks.toml"\n',
+        ("look 'a'", "is not a JSON file"),
+    ),
+    "sensor and sensors": (
+        FIRST + 'sensor = "a"\nsensors = ["a"]\n',
+        ("look 'one'", "sensor and sensors at once"),
+    ),
+    "a sensor of a basis": (FIRST + 'sensor = "a"\n', ("look 'one'", "sensor", "saved basis")),
+    "several sensors of a basis": (
+        FIRST + 'sensors = ["a", "b"]\n',
+        ("look 'one'", "a basis has one view only"),
+    ),
+    "a sensor that is a list": (FIRST + "sensor = [1]\n", ("sensor is [1]",)),
+    "an unknown step": (FIRST + 'want = ["solved"]\n', ("want is ['solved']", "'predict'")),
+    "a step twice": (FIRST + 'want = ["solve", "solve"]\n', ("each once",)),
+    "a render without a scene": (FIRST + 'want = ["render"]\n', ("'render'", "needs the scene")),
+    "a verification without a scene": (FIRST + 'want = ["verify"]\n', ("needs the scene",)),
+    "render that is not wanted": (FIRST + "[look.render]\nspp = 4\n", ("does not have 'render'",)),
+    "an unknown key of render": (
+        FIRST + "[look.render]\nsamples = 4\n",
+        ("look 'one', render", "'samples'"),
+    ),
+    "one sample": (FIRST + "[look.render]\nspp = 1\n", ("spp is 1", "whole number >= 2")),
+    "an unknown setting": (
+        FIRST + "[look.settings]\nholds = 1\n",
+        ("look 'one', settings", "mean 'hold'"),
+    ),
+    "a setting of the wrong kind": (
+        FIRST + '[look.settings]\nhold = "much"\n',
+        ("look 'one', settings", "hold is 'much'", "a weight >= 0"),
+    ),
+    "settings that contradict": (
+        FIRST + "[look.settings]\nhold = 1\nunpainted = 1\n",
+        ("look 'one', settings", "unpainted is 1"),
+    ),
+    "a setting of renders alone": (
+        FIRST + "[look.settings]\nspp = 8\n",
+        ("look 'one'", "spp", "saved basis"),
+    ),
+    "an unknown colour choice": (
+        FIRST + '[look.settings]\ncolors = "warm"\n',
+        ("colors is 'warm'", "'gentle'"),
+    ),
+    "an unknown constraint": (
+        FIRST + "[look.constraints]\nlocks = 1\n",
+        ("look 'one', constraints", "'locks'"),
+    ),
+    "an unknown key of a light": (
+        FIRST + '[look.constraints.light."lamp 0"]\nlocked = true\n',
+        ("look 'one', constraints", "lamp 0", "locked"),
+    ),
+    "a light that there is not": (
+        FIRST + "[look.constraints.light.sun]\noff = true\n",
+        ("look 'one'", "sun"),
+    ),
+    "a lights file that is not there": (
+        FIRST + 'constraints = "c.toml"\n',
+        ("look 'one', constraints", "no such lights file", "c.toml"),
+    ),
+    "constraints that are a list": (FIRST + "constraints = [1]\n", ("constraints is [1]",)),
+    "an unknown variation": (
+        FIRST + 'variations = ["warm"]\n',
+        ("variations is ['warm']", "'warmer'"),
+    ),
+    "an unknown view": (FIRST + 'view = "acres"\n', ("look 'one'", "acres")),
+    "an exposure that is a text": (FIRST + 'exposure = "+1"\n', ("exposure is '+1'", "stops")),
+    "an unknown paint": (FIRST + 'paint = "oil"\n', ("paint is 'oil'", "'light'")),
+    "a name with a slash": (HEAD + LOOK + 'name = "a/b"\n', ("'a/b' is no name for a folder",)),
+    "a name twice": (FIRST + LOOK + 'name = "one"\n', ("look 'one'", "more than one look")),
+    "a variation's name twice": (
+        FIRST + 'variations = ["warmer"]\n' + LOOK + 'name = "one-warmer"\n',
+        ("look 'one' and look 'one-warmer'", "more than one look"),
+    ),
+    "a sequence without frames": (
+        SEQUENCE + 'through = ["one", "two"]\n',
+        ("sequence 'seq'", "frames is missing"),
+    ),
+    "a sequence of one frame": (
+        SEQUENCE + 'through = ["one", "two"]\nframes = 1\n',
+        ("sequence 'seq'", "frames is 1", ">= 2"),
+    ),
+    "a sequence through one look": (
+        SEQUENCE + 'through = ["one"]\nframes = 4\n',
+        ("through is ['one']", "at least two"),
+    ),
+    "a sequence through nobody": (
+        SEQUENCE + 'through = ["one", "three"]\nframes = 4\n',
+        ("sequence 'seq'", "no look is called 'three'"),
+    ),
+    "a sequence in an unknown space": (
+        SEQUENCE + 'through = ["one", "two"]\nframes = 4\nspace = "rgb"\n',
+        ("space is 'rgb'", "'oklab'"),
+    ),
+    "a sequence that is solved": (
+        SEQUENCE + 'through = ["one", "two"]\nframes = 4\nwant = ["solve"]\n',
+        ("want is ['solve']",),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wrong")
+    write_batch(folder)
+    return folder
+
+
+def test_there_are_forty() -> None:
+    assert len(WRONG) >= 40
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_it_is_one_line_and_nothing_is_done(here: Path, name: str) -> None:
+    text, said = WRONG[name]
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    line = refused(here, "batch", "looks.toml", "-o", "out")
+    assert line.startswith("lightpaint batch: looks.toml")
+    for words in said:
+        assert words in line
+
+
+def test_all_mistakes_are_told_at_once(here: Path) -> None:
+    looks = '[[look]]\nname = "a"\npainting = "x.exr"\nmask = "y.png"\n'
+    looks += '[[look]]\nname = "b"\npainting = "p0.exr"\n[look.settings]\nholds = 1\nseed = -1\n'
+    (here / "looks.toml").write_text(HEAD + looks, encoding="utf-8")
+    done = run(here, "batch", "looks.toml", "-o", "out")
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    assert len(lines) == 4
+    assert all(line.startswith("lightpaint batch: looks.toml: look '") for line in lines)
+    assert not (here / "out").exists()
+
+
+def test_a_manifest_that_is_not_there_and_other_things_of_the_command(here: Path) -> None:
+    assert "no such manifest: gone.toml" in refused(here, "batch", "gone.toml")
+    assert "2 manifests" in refused(here, "batch", "a.toml", "b.toml")
+    (here / "looks.toml").write_text(FIRST, encoding="utf-8")
+    line = refused(here, "batch", "looks.toml", "--only", "two*", "-o", "out")
+    assert "no look matches 'two*': there are one" in line
+    (here / "file").write_text("", encoding="utf-8")
+    assert "cannot write into file" in refused(here, "batch", "looks.toml", "-o", "file")
+    (here / "file").unlink()
+    assert "no painting" in refused(here, "batch", "--init", "p0.exr")
+    assert "no such file" in refused(here, "batch", "--init", "s.xml", "p0.exr")
+    assert "looks.toml is there" in refused(here, "batch", "--init", "p0.exr", "p1.exr")

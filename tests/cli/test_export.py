@@ -1,0 +1,139 @@
+"""`lightpaint export`: each form is read back by what it is for."""
+
+import ast
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from command import refused, run, succeed
+from light_groups import interleaved, pictures
+from renderer import LIGHTS, write_room
+
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.file import read_lighting
+from lightpaint.scene.scene import load_scene
+
+#: Emissions are written with nine digits, and read as float32.
+FLOAT32 = 1e-6
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A room whose lights are in it and in a file that it includes, and an answer for it."""
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "lamps").mkdir()
+    more = f'<scene version="3.0.0">{LIGHTS["bulb"]}</scene>\n'
+    (folder / "lamps" / "bulb.xml").write_text(more, encoding="utf-8")
+    included = '<include filename="lamps/bulb.xml"/>'
+    write_room(folder, lights=LIGHTS["panel"] + LIGHTS["sun"] + included)
+    write_rgb(folder / "look.exr", np.full((20, 24, 3), 0.4, np.float32) * [1, 0.8, 0.5])
+    succeed(folder, "solve", "room.xml", "look.exr", "--spp", "4", "--unit", "100")
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
+    interleaved(folder / "groups.exr", layers)
+    write_rgb(folder / "groups" / "look.exr", pictures()[0])
+    succeed(folder, "solve", "groups.exr", "groups/look.exr", "-o", "grouped")
+    return folder
+
+
+def test_a_patch_changes_the_lights_and_nothing_else(here: Path, tmp_path: Path) -> None:
+    if shutil.which("patch") is None:
+        pytest.skip("patch")
+    given = ("look/lighting.json", "--to", "mitsuba", "--scene", "room.xml")
+    succeed(here, "export", *given, "-o", tmp_path / "out")
+    patch = (tmp_path / "out" / "relit.patch").read_text()
+    shutil.copy(here / "room.xml", tmp_path)
+    shutil.copytree(here / "lamps", tmp_path / "lamps")
+    subprocess.run(["patch", "-p1"], input=patch, text=True, cwd=tmp_path, check=True)
+    wanted = read_lighting(here / "look" / "lighting.json").emission
+    found = {light.name: light.emission for light in load_scene(tmp_path / "room.xml").lights}
+    assert set(found) == set(wanted)
+    for name, emission in wanted.items():
+        np.testing.assert_allclose(found[name], emission, rtol=FLOAT32)
+    changed = [x for x in patch.splitlines() if x[0] in "+-" and x[:3] not in ("+++", "---")]
+    assert all("rgb" in line or "sampling_weight" in line for line in changed)
+
+
+class _Socket:
+    default_value: Any = None
+
+
+def _blender() -> ModuleType:
+    """As much of Blender as the script asks for: its lamps by type, a mesh, and a world."""
+
+    def lamp(kind: str, **how: Any) -> Any:
+        world = SimpleNamespace(to_scale=lambda: (2.0, 3.0, 1.0))
+        return SimpleNamespace(
+            type="LIGHT", data=SimpleNamespace(type=kind, **how), matrix_world=world
+        )
+
+    inputs = {name: _Socket() for name in ("Color", "Strength")}
+    tree = SimpleNamespace(nodes=[SimpleNamespace(type="EMISSION", inputs=inputs)])
+    material = SimpleNamespace(use_nodes=True, node_tree=tree)
+    mesh = SimpleNamespace(type="MESH", material_slots=[SimpleNamespace(material=material)])
+    made = ModuleType("bpy")
+    objects = {
+        "bulb": lamp("POINT"),
+        "sun": lamp("SUN"),
+        "panel": mesh,
+        "desk": lamp("AREA", size=0.5, size_y=1.0, shape="RECTANGLE"),
+    }
+    made.data = SimpleNamespace(objects=objects, worlds={})  # type: ignore[attr-defined]
+    return made
+
+
+def test_blender_is_given_watts_of_the_same_light(here: Path, tmp_path: Path) -> None:
+    given = ("look/lighting.json", "--to", "blender,csv", "--scene", "room.xml")
+    succeed(here, "export", *given, "-o", tmp_path)
+    wanted = read_lighting(here / "look" / "lighting.json").emission
+    text = (tmp_path / "set_scene.py").read_text()
+    ast.parse(text)
+    blender = _blender()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "bpy", blender)
+        exec(compile(text, "set_scene.py", "exec"), {"__name__": "script"})
+    objects = blender.data.objects
+    point = objects["bulb"].data
+    # Intensity is flux over all directions, 4π; a sun's irradiance is its own.
+    np.testing.assert_allclose(
+        np.array(point.color) * point.energy / (4 * math.pi), wanted["bulb"], rtol=FLOAT32
+    )
+    sun = objects["sun"].data
+    np.testing.assert_allclose(np.array(sun.color) * sun.energy, wanted["sun"], rtol=FLOAT32)
+    sockets = objects["panel"].material_slots[0].material.node_tree.nodes[0].inputs
+    color, strength = sockets["Color"].default_value, sockets["Strength"].default_value
+    np.testing.assert_allclose(np.array(color[:3]) * strength, wanted["panel"], rtol=FLOAT32)
+
+
+def test_light_groups_go_to_nuke_and_blender(here: Path, tmp_path: Path) -> None:
+    given = ("grouped/lighting.json", "--to", "nuke", "--to", "csv,blender")
+    succeed(here, "export", *given, "--lights", "groups.exr", "-o", tmp_path)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["fixtures.csv", "relit.nk", "set_lights.py"]
+    assert (tmp_path / "relit.nk").read_text().startswith("version 12.0")
+
+
+def test_what_it_lacks_is_one_line(here: Path) -> None:
+    lighting = "look/lighting.json"
+    wrong = {
+        (lighting, "--to", "maya"): "no form 'maya': known are csv, json, mitsuba, blender, nuke",
+        (lighting, "--to", "mitsuba"): "mitsuba needs the scene: give it with --scene",
+        (lighting, "--to", "nuke"): "give them with --lights",
+        (lighting, "--to", "mitsuba", "--lights", "groups.exr"): "leave --lights out",
+        (lighting, "--to", "nuke", "--lights", "groups.exr"): "different lights",
+        ("room.xml", "--to", "csv"): "is not a JSON file",
+        ("gone.json", "--to", "csv"): "no such lighting file",
+    }
+    for given, said in wrong.items():
+        assert said in refused(here, "export", *given, "-o", "none")
+    (here / "kept").mkdir()
+    (here / "kept" / "fixtures.csv").write_text("mine", encoding="utf-8")
+    assert "is there: name another" in refused(
+        here, "export", lighting, "--to", "csv", "-o", "kept"
+    )
+    assert run(here, "export", lighting, "--to", "csv", "-o", "kept", "--force").returncode == 0
