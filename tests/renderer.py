@@ -51,15 +51,20 @@ ROOM = """<scene version="3.0.0">
         <bsdf type="diffuse"><rgb name="reflectance" value="0.7 0.5 0.4"/></bsdf></shape>
     <shape type="rectangle" id="wall"><transform name="to_world">
         <translate y="1" z="-1"/></transform>
-        <bsdf type="principled"><rgb name="base_color" value="0.3 0.5 0.6"/>
-        <float name="roughness" value="0.3"/></bsdf>
-        </shape>
+        {wall}</shape>
     <shape type="sphere" id="ball"><point name="center" x="0.3" y="0.3" z="0.2"/>
         <float name="radius" value="0.3"/>
         <bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></shape>
     {lights}
 </scene>
 """
+
+#: What the wall is of; the second has more of its light in all directions, and loads slowly.
+GLOSSY = """<bsdf type="principled"><rgb name="base_color" value="0.3 0.5 0.6"/>
+        <float name="roughness" value="0.3"/></bsdf>"""
+PLASTIC = (
+    """<bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="0.3 0.5 0.6"/></bsdf>"""
+)
 
 PATH = '<integrator type="path"><integer name="max_depth" value="5"/></integrator>'
 
@@ -71,13 +76,14 @@ def write_room(
     integrator: str = PATH,
     film: str = "",
     sensors: str = "",
+    wall: str = GLOSSY,
     name: str = "room.xml",
 ) -> Path:
     """Write the test room to `folder`, by default with a light of every one-colour kind."""
     path = folder / name
     filled = "\n    ".join(LIGHTS.values()) if lights is None else lights
     path.write_text(
-        ROOM.format(integrator=integrator, film=film, sensors=sensors, lights=filled),
+        ROOM.format(integrator=integrator, film=film, sensors=sensors, wall=wall, lights=filled),
         encoding="utf-8",
     )
     return path

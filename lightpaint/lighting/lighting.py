@@ -212,10 +212,10 @@ def combine(
 
     Examples:
         >>> solution = lp.solve(basis, target)
-        >>> np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 1e-4
+        >>> bool(np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 1e-4)
         True
         >>> twice = lp.combine(basis, {"bulb": 2}).image
-        >>> np.abs(twice - 2 * basis.image("bulb")).max() < 1e-6
+        >>> bool(np.abs(twice - 2 * basis.image("bulb")).max() < 1e-6)
         True
     """
     given = lighting

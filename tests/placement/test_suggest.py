@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, write_room
+from renderer import LIGHTS, PLASTIC, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
@@ -64,7 +64,7 @@ LIT = LIGHTS["panel"] + LIGHTS["sky"]
 @pytest.fixture(scope="module")
 def lacking(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Basis]:
     """The room without the light, and its basis."""
-    scene = load_scene(write_room(tmp_path_factory.mktemp("lacking"), lights=LIT))
+    scene = load_scene(write_room(tmp_path_factory.mktemp("lacking"), lights=LIT, wall=PLASTIC))
     return scene, render_basis(scene, spp=SPP)
 
 
@@ -77,7 +77,7 @@ def missing(
     @cache
     def suggested(hidden: Any = HIDDEN) -> tuple[Target, Solution, tuple[Suggestion, ...]]:
         extra = emitter_xml("extra", hidden, INTENSITY)
-        room = write_room(tmp_path_factory.mktemp("painted"), lights=LIT + extra)
+        room = write_room(tmp_path_factory.mktemp("painted"), lights=LIT + extra, wall=PLASTIC)
         scene, basis = lacking
         target = _target(_present(room))
         solution = solve(basis, target)

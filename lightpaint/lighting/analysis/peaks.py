@@ -13,14 +13,14 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles
 
 #: Part of what could push a light, from which on a single pixel is one of few that decide.
-PEAK = 0.2
+PEAK = 0.4
 
 #: Variance of a pixel that one path in each half has met, beside the square of its mean: nothing
 #: that both halves have seen is noisier than that.
 TWO_PATHS = 0.5
 
 #: By how much Student's t is wider than a normal distribution, where either leaves 5 % outside, of
-#: 1, 2, … degrees of freedom. No more than five pixels can each hold PEAK.
+#: 1, 2, … degrees of freedom.
 WIDER = (6.483, 2.195, 1.624, 1.416, 1.312)
 
 #: Times the variance of the others that a pixel among few may have.

@@ -189,7 +189,7 @@ def test_what_is_added_to_a_mix_is_what_a_new_mix_has(page: Any, pictures: Any):
 def test_half_size_is_every_second_pixel(page: Any, pictures: Any):
     shown(page, "cpu", pictures)
     light = page.evaluate(
-        "() => { view.pace = 1e9; bench.shown({ live: true }); "
+        "() => { view.pace = 60; bench.shown({ live: true }); "
         "return [Array.from(view.mixes.solution.light), view.step] }"
     )
     assert light[1] == 2

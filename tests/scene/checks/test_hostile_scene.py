@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damage import Case, damaged, outcomes, wrong
-from renderer import LIGHTS, PATH, ROOM, write_room
+from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
 from lightpaint.images.exr import write_rgb
 from lightpaint.scene.scene import load_scene
 
-ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", lights=LIGHTS["bulb"])
+ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, lights=LIGHTS["bulb"])
 DEVICES = ("/dev/zero", "/dev/random", "/dev/stdin", "/proc/self/mem", "/", "pipe", "gone")
 
 
