@@ -19,6 +19,11 @@ XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 #: Files round the numbers: to three decimals, or to float16.
 ROUNDING = 1e-3
 
+#: From XYZ to the responses in which Bradford's transform adapts (Lam 1985; ICC.1:2022, annex E).
+BRADFORD = np.array(
+    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+)
+
 #: The spaces that renderers work in, as files name them and as colour-science does.
 SPACES = {
     "lin_ap1_scene": "ACEScg",
@@ -52,9 +57,12 @@ def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
 
 
 def adaptation(white: Doubles, to: Doubles) -> Doubles:
-    """(3, 3) matrix that takes XYZ as seen under `white` to how it looks under `to` (Bradford)."""
-    adapt = colour_science().adaptation.matrix_chromatic_adaptation_VonKries
-    return np.asarray(adapt(white, to, transform="Bradford"))
+    """(3, 3) matrix that takes XYZ as seen under `white` to how it looks under `to` (Bradford).
+
+    Most paintings have a profile, and would wait for colour-science for these two lines alone.
+    """
+    ratio = (BRADFORD @ to) / (BRADFORD @ white)
+    return np.asarray(np.linalg.solve(BRADFORD, ratio[:, None] * BRADFORD))
 
 
 def to_rec709(primaries: tuple[float, ...]) -> Doubles:

@@ -14,6 +14,8 @@ from lightpaint.colour.color import (
     luminance,
     rgb_to_hex,
 )
+from lightpaint.colour.primaries import adaptation
+from lightpaint.colour.science import colour_science
 from lightpaint.errors import ColorError
 
 # Linear Rec.709 from the chromaticities of ITU-R BT.709: columns are the primaries' XYZ.
@@ -198,3 +200,12 @@ def test_what_is_no_colour(rgb: Any):
         rgb_to_hex(np.array(rgb))
     with pytest.raises(ColorError, match="three finite"):
         cct_and_duv(np.array(rgb))
+
+
+def test_adaptation_is_that_of_colour_science():
+    rng = np.random.default_rng(9)
+    for white, to in rng.uniform(0.5, 1.5, (20, 2, 3)):
+        expected = colour_science().adaptation.matrix_chromatic_adaptation_VonKries(
+            white, to, transform="Bradford"
+        )
+        np.testing.assert_allclose(adaptation(white, to), expected, rtol=1e-9, atol=1e-12)
