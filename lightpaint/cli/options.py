@@ -180,7 +180,8 @@ def _to_do(options: Namespace) -> dict[str, Any]:
         "is_first": options.init,
         "is_dry": options.dry_run,
         "only": options.only,
-        "how": How(options.workers, options.keep_going, options.retry),
+        "form": options.export,
+        "how": How(options.workers, options.keep_going, options.retry, options.apart),
         "force": options.force,
         "log": Path(options.log) if options.log else None,
     }

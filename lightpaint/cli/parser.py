@@ -202,6 +202,18 @@ def _batch(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="processes that share the looks; 1 for this one alone (default: %(default)s)",
     )
+    parser.add_argument(
+        "--apart",
+        action="store_true",
+        help="with --only: share the folder with others that do other looks at the same time; the "
+        "next run without it writes the gallery",
+    )
+    parser.add_argument(
+        "--export",
+        choices=("openjd",),
+        help="do nothing, but write an Open Job Description template for a farm to the folder that "
+        "is named behind the manifest",
+    )
     parser.add_argument("--log", metavar="FILE", help="add a line with its time for each step")
     add_force(parser)
 
