@@ -17,7 +17,7 @@ from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
 from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Done, Task
-from lightpaint.batch.work import Held, fields_of, is_full
+from lightpaint.batch.work import fields_of, is_full
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
 from lightpaint.scene.quality import on_film
@@ -104,7 +104,7 @@ class _Run:
         self.outcome = Outcome()
         self._plan, self._how, self._listen, self._told = plan, how, listen, told
         self._looks = {look.entry.name: look for look in plan.looks}
-        self._held = Held()
+        self._held = plan.held
         self._tries: dict[tuple[str, str], int] = {}
         self._begun_s = time.monotonic()
         self._finished = 0

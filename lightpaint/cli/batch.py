@@ -57,8 +57,11 @@ def batch(
         return _dry(planned)
     if form is not None:
         return _exported(planned, Path(paths[1]), force=force)
-    for remark in dict.fromkeys(x for look in planned.chosen_looks for x in look.remarks):
+    remarks = list(dict.fromkeys(x for look in planned.chosen_looks for x in look.remarks))
+    for remark in remarks[:LISTED]:
         terminal.say(remark)
+    if len(remarks) > LISTED:
+        terminal.say(f"and {len(remarks) - LISTED} more remarks, each when its look is done")
     listen = terminal.Listener()
     note = _log(log)
     note(f"{command}: {len(planned.chosen_looks)} looks")
