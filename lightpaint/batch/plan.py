@@ -8,6 +8,7 @@ from typing import Any
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry, entries_of
 from lightpaint.batch.fingerprint import Fingerprints
+from lightpaint.batch.gallery import check_gallery
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.manifest import Manifest, read_manifest
@@ -51,6 +52,7 @@ def plan(
     if read.mistakes.found:
         raise BatchError(*read.mistakes.found)
     check_writable(folder)
+    check_gallery(folder, force=force)
     planner = _Planner(read, folder, entries, force=force, command=command)
     looks = tuple(planner.planned(entry) for entry in entries)
     if read.mistakes.found:

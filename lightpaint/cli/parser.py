@@ -27,6 +27,7 @@ from lightpaint.cli.solve_options import (
     add_method,
     add_paintings,
     add_pattern,
+    add_several,
     add_wanted,
 )
 from lightpaint.version import __version__
@@ -115,6 +116,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         help="short: in stops and colours, of many lights those that matter; full: all lights, "
         "with their radiometry, and how sure they are (default: %(default)s)",
     )
+    add_several(parser)
     add_method(parser)
     add_wanted(parser)
     add_unit(parser)
