@@ -19,11 +19,13 @@ from lightpaint.batch.planned import Plan
 from lightpaint.batch.summary import (
     Row,
     drop_pictures,
+    is_summary,
     rows_of,
     summary_csv,
     summary_json,
 )
 from lightpaint.batch.task import Kind
+from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.png import png_bytes
 from lightpaint.report.comparison import fitted
@@ -38,6 +40,16 @@ MOST, COLUMNS, WIDTH, GAP, BELOW = 120, 6, 240, 14, 22
 
 #: A dark ground, and what is written on it.
 GROUND, TEXT, FAINT, WARNING = (24, 24, 26), (226, 226, 226), (142, 142, 146), (255, 140, 120)
+
+
+def check_gallery(folder: Path, *, force: bool = False) -> None:
+    """Raise OutputError where a gallery would take the place of somebody else's files."""
+    there = [folder / name for name in FILES if (folder / name).exists()]
+    if there and not force and not is_summary(folder / "summary.json"):
+        raise OutputError(
+            f"{there[0]} is there, and of no batch: name another folder (folder=...), or replace "
+            "it (force=True)"
+        )
 
 
 def write_gallery(folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:

@@ -5,6 +5,7 @@ look the last line holds. At the end of a run the file is written anew, in the o
 so that it does not tell how often a batch was stopped.
 """
 
+import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -37,11 +38,18 @@ class Line:
 
 
 class Journal:
-    """That of the batch in `folder`."""
+    """That of the batch in `folder`.
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / JOURNAL
-        self._lines = {(line.look, line.kind): line for line in _read(self._path)}
+    part: of several processes that share the folder, which part of the looks this one does: it has
+    a file of its own, and reads those of all.
+    """
+
+    def __init__(self, folder: Path, part: str = "") -> None:
+        self._path = self._whole = folder / JOURNAL
+        if part:
+            self._path = folder / f"journal-{hashlib.sha256(part.encode()).hexdigest()[:16]}.jsonl"
+        files = [self._whole, *sorted(folder.glob("journal-*.jsonl"))]
+        self._lines = {(line.look, line.kind): line for file in files for line in _read(file)}
         # Behind half of a line nothing could be read.
         self._is_whole = not self._path.exists() or _ends_whole(self._path)
 
@@ -66,9 +74,11 @@ class Journal:
         self._lines[line.look, line.kind] = line
 
     def settle(self, steps: Iterable[tuple[str, Kind]]) -> None:
-        """Write it anew, with the lines of these steps alone, in this order."""
+        """Write it anew, with the lines of these steps alone, in this order; parts are in it."""
         kept = [self._lines[step] for step in steps if step in self._lines]
-        write_text(self._path, "".join(map(_text, kept)))
+        write_text(self._whole, "".join(map(_text, kept)))
+        for file in self._whole.parent.glob("journal-*.jsonl"):
+            file.unlink(missing_ok=True)
         self._lines = {(line.look, line.kind): line for line in kept}
         self._is_whole = True
 

@@ -8,6 +8,7 @@ from typing import Any
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry, entries_of
 from lightpaint.batch.fingerprint import Fingerprints
+from lightpaint.batch.gallery import check_gallery
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.manifest import Manifest, read_manifest
@@ -51,12 +52,14 @@ def plan(
     if read.mistakes.found:
         raise BatchError(*read.mistakes.found)
     check_writable(folder)
+    check_gallery(folder, force=force)
     planner = _Planner(read, folder, entries, force=force, command=command)
     looks = tuple(planner.planned(entry) for entry in entries)
     if read.mistakes.found:
         raise BatchError(*read.mistakes.found)
     names = frozenset(look.entry.name for look in looks)
-    return Plan(read.path, folder, looks, planner.costs, names)
+    planner.held.only(())
+    return Plan(read.path, folder, looks, planner.costs, names, planner.held)
 
 
 class _Planner:
@@ -74,7 +77,7 @@ class _Planner:
         self._mistakes: Mistakes = manifest.mistakes
         self._force, self._command = force, command
         self._folders = {entry.name: folder / entry.name for entry in entries}
-        self._held, self._journal = Held(), Journal(folder)
+        self.held, self._journal = Held(), Journal(folder)
         self._prints = Fingerprints(manifest.folder)
         self._failed: set[str] = set()
         self.costs: dict[str, Cost] = {}
@@ -120,10 +123,12 @@ class _Planner:
 
     def _looked_at(self, entry: Entry) -> tuple[Entry, tuple[Path, ...], tuple[str, ...]]:
         """With all decided that follows from its files; what it reads; what is worth saying."""
-        scenes = tuple(map(self._held.scene, entry.scenes))
-        basis = None if entry.basis is None else self._held.saved(entry.basis)
+        scenes = tuple(map(self.held.scene, entry.scenes))
+        # Of saved bases no more than one is held, and by no look.
+        self.held.only(bases_of(entry))
+        basis = None if entry.basis is None else self.held.saved(replace(entry.basis))
         if not entry.is_solved:
-            return self._made(replace(entry, scenes=scenes, basis=basis))
+            return entry, *self._made(replace(entry, scenes=scenes, basis=basis))
         settings, asked = entry.settings, entry.constraints
         job = self._job(entry, scenes, basis, settings, asked)
         if entry.variation:
@@ -153,7 +158,7 @@ class _Planner:
         folder = self._folders[entry.name]
         return Job(tuple(scenes), paintings, folder, basis, asked, settings, entry.by_sensor)
 
-    def _made(self, entry: Entry) -> tuple[Entry, tuple[Path, ...], tuple[str, ...]]:
+    def _made(self, entry: Entry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         """Of a look that is made of lightings: those of files are looked at."""
         scene: Scene | None = entry.scenes[0].content if entry.scenes else None
         lights = entry.basis.content.lights if entry.basis is not None else None
@@ -181,7 +186,7 @@ class _Planner:
             self._note_costs(entry, [film], entry.settings)
             if entry.final.resolution is not None and "render" in entry.want:
                 on_film(scene, None, entry.final.resolution)
-        return entry, reads, ()
+        return reads, ()
 
     def _note_costs(self, entry: Entry, films: Sequence[Scene | None], settings: Settings) -> None:
         """What each basis costs that is to be obtained. films: on which it is rendered."""

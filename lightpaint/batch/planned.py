@@ -1,12 +1,13 @@
 """What is planned: looks, their steps, what they cost."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.task import Kind, Task
+from lightpaint.batch.work import Held
 from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 
@@ -54,13 +55,17 @@ class Cost:
 
 @dataclass(frozen=True)
 class Plan:
-    """All looks of a manifest. costs: of each basis, by its key. chosen: names of those to do."""
+    """All looks of a manifest. costs: of each basis, by its key. chosen: names of those to do.
+
+    held: scenes as they were loaded to be looked at, so that they are not loaded twice.
+    """
 
     manifest: Path
     folder: Path
     looks: tuple[PlannedLook, ...]
     costs: Mapping[str, Cost]
     chosen: frozenset[str]
+    held: Held = field(default_factory=Held, repr=False, compare=False)
 
     @property
     def chosen_looks(self) -> tuple[PlannedLook, ...]:

@@ -17,7 +17,7 @@ from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
 from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Done, Task
-from lightpaint.batch.work import Held, fields_of, is_full
+from lightpaint.batch.work import fields_of, is_full
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
 from lightpaint.scene.quality import on_film
@@ -29,12 +29,14 @@ class How:
     """How a plan is done.
 
     workers: processes; 1 for none beside this. keep_going: whether what fails stops nothing else.
-    retry: how often a step that failed is tried again.
+    retry: how often a step that failed is tried again. apart: whether others do the other looks of
+    the plan at the same time, in the same folder; the gallery is left to who comes last.
     """
 
     workers: int = 1
     keep_going: bool = True
     retry: int = 0
+    apart: bool = False
 
 
 @dataclass
@@ -71,7 +73,7 @@ def run_batch(
         Interrupted: For Ctrl-C; the same call goes on from there.
     """
     how = how or How()
-    with _alone(plan.folder), ExitStack() as stack:
+    with _alone(plan.folder, may_share=how.apart), ExitStack() as stack:
         run = _Run(plan, how, listener(progress), told or (lambda look, done: None))
         try:
             run.all(stack)
@@ -80,7 +82,10 @@ def run_batch(
             raise Interrupted(f"{left} looks are left; the same command goes on") from None
         finally:
             with suppress(LightpaintError):
-                run.journal.settle(plan.steps)
+                if not how.apart:
+                    run.journal.settle(plan.steps)
+        if how.apart:
+            return run.outcome
         run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
         return run.outcome
 
@@ -95,11 +100,11 @@ class _Run:
         listen: Listener,
         told: Callable[[PlannedLook, Done], None],
     ) -> None:
-        self.journal = Journal(plan.folder)
+        self.journal = Journal(plan.folder, "/".join(sorted(plan.chosen)) if how.apart else "")
         self.outcome = Outcome()
         self._plan, self._how, self._listen, self._told = plan, how, listen, told
         self._looks = {look.entry.name: look for look in plan.looks}
-        self._held = Held()
+        self._held = plan.held
         self._tries: dict[tuple[str, str], int] = {}
         self._begun_s = time.monotonic()
         self._finished = 0
@@ -234,8 +239,11 @@ class _Run:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Raise OutputError where another batch is at work in `folder`."""
+def _alone(folder: Path, *, may_share: bool) -> Iterator[None]:
+    """Raise OutputError where another batch is at work in `folder`.
+
+    may_share: whether others that may, too, are let work there.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -244,7 +252,8 @@ def _alone(folder: Path) -> Iterator[None]:
     try:
         with suppress(PermissionError):
             try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                kind = fcntl.LOCK_SH if may_share else fcntl.LOCK_EX
+                fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise OutputError(
                     f"another batch is at work in {folder}: wait for it, or name another folder "

@@ -219,6 +219,11 @@ def summary_document(rows: Iterable[Row]) -> dict[str, Any]:
     return {"format": FORMAT, "lightpaint": __version__, **counts, "looks": looks}
 
 
+def is_summary(path: Path) -> bool:
+    """Whether a file is a summary.json of ours."""
+    return _json(path).get("format") == FORMAT
+
+
 def summary_json(rows: Iterable[Row]) -> str:
     """summary.json as text."""
     return json.dumps(summary_document(rows), indent=1, ensure_ascii=False, allow_nan=False) + "\n"

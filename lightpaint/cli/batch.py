@@ -9,13 +9,14 @@ from typing import Any
 from lightpaint.batch.estimate import estimate
 from lightpaint.batch.first import write_first
 from lightpaint.batch.gallery import FILES, spoken_counts
+from lightpaint.batch.openjd import write_openjd
 from lightpaint.batch.plan import plan
 from lightpaint.batch.planned import Plan, PlannedLook
 from lightpaint.batch.run import How, run_batch
 from lightpaint.batch.run import Outcome as BatchOutcome
 from lightpaint.batch.summary import Row, summary_document
 from lightpaint.batch.task import Done
-from lightpaint.cli import terminal
+from lightpaint.cli import documents, terminal
 from lightpaint.cli.manner import Outcome
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import called
@@ -31,6 +32,7 @@ def batch(
     output: Path | None,
     is_first: bool,
     is_dry: bool,
+    form: str | None,
     only: str | None,
     how: How,
     force: bool,
@@ -43,7 +45,9 @@ def batch(
         terminal.write(f"{made}: {len(paths) - 1} looks; what runs them is")
         terminal.write(f"lightpaint batch {shlex.quote(str(made))}")
         return Outcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
-    if len(paths) > 1:
+    if form is not None and len(paths) != 2:
+        raise BatchError("where is the job to go? give looks.toml --export openjd DIR")
+    if form is None and len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
     folder = output or Path(called(Path(paths[0])))
     # The same in all reports, however often it was stopped, and by how many it is done.
@@ -51,8 +55,13 @@ def batch(
     planned = plan(paths[0], folder, force=force, command=command).only(only)
     if is_dry:
         return _dry(planned)
-    for remark in dict.fromkeys(x for look in planned.chosen_looks for x in look.remarks):
+    if form is not None:
+        return _exported(planned, Path(paths[1]), force=force)
+    remarks = list(dict.fromkeys(x for look in planned.chosen_looks for x in look.remarks))
+    for remark in remarks[:LISTED]:
         terminal.say(remark)
+    if len(remarks) > LISTED:
+        terminal.say(f"and {len(remarks) - LISTED} more remarks, each when its look is done")
     listen = terminal.Listener()
     note = _log(log)
     note(f"{command}: {len(planned.chosen_looks)} looks")
@@ -74,6 +83,14 @@ def batch(
     return _told(planned, outcome)
 
 
+def _exported(planned: Plan, folder: Path, *, force: bool) -> Outcome:
+    """A job for a farm, and how it is run here."""
+    path = write_openjd(folder, planned, force=force)
+    terminal.write(f"{path}: {len(planned.chosen_looks)} looks; what runs them here is")
+    terminal.write(f"openjd run {shlex.quote(str(path))}")
+    return Outcome(lambda: documents.files_document(folder, [path]))
+
+
 def _told(planned: Plan, outcome: BatchOutcome) -> Outcome:
     """What a run came to, for people and programs."""
     _show(planned, outcome.rows)
@@ -86,11 +103,12 @@ def _told(planned: Plan, outcome: BatchOutcome) -> Outcome:
         terminal.say(f"{len(outcome.skipped)} looks were done earlier, and are as they were")
     if outcome.waiting:
         terminal.complain("batch", f"stopped: {some_of(outcome.waiting)} not begun")
-    terminal.write(f"{folder / FILES[0]}: {spoken_counts(outcome.rows)}")
+    if outcome.rows:
+        terminal.write(f"{folder / FILES[0]}: {spoken_counts(outcome.rows)}")
     return Outcome(
         lambda: {
             "folder": str(folder),
-            "files": [str(folder / name) for name in FILES],
+            "files": [str(folder / name) for name in FILES if outcome.rows],
             **summary_document(outcome.rows),
         },
         1 if outcome.failed or outcome.waiting else 0,

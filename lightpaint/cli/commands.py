@@ -7,6 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.file import write_basis
+from lightpaint.batch.gallery import FILES, spoken_counts
+from lightpaint.batch.plan import ALONE
+from lightpaint.batch.solved import write_gallery_of
+from lightpaint.batch.work import is_full
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.answer import Table, show_look, spoken_settings
 from lightpaint.cli.batch import batch as batch
@@ -134,17 +138,34 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
     return replace(solved, told=lambda: about | solved.told())
 
 
-def solve(*, jobs: Sequence[Job], table: Table = "short", wanted: Wanted = ANY) -> Outcome:
-    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`"""
+def solve(
+    *,
+    jobs: Sequence[Job],
+    table: Table = "short",
+    wanted: Wanted = ANY,
+    failed: dict[str, str] | None = None,
+    together: Path | None = None,
+    keep_going: bool = False,
+) -> Outcome:
+    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`
+
+    failed: names of those that cannot be done, and why. together: folder of a gallery of all.
+    """
     listen, obtained = terminal.Listener(), None
-    results, shortfalls = [], []
+    results, shortfalls, failed = [], [], failed or {}
     # Those of all before the first is run, which says its own again: once is enough.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
     for job in jobs:
         listen.note(f"files read; {spoken_settings(job.fit)}")
-        with listen:
-            looks = run(job, listen, bases=obtained)
+        try:
+            with listen:
+                looks = run(job, listen, bases=None if obtained is None else list(obtained))
+        except ALONE as error:
+            if not keep_going or is_full(error):
+                raise
+            failed[job.folder.name] = str(error)
+            continue
         # Several paintings of one scene share its basis.
         obtained = [look.basis for look in looks]
         for view, look in zip(job.views, looks, strict=True):
@@ -159,13 +180,19 @@ def solve(*, jobs: Sequence[Job], table: Table = "short", wanted: Wanted = ANY) 
         if job.groups is not None:
             there = ", ".join(name for name in EXPORTS if (job.folder / name).is_file())
             terminal.write(f"for other programs: {there}")
-    if not jobs[0].scenes and jobs[0].groups is None:
+    for name, why in failed.items():
+        terminal.complain("solve", f"{name}: {why}")
+    if together is not None:
+        names = [*(job.folder.name for job in jobs), *failed]
+        rows = write_gallery_of(together, list(dict.fromkeys(names)), failed)
+        terminal.write(f"{together / FILES[0]}: {spoken_counts(rows)}")
+    if jobs and not jobs[0].scenes and jobs[0].groups is None:
         terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
     if shortfalls:
         terminal.complain("solve", some_of(shortfalls, joint="; "))
     return Outcome(
         lambda: {"results": [documents.result_document(*x, wanted) for x in results]},
-        1 if shortfalls else 0,
+        1 if shortfalls or failed else 0,
     )
 
 

@@ -14,6 +14,8 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
+from lightpaint.batch.gallery import check_gallery
+from lightpaint.batch.plan import ALONE
 from lightpaint.batch.run import How
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
@@ -62,7 +64,13 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
             wanted = Wanted(options.max_miss, options.min_fit)
-            return {"jobs": jobs_of(options, settings), "table": options.table, "wanted": wanted}
+            failed: dict[str, str] = {}
+            jobs = jobs_of(options, settings, failed)
+            together = None if len(options.targets) < 2 else output
+            if together is not None:
+                check_gallery(together, force=options.force)
+            how = {"failed": failed, "together": together, "keep_going": options.keep_going}
+            return {"jobs": jobs, "table": options.table, "wanted": wanted, **how}
         case "batch":
             return _to_do(options)
         case "export":
@@ -118,10 +126,13 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
     return SceneFile(path, parameters=dict(options.parameters), **loading)
 
 
-def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
+def jobs_of(
+    options: Namespace, settings: Settings, failed: dict[str, str] | None = None
+) -> list[Job]:
     """What `solve` is asked for, a job for each painting or one for several views.
 
-    All are born, and so checked, before the first is run.
+    All are born, and so checked, before the first is run. failed: where the others are to go on,
+    receives why one cannot be done, by the name of its folder.
     """
     basis = basis_of(options)
     if options.views and options.targets:
@@ -153,10 +164,14 @@ def jobs_of(options: Namespace, settings: Settings) -> list[Job]:
     # One scene, which is loaded once for all.
     source = () if basis is not None else (scene_of(options),)
     folders = folders_of(options.output and Path(options.output), [Path(p).stem for p in paths])
-    jobs = [
-        Job(source, (painting,), folder, basis, asked, settings)
-        for painting, folder in zip(paintings, folders, strict=True)
-    ]
+    jobs = []
+    for painting, folder in zip(paintings, folders, strict=True):
+        try:
+            jobs.append(Job(source, (painting,), folder, basis, asked, settings))
+        except ALONE as error:
+            if failed is None or not options.keep_going or len(paintings) == 1:
+                raise
+            failed[folder.name] = str(error)
     if options.lights_file:
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
@@ -180,7 +195,8 @@ def _to_do(options: Namespace) -> dict[str, Any]:
         "is_first": options.init,
         "is_dry": options.dry_run,
         "only": options.only,
-        "how": How(options.workers, options.keep_going, options.retry),
+        "form": options.export,
+        "how": How(options.workers, options.keep_going, options.retry, options.apart),
         "force": options.force,
         "log": Path(options.log) if options.log else None,
     }

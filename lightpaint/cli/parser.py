@@ -27,6 +27,7 @@ from lightpaint.cli.solve_options import (
     add_method,
     add_paintings,
     add_pattern,
+    add_several,
     add_wanted,
 )
 from lightpaint.version import __version__
@@ -115,6 +116,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         help="short: in stops and colours, of many lights those that matter; full: all lights, "
         "with their radiometry, and how sure they are (default: %(default)s)",
     )
+    add_several(parser)
     add_method(parser)
     add_wanted(parser)
     add_unit(parser)
@@ -201,6 +203,18 @@ def _batch(parser: argparse.ArgumentParser) -> None:
         default=1,
         metavar="N",
         help="processes that share the looks; 1 for this one alone (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--apart",
+        action="store_true",
+        help="with --only: share the folder with others that do other looks at the same time; the "
+        "next run without it writes the gallery",
+    )
+    parser.add_argument(
+        "--export",
+        choices=("openjd",),
+        help="do nothing, but write an Open Job Description template for a farm to the folder that "
+        "is named behind the manifest",
     )
     parser.add_argument("--log", metavar="FILE", help="add a line with its time for each step")
     add_force(parser)

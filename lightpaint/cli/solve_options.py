@@ -150,6 +150,16 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_several(parser: argparse.ArgumentParser) -> None:
+    """What several paintings of one scene are to each other."""
+    parser.add_argument(
+        "--keep-going",
+        action="store_true",
+        help="of several paintings: one that cannot be read or answered fails alone, the others go "
+        "on, and the exit code is 1 (default: all are checked first, and nothing is begun)",
+    )
+
+
 def add_wanted(parser: argparse.ArgumentParser) -> None:
     """What a script asks of the answer."""
     parser.add_argument(

@@ -154,8 +154,8 @@ def _banner(verification: Verification | None) -> str:
     """What must be known before looking: loud where the render contradicts the prediction."""
     if verification is None:
         return (
-            '<p class="note">Not verified: solved from a saved basis, without a render of the '
-            "relit scene to compare with.</p>"
+            '<p class="note">Not verified: there is no render of the relit scene to compare with, '
+            "as of a saved basis, or because none was asked for.</p>"
         )
     if verification.agrees:
         return ""

@@ -4,7 +4,9 @@ import csv
 import json
 import os
 import random
+import shutil
 import signal
+import subprocess
 import time
 from html.parser import HTMLParser
 from pathlib import Path
@@ -212,6 +214,27 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
     write_batch(here / "other")
     succeed(here / "other", "batch", "looks.toml", "-o", "out")
     assert contents(here / "out") == contents(here / "other" / "out")
+
+
+def test_a_disk_that_is_really_full(here: Path) -> None:
+    disk = here / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=96K", "tmpfs", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("the right to mount")
+    try:
+        done = run(here, "batch", "looks.toml", "-o", disk / "out", "-q")
+        assert done.returncode == 2
+        [line] = done.stderr.splitlines()
+        assert "No space left on device: make room; the same command goes on" in line
+        assert not list((disk / "out").glob(".*"))
+        more = ["mount", "-o", "remount,size=8M", str(disk)]
+        subprocess.run(more, check=True)
+        again = run(here, "batch", "looks.toml", "-o", disk / "out")
+        assert again.returncode == 0
+        assert "looks were done earlier" in again.stderr
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
 
 
 def test_an_interrupt_says_how_to_go_on(

@@ -1,0 +1,33 @@
+"""The gallery of looks that were solved by name, without a manifest."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from lightpaint.batch.entries import Entry
+from lightpaint.batch.gallery import write_gallery
+from lightpaint.batch.journal import Line
+from lightpaint.batch.planned import Plan, PlannedLook, Step
+from lightpaint.batch.summary import Row
+from lightpaint.batch.task import Kind, Task
+
+
+def write_gallery_of(folder: Path, names: Sequence[str], failed: Mapping[str, str]) -> list[Row]:
+    """Write the gallery of the looks in `folder`, by the names of their folders there.
+
+    failed: why, by name, of those that came to nothing.
+    """
+    looks, lines = [], {}
+    for name in names:
+        made_of = "" if name in failed else _content(folder / name / "lighting.json")
+        step = Step(Task(name, "answer", ""), made_of, True)
+        looks.append(PlannedLook(Entry(name, ""), folder / name, (step,)))
+        key: tuple[str, Kind] = (name, "answer")
+        state = "failed" if name in failed else "done"
+        lines[key] = Line(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
+    plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, frozenset(names))
+    return write_gallery(folder, plan, lines)
+
+
+def _content(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

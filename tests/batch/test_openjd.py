@@ -1,0 +1,119 @@
+"""A batch as a farm job: what `openjd run` makes of it, or at least what its commands do."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import pytest
+from batches import NAMES, contents, run_all, write_batch
+from command import refused, run, succeed
+
+OPENJD = os.environ.get("LIGHTPAINT_OPENJD") or shutil.which("openjd")
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    write_batch(tmp_path)
+    output = succeed(tmp_path, "batch", "looks.toml", "-o", "out", "--export", "openjd", "job")
+    assert "openjd run job/template.json" in output
+    assert not (tmp_path / "out").exists()
+    return tmp_path
+
+
+def _template(here: Path) -> Any:
+    return json.loads((here / "job" / "template.json").read_text())
+
+
+def test_each_look_is_in_one_task_after_all_that_it_is_made_of(here: Path) -> None:
+    steps = _template(here)["steps"]
+    assert [step["name"] for step in steps] == ["Bases", "Looks", "Made 1", "Gallery"]
+    done: list[str] = []
+    for k, step in enumerate(steps[:-1]):
+        [look] = step["parameterSpace"]["taskParameterDefinitions"]
+        for pattern in look["range"]:
+            done += [name for name in NAMES if fnmatchcase(name, pattern)]
+        waits = [one["dependsOn"] for one in step.get("dependencies", [])]
+        assert waits == [one["name"] for one in steps[:k]]
+    assert sorted(done) == sorted(NAMES)
+    assert done[0] == "p0"
+
+
+def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(here: Path) -> None:
+    template = _template(here)
+    values = {"{{Param.Manifest}}": "looks.toml", "{{Param.Output}}": "out"}
+    for step in template["steps"]:
+        action = step["script"]["actions"]["onRun"]
+        space = step.get("parameterSpace", {"taskParameterDefinitions": [{"range": [""]}]})
+        for look in space["taskParameterDefinitions"][0]["range"]:
+            filled = {**values, "{{Task.Param.Look}}": look}
+            done = run(here, *(filled.get(word, word) for word in action["args"]), "-q")
+            assert done.returncode == 0, done.stderr
+    (here / "once").mkdir()
+    write_batch(here / "once")
+    succeed(here / "once", "batch", "looks.toml", "-o", "out")
+    assert contents(here / "out") == contents(here / "once" / "out")
+
+
+def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
+    from lightpaint.batch.plan import plan
+    from lightpaint.batch.run import How, run_batch
+    from lightpaint.errors import OutputError
+
+    planned, told = plan(here / "looks.toml", here / "out"), []
+
+    def meanwhile(*_: Any) -> None:
+        with pytest.raises(OutputError, match="another batch is at work"):
+            run_batch(planned)
+        told.append(run_batch(planned.only("p1"), How(apart=True)).done)
+
+    run_batch(planned.only("p0"), How(apart=True), told=meanwhile)
+    assert told == [["p1"]]
+    assert not (here / "out" / "index.html").exists()
+    assert set(run_batch(plan(here / "looks.toml", here / "out")).skipped) == {"p0", "p1"}
+
+
+def test_files_in_the_folder_of_the_job_go_with_it(here: Path) -> None:
+    def kinds(template: Any) -> dict[str, tuple[str, str]]:
+        given = template["parameterDefinitions"][:3]
+        return {one["name"]: (one["type"], one["default"]) for one in given}
+
+    outside = {"Manifest": "looks.toml", "Output": "out", "Cache": "out/.cache"}
+    whole = {name: ("STRING", str((here / file).resolve())) for name, file in outside.items()}
+    assert kinds(_template(here)) == whole
+    succeed(here, "batch", "looks.toml", "-o", "out", "--export", "openjd", ".")
+    inside = json.loads((here / "template.json").read_text())
+    assert kinds(inside) == {name: ("PATH", file) for name, file in outside.items()}
+
+
+def test_a_template_that_is_there_is_kept(here: Path) -> None:
+    said = refused(here, "batch", "looks.toml", "--export", "openjd", "job")
+    assert "template.json is there" in said
+    assert "where is the job to go" in refused(here, "batch", "looks.toml", "--export", "openjd")
+
+
+def test_openjd_runs_it(here: Path) -> None:
+    if OPENJD is None:
+        pytest.skip("openjd (or LIGHTPAINT_OPENJD: its path)")
+    program = here / "lightpaint.sh"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m lightpaint "$@"\n', encoding="utf-8")
+    program.chmod(0o755)
+    done = subprocess.run(
+        [OPENJD, "run", "job/template.json", "-p", f"Lightpaint={program}"],
+        cwd=here,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = contents(here / "out")
+    assert b"p1-warmer" in found["summary.csv"]
+    run_all(str(here / "looks.toml"), str(here / "once"))
+    once = contents(here / "once")
+    # The command, and so the sums of files with it, is that of the farm.
+    same = [name for name in once if Path(name).name in ("lighting.json", "predicted.exr")]
+    assert {name: found[name] for name in same} == {name: once[name] for name in same}
