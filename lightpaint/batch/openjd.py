@@ -22,22 +22,30 @@ TEMPLATE = "template.json"
 MOST, LONGEST = 1024, 1024
 
 
-def write_openjd(folder: Path, plan: Plan, *, force: bool = False) -> Path:
-    """Write the template of `plan` to `folder`, and return its path."""
+#: In the command of a task, what stands for the pattern of its looks.
+LOOK = "{{Task.Param.Look}}"
+
+
+def write_openjd(folder: Path, plan: Plan, *, only: Sequence[str], force: bool = False) -> Path:
+    """Write the template of `plan` to `folder`, and return its path.
+
+    only: words of the command that does the looks of one task, LOOK among them.
+    """
     check_writable(folder)
     path = folder / TEMPLATE
     if path.exists() and not force:
         raise BatchError(f"{path} is there: name another folder, or pass force=True")
-    text = json.dumps(template_of(plan, folder), indent=2, ensure_ascii=False)
+    text = json.dumps(template_of(plan, folder, only), indent=2, ensure_ascii=False)
     write_text(path, text + "\n")
     return path
 
 
-def template_of(plan: Plan, folder: Path) -> dict[str, Any]:
+def template_of(plan: Plan, folder: Path, only: Sequence[str]) -> dict[str, Any]:
     """The template, as plain values.
 
     folder: where it is to lie. Files in it are named from there, so that farms may send them with
-    the job; others by their whole paths, which all machines have to share.
+    the job; others by their whole paths, which all machines have to share. only: as of
+    `write_openjd`.
     """
 
     base = folder.resolve()
@@ -67,11 +75,11 @@ def template_of(plan: Plan, folder: Path) -> dict[str, Any]:
         "jobEnvironments": [
             {"name": "Cache", "variables": {"LIGHTPAINT_CACHE": "{{Param.Cache}}"}}
         ],
-        "steps": _steps(plan),
+        "steps": _steps(plan, only),
     }
 
 
-def _steps(plan: Plan) -> list[dict[str, Any]]:
+def _steps(plan: Plan, only: Sequence[str]) -> list[dict[str, Any]]:
     """One after the other, each of tasks that do not wait for each other."""
     steps: list[dict[str, Any]] = []
     for name, looks in _waves(plan.chosen_looks):
@@ -79,9 +87,8 @@ def _steps(plan: Plan) -> list[dict[str, Any]]:
             part = f" {k // MOST + 1}" if len(looks) > MOST else ""
             range_ = [_pattern(look) for look in looks[k : k + MOST]]
             look = {"name": "Look", "type": "STRING", "range": range_}
-            how = ("--only", "{{Task.Param.Look}}", "--apart")
             space = {"taskParameterDefinitions": [look]}
-            steps.append(_step(name + part, how, steps, parameterSpace=space))
+            steps.append(_step(name + part, only, steps, parameterSpace=space))
     # What is left, if a task was lost, and the gallery.
     steps.append(_step("Gallery", (), steps))
     return steps

@@ -9,7 +9,7 @@ from typing import Any
 from lightpaint.batch.estimate import estimate
 from lightpaint.batch.first import write_first
 from lightpaint.batch.gallery import FILES, spoken_counts
-from lightpaint.batch.openjd import write_openjd
+from lightpaint.batch.openjd import LOOK, write_openjd
 from lightpaint.batch.plan import plan
 from lightpaint.batch.planned import Plan, PlannedLook
 from lightpaint.batch.run import How, run_batch
@@ -85,7 +85,7 @@ def batch(
 
 def _exported(planned: Plan, folder: Path, *, force: bool) -> Outcome:
     """A job for a farm, and how it is run here."""
-    path = write_openjd(folder, planned, force=force)
+    path = write_openjd(folder, planned, only=("--only", LOOK, "--apart"), force=force)
     terminal.write(f"{path}: {len(planned.chosen_looks)} looks; what runs them here is")
     terminal.write(f"openjd run {shlex.quote(str(path))}")
     return Outcome(lambda: documents.files_document(folder, [path]))
