@@ -1,6 +1,7 @@
 """How long a plan takes, and how much memory: from constants that were measured.
 
-On the two cores of docs/benchmarks.md: on others it is another time, and the proportions hold.
+Samples as docs/benchmarks.md has them of the gallery, on two cores. Looks by processor seconds in
+benchmarks/batch.py's own batches, some looks each on a machine that had other work: a rough guide.
 """
 
 from collections.abc import Iterable
@@ -9,10 +10,11 @@ from dataclasses import dataclass
 from lightpaint.batch.planned import Cost, Plan, PlannedLook
 
 #: Seconds of a sample of one pixel, all lights together, and for each light that it is added to.
-SAMPLE_S, LIGHT_SAMPLE_S = 4e-7, 2e-8
+SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
 
-#: Seconds of a look: of any, for each pixel and light of its basis, and for each pixel of pictures.
-LOOK_S, PIXEL_LIGHT_S, REPORT_S = 0.3, 4e-7, 2e-5
+#: Seconds of a look: of any; of what is solved for each pixel, and for each pixel and light; and of
+#: a report for each pixel.
+LOOK_S, PIXEL_S, PIXEL_LIGHT_S, REPORT_S = 0.07, 1.7e-6, 1.6e-7, 1.2e-5
 
 #: What is taken for a basis that is a file.
 SAVED = Cost("", 12, (360, 640), 0, 0)
@@ -57,7 +59,8 @@ def _look_s(look: PlannedLook, plan: Plan) -> float:
     want, spent_s = look.entry.want, 0.0
     if not look.steps[0].is_done:
         lights = max((cost.lights for cost in costs), default=0)
-        spent_s += LOOK_S + PIXEL_LIGHT_S * pixels * lights * look.entry.is_solved
+        spent_s += LOOK_S
+        spent_s += pixels * (PIXEL_S + PIXEL_LIGHT_S * lights) * look.entry.is_solved
         spent_s += REPORT_S * pixels * ("report" in want)
         spent_s += SAMPLE_S * sum(cost.samples for cost in costs) * ("verify" in want)
     if "render" in want and not look.steps[-1].is_done:
