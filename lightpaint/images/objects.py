@@ -26,8 +26,8 @@ class Objects:
 
     Examples:
         >>> objects = lp.Objects(np.array([[-1, 0], [1, 1]], np.int32), ("wall", "statue"))
-        >>> objects.mask("statue").sum()
-        np.int64(2)
+        >>> int(objects.mask("statue").sum())
+        2
     """
 
     index: npt.NDArray[np.int32]

@@ -46,6 +46,10 @@ def until(is_so: Callable[[], Any], what: str, seconds: float = 20) -> Any:
     return found
 
 
+#: What a soft brush at full flow may leave of what was there, between two of its stamps.
+SOFT = 2e-3
+
+
 class Served:
     """A painter on a port of its own, in threads of this process."""
 
@@ -380,7 +384,7 @@ def test_strokes_outlive_their_connection(served: Served, opened: Any) -> None:
     me.still("brush")
     for x in (20, 30, 40):
         np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
-        np.testing.assert_allclose(served.studio.session.image[20, x], me.paint, rtol=1e-6)
+        np.testing.assert_allclose(served.studio.session.image[20, x], me.paint, rtol=SOFT)
     # A stroke that was kept, and whose answer never came, comes again and is kept once.
     me.look(
         "const receive = host.receive.bind(host);"
@@ -500,7 +504,7 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         session = served.studio.session
         for x in (20, 30, 40):
             np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
-            np.testing.assert_allclose(session.image[20, x], me.paint, rtol=1e-6)
+            np.testing.assert_allclose(session.image[20, x], me.paint, rtol=SOFT)
         np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
         me.press("Control+z").still()
         np.testing.assert_allclose(me.seen(30, 20), me.code(session.present[20, 30]), atol=1)
