@@ -17,7 +17,7 @@ from lightpaint.lighting.solution import Solution
 
 #: Parts of what a light does and no other can, that are noise, from which on and up to which it is
 #: doubted more and more.
-DOUBTED = 0.4, 0.6
+DOUBTED = 0.6, 0.8
 
 #: Standard errors on the safe side of a sum, and the least that is left of what M holds of a light.
 SAFE, LEAST = 1.0, 1e-3

@@ -85,13 +85,13 @@ def test_intervals_hold_the_answer_without_noise(
         missed.append(np.square(found.weights - truth).mean())
         told.append(np.square(found.standard_error).mean())
     # Where more than half of what a light does alone is noise, it may be anything: they are wide.
-    assert 0.85 <= np.mean(held) <= (0.99 if sigma < 0.5 else 1)
+    assert 0.85 <= np.mean(held) <= 0.99
     # So is each light by itself, unless half of M is noise and more than that is guessed.
     if sigma < 0.5:
         assert np.mean(held, axis=0).min() > 0.8
     # The errors are as large as they say.
     ratio = np.sqrt(np.mean(told) / np.mean(missed))
-    assert 0.6 < ratio < (1.4 if sigma < 0.5 else 2.5)
+    assert 0.6 < ratio < 1.4
 
 
 def test_one_light_by_hand(make_basis: Any):
