@@ -171,7 +171,8 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
     larger = None
     if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
         larger = render_features(look.relit)
-    looks = Looks.clean(look.basis, look.predicted.image, verified, larger=larger)
+    weights, predicted = look.solution.weights, look.predicted.image
+    looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
 
     def comparison() -> None:
         sheet = comparison_image(

@@ -146,6 +146,7 @@ def _mixer(
         target_picture(target, solution, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
+        planes=looks.planes,
         scene=shlex.quote(scene) if scene.endswith(".xml") else None,
     )
 
