@@ -11,7 +11,6 @@ from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -36,6 +35,7 @@ from lightpaint.scene.surfaces import render_features
 from lightpaint.screen import some_names
 from lightpaint.staging import finish
 from lightpaint.target.target import Target
+from lightpaint.threads import side_by_side
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
 VIEW_KEY = "lightpaint.view"

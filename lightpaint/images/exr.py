@@ -33,8 +33,8 @@ VERSION_KEY = f"{OWN}version"
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 64
 
-#: Every so-many-th line, and their bytes from which on they tell how well a part packs; and the part
-#: of its bytes that may be left for it to be worth the time.
+#: Every so-many-th line, and their bytes from which on they tell how well a part packs; and the
+#: share of them that may be left for it to be worth the time.
 SAMPLED, TELLING, SAVED = 16, 2**16, 0.75
 
 #: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … on each side.
@@ -253,7 +253,9 @@ def _compression(part: Part) -> Any:
     if any(x.dtype != np.float32 for x in lines) or sum(x.nbytes for x in lines) < TELLING:
         return OpenEXR.ZIP_COMPRESSION
     # As ZIP does it: bytes of one rank together.
-    data = b"".join(np.ascontiguousarray(x).view(np.uint8).reshape(-1, 4).T.tobytes() for x in lines)
+    data = b"".join(
+        np.ascontiguousarray(x).view(np.uint8).reshape(-1, 4).T.tobytes() for x in lines
+    )
     is_worth_it = len(zlib.compress(data, 1)) < SAVED * len(data)
     return OpenEXR.ZIP_COMPRESSION if is_worth_it else OpenEXR.NO_COMPRESSION
 

@@ -13,7 +13,6 @@ from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import denoised
 from lightpaint.images.png import png_bytes
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.pictures import (
@@ -23,6 +22,7 @@ from lightpaint.report.pictures import (
     residual_of,
     residual_picture,
 )
+from lightpaint.threads import side_by_side
 
 #: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
 UNCOUNTED, COUNTED = "#393939", "#e8d8a2"

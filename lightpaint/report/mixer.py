@@ -24,12 +24,12 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.compact import Compact, compact
 from lightpaint.images.denoise import denoised
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.file import lighting_fields
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED
 from lightpaint.report.figures import ENOUGH, data_uri
 from lightpaint.report.measures import that_do_most
+from lightpaint.threads import side_by_side
 
 #: Pixels of a plane from left to right, and of all planes together, at most.
 WIDEST, MOST_PIXELS = 480, 1_000_000

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.color_choices import Choices, best_of_each, color_choices
 from lightpaint.lighting.analysis.costs import without_constraints
@@ -14,6 +13,7 @@ from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
+from lightpaint.threads import side_by_side
 
 
 @dataclass(frozen=True)
