@@ -28,6 +28,7 @@ from lightpaint.report.looks import Looks
 from lightpaint.report.notebook import look_html
 from lightpaint.report.numbers import report_numbers
 from lightpaint.report.page import report_page
+from lightpaint.report.pictures import residual_of, transform_of
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
@@ -173,6 +174,8 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
         larger = render_features(look.relit)
     weights, predicted = look.solution.weights, look.predicted.image
     looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
+    transform = transform_of(look.target, predicted, verified)
+    missed = residual_of(look.solution, predicted, transform=transform)
 
     def comparison() -> None:
         sheet = comparison_image(
@@ -183,14 +186,15 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
             verified=verified,
             seen=look.analysis.seen,
             looks=looks,
+            missed=missed,
         )
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
     def page() -> None:
-        write_text(folder / "report.html", report_page(**how, looks=looks))
+        write_text(folder / "report.html", report_page(**how, looks=looks, missed=missed))
 
     def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(**how))
+        write_text(folder / "report.json", report_numbers(**how, missed=missed))
 
     side_by_side(lambda write: write(), (page, comparison, numbers))
 

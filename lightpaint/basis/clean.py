@@ -20,10 +20,11 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, mix
 from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes
 from lightpaint.images.denoise import denoised, is_there
+from lightpaint.threads import side_by_side
 
 #: Pixels of all planes below which a sum is denoised as soon as planes are read, up to which they
 #: are made where they are wanted, and up to which a render is followed by them.
@@ -36,6 +37,9 @@ BRIGHTEST = 1024.0
 #: Bytes above which those that were not used for longest are deleted.
 LARGEST = 2 * 2**30
 SUFFIX = ".clean.npz"
+
+#: Rows of planes that are brought to single precision at a time.
+STRIP = 64
 
 Halves = npt.NDArray[np.float16]
 
@@ -52,11 +56,12 @@ class CleanPlanes:
 
     def mix(self, weights: Doubles) -> Floats:
         """Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
-        mixed = np.zeros(self.halves.shape[1:], np.float32)
-        for half, own in zip(self.halves, weights * self.scales[:, None], strict=True):
-            if own.any():
-                mixed += half * own.astype(np.float32)
-        return mixed
+        own = weights * self.scales[:, None]
+
+        def strip(top: int) -> Floats:
+            return mix(self.halves[:, top : top + STRIP].astype(np.float32), own)
+
+        return np.concatenate(side_by_side(strip, range(0, self.halves.shape[1], STRIP)))
 
     def plane(self, k: int) -> Floats:
         """That of light k at unit emission, (h, w, 3) float32."""
@@ -118,11 +123,16 @@ def forget(limit: int = 0) -> int:
 
 def _path(basis: Basis) -> Path:
     """Named after all that they are made of."""
-    content = hashlib.blake2b(repr(basis.images.shape).encode(), digest_size=16)
-    content.update(np.ascontiguousarray(basis.images).data)
+    its = [basis.images]
     if basis.features is not None:
-        content.update(np.ascontiguousarray(basis.features.albedo).data)
-        content.update(np.ascontiguousarray(basis.features.normal).data)
+        its += [basis.features.albedo[None], basis.features.normal[None]]
+
+    def digest(plane: Floats) -> bytes:
+        return hashlib.blake2b(np.ascontiguousarray(plane).data, digest_size=16).digest()
+
+    content = hashlib.blake2b(repr(basis.images.shape).encode(), digest_size=16)
+    for one in side_by_side(digest, [plane for planes in its for plane in planes]):
+        content.update(one)
     return cache.folder() / f"{content.hexdigest()}{SUFFIX}"
 
 

@@ -64,13 +64,13 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     asked: list[Callable[[], Any]] = [partial(what_is_seen, view) for view in views]
     asked += [partial(diagnose, view) for view in views]
     asked += [partial(error_bars, solution), partial(best_of_each, solution)]
+    asked += [partial(_alike, solution)]
     asked += [partial(without_constraints, view) for view in views]
     # None of them needs another, and each leaves a processor idle now and then.
     answers = iter(side_by_side(lambda ask: ask(), asked))
     seen, diagnoses = ([next(answers) for _ in views] for _ in range(2))
-    uncertainty, best = next(answers), next(answers)
+    uncertainty, best, alike = next(answers), next(answers), next(answers)
     solution = with_error_bars(solution, uncertainty)
-    alike = () if solution.problem.asks else ambiguities(solution)
     choices = color_choices(solution, [its.delta_e for its in seen], best)
     found = []
     for view, its, diagnosis, colors in zip(solution.views, seen, diagnoses, choices, strict=True):
@@ -78,6 +78,10 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
         free = next(answers)
         found.append(Analysis(told, uncertainty, diagnosis, its, alike, free, colors))
     return tuple(found)
+
+
+def _alike(solution: Solution) -> tuple[Ambiguity, ...]:
+    return () if solution.problem.asks else ambiguities(solution)
 
 
 def with_findings(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
