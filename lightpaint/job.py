@@ -37,6 +37,8 @@ from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
 from lightpaint.settings import Settings
 from lightpaint.sources import (
+    NOT_IN_GROUPS,
+    RENDERED,
     BasisFile,
     GroupsFile,
     Painting,
@@ -47,10 +49,6 @@ from lightpaint.sources import (
     to_json,
 )
 from lightpaint.target.target import Target
-
-#: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
-NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
 @dataclass(frozen=True)
