@@ -38,7 +38,7 @@ FORMAT = "lightpaint-known 1"
 COARSE_S = 2.0
 
 #: What in a process changes how Mitsuba reads a scene.
-VARIABLES = ("MI_", "MITSUBA", "DRJIT", "LIGHTPAINT")
+VARIABLES = ("MI_", "MITSUBA")
 
 #: Code that reads scenes and makes identities of them; of others the libraries as well.
 OURS, OTHERS = ("scene", "scene/checks", "basis", "basis/render"), ("mitsuba", "drjit")
@@ -66,8 +66,7 @@ class Known:
 def key_of(asking: Mapping[str, Any]) -> str:
     """A name for all that is neither in a scene nor in its files.
 
-    asking: all that decides how it is loaded and on which film, as plain values. To be asked
-    before anything is loaded: what loads it speaks to others by the surroundings of the process.
+    asking: all that decides how it is loaded and on which film, as plain values.
     """
     around = {x: y for x, y in os.environ.items() if x.startswith(VARIABLES)}
     key = [FORMAT, dict(asking), os.getcwd(), around, _code()]
