@@ -37,6 +37,8 @@ from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
 from lightpaint.settings import Settings
 from lightpaint.sources import (
+    NOT_IN_GROUPS,
+    RENDERED,
     BasisFile,
     GroupsFile,
     Painting,
@@ -48,10 +50,6 @@ from lightpaint.sources import (
 )
 from lightpaint.target.target import Target
 from lightpaint.threads import side_by_side
-
-#: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
-NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
 @dataclass(frozen=True)

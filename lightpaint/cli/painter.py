@@ -2,8 +2,8 @@
 
 import os
 import sys
-import webbrowser
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from lightpaint.cli import lines, terminal
@@ -11,7 +11,6 @@ from lightpaint.cli.manner import Outcome, manner
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
@@ -54,10 +53,6 @@ def paint(
         choice=choice,
         command=lambda painting, wishes: solve_command(source.path, painting, options, wishes),
     )
-    if (scene := subject.scene) is not None:
-        remarks = *remarks_of_scene(scene), *remarks_of_film(scene, settings)
-        for remark in (*remarks, *remarks_of_memory(scene)):
-            terminal.say(remark)
     if subject.groups is not None:
         for remark in subject.groups.remarks:
             terminal.say(remark)
@@ -73,7 +68,9 @@ def paint(
         said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
         (lines.err if manner().as_json else terminal.write)(said)
         if with_browser and _has_browser():
-            webbrowser.open(server.url_once())
+            # Some browsers keep who starts them waiting.
+            given = (server.url_once(),)
+            Thread(target=_show, args=given, name="browser", daemon=True).start()
 
     try:
         paint_in_browser(
@@ -93,6 +90,12 @@ def _say(text: str) -> None:
     """What the server says; a mistake of lightpaint's own has many lines."""
     for line in text.rstrip().split("\n"):
         terminal.say(line)
+
+
+def _show(url: str) -> None:
+    import webbrowser
+
+    webbrowser.open(url)
 
 
 def _has_browser() -> bool:

@@ -13,7 +13,7 @@ from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.paint.session import Moment
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import PAINTING, Subject
 from lightpaint.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
@@ -22,8 +22,8 @@ from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.own import write_painting
 
-#: Files of an export, and the folder of its report.
-PAINTING, LIGHTING, RELIT, ANSWER = "painting.exr", "lighting.json", "relit.xml", "answer"
+#: Files of an export beside the painting, and the folder of its report.
+LIGHTING, RELIT, ANSWER = "lighting.json", "relit.xml", "answer"
 
 
 def export(
@@ -54,7 +54,7 @@ def export(
     if "relit" in what:
         if subject.scene is None:
             raise PaintError("there is no scene to relight: it was opened from a saved basis")
-        relight(subject.scene, lighting, folder / RELIT)
+        relight(subject.loaded, lighting, folder / RELIT)
         written.append(folder / RELIT)
     if "report" in what:
         written.append(_report(subject, moment, progress))
@@ -66,7 +66,7 @@ def _report(subject: Subject, moment: Moment, progress: Progress) -> Path:
     assert moment.target is not None
     answer = subject.folder / ANSWER
     settings = replace(moment.settings, force=True)
-    scenes = () if subject.scene is None else (subject.scene,)
+    scenes = () if subject.scene is None else (subject.loaded,)
     basis = moment.basis if subject.groups is None else subject.groups
     job = Job(scenes, (moment.target,), answer, basis, moment.constraints, settings)
     run(job, progress)
@@ -77,8 +77,7 @@ def verified(
     subject: Subject, basis: Basis, lighting: Lighting, progress: Progress
 ) -> tuple[Floats, str, bool]:
     """The scene as it is relit, rendered: (h, w, 3) clean, what that says, whether it agrees."""
-    scene = subject.scene
-    assert scene is not None
+    scene = subject.loaded
     with tempfile.TemporaryDirectory(dir=scene.path.parent, prefix=".lightpaint-") as place:
         relit = relight(scene, lighting, Path(place) / RELIT)
         if relit.sensor != scene.sensor:

@@ -3,27 +3,35 @@
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.basis.render.render import basis_lights
 from lightpaint.colour.transform import TransformChoice
-from lightpaint.files import check_writable
-from lightpaint.job import NOT_IN_GROUPS, RENDERED
+from lightpaint.errors import SceneError
+from lightpaint.files import check_writable, file_length
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.paint.database import set_aside
+from lightpaint.paint.opening import Opening
 from lightpaint.paint.server import Server, check_installed
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.wishes import Wishes
-from lightpaint.scene.quality import on_film
+from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, GroupsFile, SceneFile, check_needed
+from lightpaint.sources import (
+    NOT_IN_GROUPS,
+    RENDERED,
+    BasisFile,
+    GroupsFile,
+    SceneFile,
+    check_needed,
+)
 
 #: The session in the folder of what is painted.
 SESSION = "session.db"
@@ -64,17 +72,34 @@ def subject_of(
         basis = found.basis if isinstance(found, LightGroups) else found
         reduce_to(constraints_of(basis.asked).and_then(constraints), basis.lights)
         return Subject(basis=basis, groups=groups, **about)
-    scene = on_film(source.content, settings.quality, settings.resolution)
-    reduce_to(constraints_of(scene.asked).and_then(constraints), basis_lights(scene))
-    return Subject(scene=scene, **about)
+    # What can be seen without the renderer is said before anything is opened.
+    file_length(Path(source.path), "scene file", SceneError)
+    opening = Opening(source, settings)
+    if (known := opening.known) is not None:
+        reduce_to(constraints_of(known.asked).and_then(constraints), known.lights)
+
+    def check(scene: Scene) -> None:
+        from lightpaint.basis.render.render import basis_lights
+
+        reduce_to(constraints_of(scene.asked).and_then(constraints), basis_lights(scene))
+
+    opening.checks.append(check)
+    return Subject(scene=opening, **about)
 
 
-def identity_of(subject: Subject) -> Identity:
-    """What its session is of; of a scene that of the basis which is still to be rendered."""
+def identity_of(subject: Subject) -> Identity | None:
+    """What its session is of; None of a scene of which that is known when it has been loaded."""
     if subject.basis is not None:
         return Identity.of(subject.basis)
-    scene = subject.scene
-    assert scene is not None
+    if (known := subject.known) is not None:
+        name = Path(known.path).name
+        names = tuple(light.name for light in known.lights)
+        return Identity(name, known.identity, known.size, names, known.sensor)
+    return None if isinstance(subject.scene, Opening) else identity_of_scene(subject.loaded)
+
+
+def identity_of_scene(scene: Scene) -> Identity:
+    """That of the basis which is still to be rendered."""
     names = tuple(light.name for light in scene.lights)
     sensor = scene.sensor_names[scene.sensor]
     return Identity(scene.path.name, scene.identity, scene.size, names, sensor)
@@ -102,21 +127,79 @@ def paint_in_browser(
     path = subject.folder / SESSION
     if new and (aside := set_aside(path)) is not None:
         say(f"the earlier session is kept as {aside}")
-    store = Store.open(path, identity_of(subject))
-    studio = Studio(subject, lambda _: store)
+    places = _Places(subject, path, say)
+    studio = Studio(subject, places.opened)
     try:
-        server = Server(studio, store, host=host, port=port, say=say)
+        server = Server(studio, places.store, host=host, port=port, say=say)
+        places.server = server
         try:
+            studio.on_failure = partial(_failed, server)
             opened(server)
             studio.start()
             server.run()
         finally:
             server.close()
+        if studio.failure is not None and studio.store is None:
+            raise studio.failure
     finally:
-        _end(studio, store)
+        _end(studio, places.store)
 
 
-def _end(studio: Studio, store: Store) -> None:
+class _Places:
+    """Where a session is kept: opened at once, unless its scene has to be loaded for that."""
+
+    def __init__(self, subject: Subject, path: Path, say: Callable[[str], None]) -> None:
+        self.path = path
+        self.store: Store | None = None
+        self.server: Server | None = None
+        if (identity := identity_of(subject)) is not None or path.exists():
+            self.store = Store.open(path, identity)
+        scene = subject.scene
+        if isinstance(scene, Opening):
+            if scene.known is not None:
+                for remark in scene.remarks:
+                    say(remark)
+            else:
+                scene.checks.append(partial(self._loaded, scene, say))
+
+    def _loaded(self, opening: Opening, say: Callable[[str], None], scene: Scene) -> None:
+        """Once a scene is there of which nothing was known."""
+        from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+
+        identity = identity_of_scene(scene)
+        if self.store is None:
+            self.store = Store.open(self.path, identity)
+        else:
+            self.store.becomes(identity)
+        if self.server is not None:
+            self.server.keeps(self.store)
+        of_scene, of_film = remarks_of_scene(scene), remarks_of_film(scene, opening.settings)
+        for remark in (*of_scene, *of_film, *remarks_of_memory(scene)):
+            say(remark)
+        from lightpaint.scene.variant import use_variant
+
+        # What is said of this machine may not be so the next time.
+        opening.remarks = tuple(x for x in (*of_scene, *of_film) if x != use_variant().note)
+
+    def opened(self, _: Identity) -> Store:
+        """The store, when there is a basis."""
+        assert self.store is not None
+        return self.store
+
+
+#: Seconds in which a page that a browser was asked to open comes to hear why there is nothing.
+COMES_S = 5.0
+
+
+def _failed(server: Server, error: Exception) -> None:
+    """End, since there is nothing to paint; a page that is about to come is told."""
+    end_s = time.monotonic() + (COMES_S if server.is_expected else 0.0)
+    while not server.has_page and time.monotonic() < end_s:
+        time.sleep(0.05)
+    server.stop(str(error))
+
+
+def _end(studio: Studio, store: Store | None) -> None:
     """Close both, and the store also where the studio fails; then let renders come to an end.
 
     What Mitsuba is at in another thread cannot be left alone at the end of a process.
@@ -124,7 +207,8 @@ def _end(studio: Studio, store: Store) -> None:
     try:
         studio.close()
     finally:
-        store.close()
+        if store is not None:
+            store.close()
     wait_for_renders()
 
 

@@ -25,14 +25,14 @@ from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.exports import PAINTING, export, verified
+from lightpaint.paint.clean import Clean, keep_clean, kept_clean
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import Moment, Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import PAINTING, Subject
 from lightpaint.paint.told import analysis_fields, light_fields, lights_fields
 from lightpaint.paint.wishes import Wishes
 
@@ -56,11 +56,15 @@ class Studio:
 
     Attributes:
         on_message: Hears what is said unasked, from other threads.
+        on_failure: Hears why there is nothing to paint, from another thread.
+        failure: The same, afterwards.
     """
 
     def __init__(self, subject: Subject, open_store: Callable[[Identity], Store]) -> None:
         self.subject, self._open_store = subject, open_store
         self.on_message: Callable[[Message], None] | None = None
+        self.on_failure: Callable[[Exception], None] | None = None
+        self.failure: Exception | None = None
         self.pictures = Pictures()
         self._session: Session | None = None
         self._looks: Looks | None = None
@@ -222,14 +226,19 @@ class Studio:
         except StoppedError:
             pass
         except Exception as error:
-            self._failed = _told(error)
+            is_told = self._session is None and self.on_failure is not None
+            self._failed = _told(error, at_length=not is_told)
             self._say(Message("say", {"text": self._failed, "tone": "warn"}))
             if self._session is None:
+                self.failure = error
                 self._say(self.state())
+            if is_told and self._is_open:
+                self.on_failure(error)  # type: ignore[misc]
 
     def _take(self, basis: Basis) -> None:
         """Paint on with this basis."""
-        present = denoised(basis.present_look, basis.features)
+        clean = kept_clean(basis) if self.subject.settings.use_cache else None
+        present = denoised(basis.present_look, basis.features) if clean is None else clean.present
         with self._lock:
             if not self._is_open:
                 raise StoppedError
@@ -246,16 +255,19 @@ class Studio:
                 self._looks = Looks(self._session, self.pictures)
             else:
                 self._session.improve(basis, present)
-            self._offer(self._session)
+            self._offer(self._session, clean)
         self._say(self.state())
         self._ring()
 
-    def _offer(self, session: Session) -> None:
+    def _offer(self, session: Session, clean: Clean | None) -> None:
         basis, offer = session.basis, self.pictures.offer
         for k, plane in enumerate(basis.images):
             offer(f"plane/{k}", lambda p=plane: pictures.as_halves(p, pictures.scale_of(p)))  # type: ignore[misc]
             offer(f"thumb/{k}", lambda k=k: pictures.small(basis, k))  # type: ignore[misc]
-            self.pictures.withdraw(f"clean/{k}")
+            if clean is None:
+                self.pictures.withdraw(f"clean/{k}")
+            else:
+                self.pictures.put(f"clean/{k}", clean.planes[k])
         offer("present", lambda: pictures.as_halves(session.present))
         offer("painting", lambda: session.image.copy())
         offer("importance", lambda: session.importance.copy())
@@ -312,16 +324,21 @@ class Studio:
         session = self._session
         assert session is not None
         basis = session.basis
-        if not basis.knows_noise:
+        if not basis.knows_noise or "clean/0" in self.pictures.generations:
             return
+        planes = np.empty(basis.images.shape, np.float16)
         for k, plane in enumerate(basis.images):
             if not self._is_open or session.basis is not basis:
                 return
-            clean = pictures.as_halves(pictures.clean_plane(basis, k), pictures.scale_of(plane))
+            clean = planes[k] = pictures.as_halves(
+                pictures.clean_plane(basis, k), pictures.scale_of(plane)
+            )
             with self._lock:
                 self.pictures.put(f"clean/{k}", clean)
                 new = {f"clean/{k}": self.pictures.generations[f"clean/{k}"]}
             self._say(Message("renewed", {"resources": new}))
+        if self.subject.settings.use_cache:
+            keep_clean(basis, Clean(session.present, planes))
 
     def _ring(self) -> None:
         with self._bell:
@@ -381,6 +398,9 @@ class Studio:
         return moment, solution.lighting
 
     def _export(self, message: protocol.Export) -> None:
+        # It brings all rooms, of which painting needs a few.
+        from lightpaint.paint.exports import export
+
         moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -401,6 +421,8 @@ class Studio:
         return self._later(self._verified, message)
 
     def _verified(self, _asked: protocol.Verify) -> None:
+        from lightpaint.paint.exports import verified
+
         moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -429,11 +451,12 @@ class Studio:
         self._say(Message("explained", {"sentences": said}))
 
 
-def _told(error: Exception) -> str:
+def _told(error: Exception, *, at_length: bool = True) -> str:
     """What to say of it; a mistake of lightpaint's own is told at length where it was started."""
     if isinstance(error, LightpaintError):
         return str(error)
-    traceback.print_exception(error)
+    if at_length:
+        traceback.print_exception(error)
     return f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
 
 

@@ -1,22 +1,26 @@
 """What is painted: a scene, a saved basis, or light groups; and how its lights come to be known."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.known import Known
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint.opening import Opening
 from lightpaint.paint.wishes import Wishes
-from lightpaint.pipeline import obtain
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
+
+#: The painting among the files of an export.
+PAINTING = "painting.exr"
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
 FIRST = (2, 8, 32, 128)
@@ -26,16 +30,17 @@ FIRST = (2, 8, 32, 128)
 class Subject:
     """One view to be painted.
 
-    source: as it was named, for people and for command lines. scene: on the film of the basis;
-    None without a renderer. basis: where there is one already, as of light groups. settings,
-    constraints: how paintings are answered. choice: of a view transform, to paint through. folder:
-    receives what is exported. command: that answers an exported painting, by its path, as a session
-    does in which this is wished; "" where there are no commands.
+    source: as it was named, for people and for command lines. scene: on the film of the basis, or
+    one that is loaded when it is needed; None without a renderer. basis: where there is one
+    already, as of light groups. settings, constraints: how paintings are answered. choice: of a
+    view transform, to paint through. folder: receives what is exported. command: that answers an
+    exported painting, by its path, as a session does in which this is wished; "" where there are
+    no commands.
     """
 
     source: str
     folder: Path
-    scene: Scene | None = None
+    scene: Scene | Opening | None = None
     basis: Basis | None = None
     groups: LightGroups | None = None
     settings: Settings = field(default_factory=Settings)
@@ -49,21 +54,37 @@ class Subject:
         return called(Path(self.source))
 
     @property
+    def loaded(self) -> Scene:
+        """Its scene, which it has; loaded if it is not yet. Raises LightpaintError."""
+        assert self.scene is not None
+        return self.scene.scene if isinstance(self.scene, Opening) else self.scene
+
+    @property
+    def known(self) -> Known | None:
+        """What is known of a scene that need not be loaded for it."""
+        return self.scene.known if isinstance(self.scene, Opening) else None
+
+    @property
     def wanted(self) -> int | None:
         """Samples per pixel that its basis is to have; None where that is not asked here."""
         if self.scene is None:
             return None
         settings = self.settings
         asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
-        return asked or self.scene.spp
+        return asked or (self.known or self.loaded).spp
 
     def bases(self, progress: Progress = silent) -> Iterator[Basis]:
         """Its basis; where it is still to be rendered, first ones of few samples."""
         if self.basis is not None:
             yield self.basis
             return
-        assert self.scene is not None
-        scene, settings, wanted = self.scene, self.settings, self.wanted or 1
+        if (kept := self._kept()) is not None:
+            yield kept
+            return
+        # What renders is not needed for a basis that is there.
+        from lightpaint.pipeline import obtain
+
+        scene, settings, wanted = self.loaded, self.settings, self.wanted or 1
         sensor = scene.sensor_names[scene.sensor]
         kept = cache.find(scene.identity, sensor, settings.seed, scene.size)
         has = 0 if kept is None or not settings.use_cache else kept.origin.spp
@@ -71,14 +92,30 @@ class Subject:
             for spp in FIRST:
                 if has < spp < wanted:
                     yield self._obtained(spp, progress)
-        yield obtain(scene, settings, progress).asking(scene.asked)
+        basis = obtain(scene, settings, progress)
+        if isinstance(self.scene, Opening):
+            self.scene.remember(basis)
+        yield basis.asking(scene.asked)
+
+    def _kept(self) -> Basis | None:
+        """The basis of a scene that is known, if all of it is kept."""
+        known, settings = self.known, self.settings
+        if known is None or settings.time_s is not None or settings.exact_spp:
+            return None
+        kept = cache.find(known.identity, known.sensor, settings.seed, known.size)
+        names = tuple(light.name for light in known.lights)
+        if kept is None or kept.names != names or kept.origin.spp < (self.wanted or 1):
+            return None
+        if kept.features is None or kept.objects is None:  # by an earlier version
+            return None
+        return replace(kept, lights=known.lights, asked=known.asked)
 
     def _obtained(self, spp: int, progress: Progress) -> Basis:
         from lightpaint.basis.render.obtain import obtain_basis
 
-        assert self.scene is not None
-        basis = obtain_basis(self.scene, spp=spp, seed=self.settings.seed, progress=progress)
-        return basis.asking(self.scene.asked)
+        scene = self.loaded
+        basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
+        return basis.asking(scene.asked)
 
     def transform(self, basis: Basis) -> ViewTransform:
         """What it is painted through: as asked, else sRGB at an exposure that shows something."""

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.cli.spelling import solve_command
 from lightpaint.paint import protocol
+from lightpaint.paint.clean import Clean, keep_clean, kept_clean
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import Moment
 from lightpaint.paint.store import Store
@@ -131,7 +133,11 @@ def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
     assert any(light["error"] for light in fields["lights"])
 
 
-def test_clean_planes_come_later_and_keep_the_light(heard: Heard, basis: lp.Basis):
+def test_clean_planes_come_later_and_keep_the_light(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    heard = Heard(basis, tmp_path / "first")
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     state = heard.studio.state().fields
     for k, light in enumerate(state["lights"]):
@@ -143,6 +149,40 @@ def test_clean_planes_come_later_and_keep_the_light(heard: Heard, basis: lp.Basi
         np.testing.assert_allclose(raw, basis.images[k], rtol=2**-11, atol=1e-7)
         assert clean.mean() == pytest.approx(raw.mean(), rel=0.1)
     np.testing.assert_allclose(heard.studio.resource("painting"), heard.studio.session.image)
+    until = time.monotonic() + 30
+    while not kept_clean(basis) and time.monotonic() < until:
+        time.sleep(0.01)
+    # The next session has the same at once, and one of other pixels has not.
+    again = Heard(basis, tmp_path / "again")
+    first = again.wait(lambda m: m.kind == "state").fields
+    for k in range(len(basis.lights)):
+        assert f"clean/{k}" in first["resources"]
+        same = (one.studio.resource(f"clean/{k}") for one in (heard, again))
+        np.testing.assert_array_equal(*same)
+    np.testing.assert_array_equal(again.studio.session.present, heard.studio.session.present)
+    assert kept_clean(replace(basis, images=2 * basis.images)) is None
+    for one in (heard, again):
+        one.studio.close()
+
+
+def test_kept_pictures_that_are_damaged_are_made_again(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    clean = Clean(basis.present_look, basis.images.astype(np.float16))
+    assert kept_clean(basis) is None
+    assert keep_clean(basis, clean)
+    [path] = tmp_path.iterdir()
+    data = path.read_bytes()
+    for damage in (b"", b"no file", data[: len(data) // 2], data[:2000] + bytes(99) + data[2099:]):
+        path.write_bytes(damage)
+        assert kept_clean(basis) is None
+    assert keep_clean(basis, Clean(clean.present, clean.planes[:1]))
+    assert kept_clean(basis) is None
+    assert keep_clean(basis, clean)
+    found = kept_clean(basis)
+    assert found is not None
+    np.testing.assert_array_equal(found.planes, clean.planes)
 
 
 def test_a_look_is_gone_back_to_and_undone(heard: Heard):
