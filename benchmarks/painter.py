@@ -289,7 +289,7 @@ def print_starts(scene: str, times: int) -> None:
         around.pop("PYTHONDONTWRITEBYTECODE", None)
         print(f"{scene}: s from the start of its process, and s of the processor that it took")
         heads = ("", "address", *STAGES, "stroke", "processor")
-        print("{:12s}".format(heads[0]) + "".join(f"{head:>10s}" for head in heads[1:]))
+        print(f"{heads[0]:12s}" + "".join(f"{head:>10s}" for head in heads[1:]))
         print_times("nothing kept", [started(browser, scene, folder, around, is_first=True)])
         every = []
         for _ in range(times):

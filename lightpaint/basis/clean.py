@@ -7,13 +7,11 @@ they were made of, and may be deleted at any time.
 """
 
 import hashlib
-import io
-import os
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +19,12 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, mix
-from lightpaint.errors import OutputError
-from lightpaint.files import write_bytes
-from lightpaint.images.denoise import denoised, is_there
+from lightpaint.errors import LightpaintError
+from lightpaint.files import replacing
+from lightpaint.images.denoise import denoised, how_denoised, is_there
 from lightpaint.threads import side_by_side
+
+FORMAT, PARTS = "lightpaint-clean 1", ("halves", "scales", "present")
 
 #: Pixels of all planes below which a sum is denoised as soon as planes are read, up to which they
 #: are made where they are wanted, and up to which a render is followed by them.
@@ -34,12 +34,14 @@ FEWEST, MOST_WANTED, MOST = 2**18, 2**22, 2**24
 #: precision.
 BRIGHTEST = 1024.0
 
-#: Bytes above which those that were not used for longest are deleted.
-LARGEST = 2 * 2**30
-SUFFIX = ".clean.npz"
-
 #: Rows of planes that are brought to single precision at a time.
 STRIP = 64
+
+#: What comes of reading a file that is cut off, or another one.
+_DAMAGES = (
+    *(OSError, EOFError, LookupError, MemoryError, NotImplementedError, RuntimeError, ValueError),
+    zipfile.BadZipFile,
+)
 
 Halves = npt.NDArray[np.float16]
 
@@ -49,19 +51,22 @@ class CleanPlanes:
     """What each light does, for eyes.
 
     halves: (n, h, w, 3) float16, linear, at unit emission over `scales`. scales: (n,), powers of 2.
+    present: (h, w, 3) float32, the scene as it is: their sum, or the sum denoised where that came
+    first, so that who paints over it goes on from what was there.
     """
 
     halves: Halves
     scales: Doubles
+    present: Floats
+
+    @classmethod
+    def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "CleanPlanes":
+        """With what their sum shows of the scene as it is."""
+        return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
 
     def mix(self, weights: Doubles) -> Floats:
         """Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
-        own = weights * self.scales[:, None]
-
-        def strip(top: int) -> Floats:
-            return mix(self.halves[:, top : top + STRIP].astype(np.float32), own)
-
-        return np.concatenate(side_by_side(strip, range(0, self.halves.shape[1], STRIP)))
+        return _mixed(self.halves, self.scales, weights)
 
     def plane(self, k: int) -> Floats:
         """That of light k at unit emission, (h, w, 3) float32."""
@@ -90,68 +95,74 @@ def clean_planes(
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < FEWEST or not is_there():
         return None
-    path = _path(basis)
-    found = _read(path, basis)
+    found = kept_planes(basis)
     if found is None and pixels <= most:
         halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
-        for k, plane in enumerate(basis.images):
-            scales[k] = scale_of(plane)
-            halves[k] = as_halves(denoised(plane, basis.features), scales[k])
+        for k in range(len(basis.lights)):
+            halves[k], scales[k] = clean_plane(basis, k)
             if progress is not None:
                 progress(k + 1, len(basis.lights))
-        found = CleanPlanes(halves, scales)
-        _keep(path, found)
+        found = CleanPlanes.of(basis, halves, scales)
+        keep_planes(basis, found)
     return found
 
 
-def forget(limit: int = 0) -> int:
-    """Delete those that were not used for longest until `limit` bytes are left; bytes freed."""
-    files = []
-    for path in cache.folder().glob(f"*{SUFFIX}"):
-        with suppress(OSError):
-            about = path.stat()
-            files.append((about.st_mtime, about.st_size, path))
-    left, freed = limit, 0
-    for _, size, path in sorted(files, reverse=True):
-        left -= size
-        if left < 0:
-            with suppress(OSError):
-                path.unlink(missing_ok=True)
-                freed += size
-    return freed
+def clean_plane(basis: Basis, k: int) -> tuple[Halves, float]:
+    """Of light k what `CleanPlanes` holds."""
+    scale = scale_of(basis.images[k])
+    return as_halves(denoised(basis.images[k], basis.features), scale), scale
 
 
-def _path(basis: Basis) -> Path:
-    """Named after all that they are made of."""
-    its = [basis.images]
+def kept_planes(basis: Basis) -> CleanPlanes | None:
+    """Those that are kept of just these pixels; None for none, and for what is damaged."""
+    path = cache.place_beside(basis, cache.CLEAN)
+    with suppress(*_DAMAGES):
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+            if str(kept["made_of"]) != _made_of(basis):
+                return None
+            found = CleanPlanes(*(kept[name] for name in PARTS))
+        its = [getattr(found, name) for name in PARTS]
+        shapes = [basis.images.shape, (len(basis.lights),), basis.images.shape[1:]]
+        types = ["float16", "float64", "float32"]
+        if [x.shape for x in its] == shapes and [x.dtype.name for x in its] == types:
+            path.touch()
+            return found
+    return None
+
+
+def keep_planes(basis: Basis, planes: CleanPlanes) -> bool:
+    """Keep what was made of `basis`. Returns whether that worked: nothing is lost if not."""
+    path = cache.place_beside(basis, cache.CLEAN)
+    try:
+        with replacing(path) as place, place.open("wb") as file:
+            made_of = np.array(_made_of(basis))
+            parts: dict[str, Any] = {name: getattr(planes, name) for name in PARTS}
+            np.savez(file, made_of=made_of, **parts)
+    except (OSError, LightpaintError):
+        return False
+    return True
+
+
+def _mixed(halves: Halves, scales: Doubles, weights: Doubles) -> Floats:
+    own = weights * scales[:, None]
+
+    def strip(top: int) -> Floats:
+        return mix(halves[:, top : top + STRIP].astype(np.float32), own)
+
+    return np.concatenate(side_by_side(strip, range(0, halves.shape[1], STRIP)))
+
+
+def _made_of(basis: Basis) -> str:
+    """What decides how they come out."""
+    pictures = [basis.images, basis.present_weights[None]]
     if basis.features is not None:
-        its += [basis.features.albedo[None], basis.features.normal[None]]
+        pictures += [basis.features.albedo[None], basis.features.normal[None]]
 
     def digest(plane: Floats) -> bytes:
-        return hashlib.blake2b(np.ascontiguousarray(plane).data, digest_size=16).digest()
+        return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 
-    content = hashlib.blake2b(repr(basis.images.shape).encode(), digest_size=16)
-    for one in side_by_side(digest, [plane for planes in its for plane in planes]):
+    made = repr((FORMAT, how_denoised(basis.features, raw=""), basis.images.shape))
+    content = hashlib.blake2b(made.encode(), digest_size=16)
+    for one in side_by_side(digest, [plane for planes in pictures for plane in planes]):
         content.update(one)
-    return cache.folder() / f"{content.hexdigest()}{SUFFIX}"
-
-
-def _read(path: Path, basis: Basis) -> CleanPlanes | None:
-    """What is kept there; None for nothing, or for what is damaged."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            found = CleanPlanes(file["halves"], file["scales"])
-        os.utime(path)
-    except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile):
-        return None
-    is_whole = found.halves.shape == basis.images.shape and found.halves.dtype == np.float16
-    return found if is_whole and found.scales.shape == (len(basis.lights),) else None
-
-
-def _keep(path: Path, planes: CleanPlanes) -> None:
-    """Where that works: a full disk is no reason to show nothing."""
-    buffer = io.BytesIO()
-    np.savez(buffer, halves=planes.halves, scales=planes.scales)
-    with suppress(OutputError, OSError):
-        write_bytes(path, buffer.getvalue())
-        forget(LARGEST)
+    return content.hexdigest()

@@ -6,16 +6,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.images.denoise import denoised
 from lightpaint.report.figures import thumbnail
-
-#: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
-#: precision.
-BRIGHTEST = 1024.0
 
 #: Points along each side of a lookup table, and the light, in stops, that its ends stand for.
 SIDE, LOW, HIGH = 64, -13.0, 7.0
@@ -67,22 +61,6 @@ class Pictures:
     def named(self) -> dict[str, int]:
         """Generation of each, by name."""
         return dict(self.generations)
-
-
-def scale_of(plane: Floats) -> float:
-    """What a plane is divided by to be sent as half floats: a power of two."""
-    brightest = float(plane.max(initial=0))
-    return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST))) if brightest > 0 else 1.0
-
-
-def as_halves(plane: Floats, scale: float = 1.0) -> Picture:
-    """Light as half floats, what they cannot hold clipped."""
-    return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
-
-
-def clean_plane(basis: Basis, k: int) -> Floats:
-    """What light k does at unit emission, without its grain."""
-    return denoised(basis.images[k], basis.features)
 
 
 def small(basis: Basis, k: int) -> Picture:

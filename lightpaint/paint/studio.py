@@ -19,13 +19,20 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import (
+    CleanPlanes,
+    as_halves,
+    clean_plane,
+    keep_planes,
+    kept_planes,
+    scale_of,
+)
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import first_line
 from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.clean import Clean, keep_clean, kept_clean
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
 from lightpaint.paint.protocol import Message
@@ -237,7 +244,7 @@ class Studio:
 
     def _take(self, basis: Basis) -> None:
         """Paint on with this basis."""
-        clean = kept_clean(basis) if self.subject.settings.use_cache else None
+        clean = kept_planes(basis) if self.subject.settings.use_cache else None
         present = denoised(basis.present_look, basis.features) if clean is None else clean.present
         with self._lock:
             if not self._is_open:
@@ -259,21 +266,21 @@ class Studio:
         self._say(self.state())
         self._ring()
 
-    def _offer(self, session: Session, clean: Clean | None) -> None:
+    def _offer(self, session: Session, clean: CleanPlanes | None) -> None:
         basis, offer = session.basis, self.pictures.offer
         for k, plane in enumerate(basis.images):
-            offer(f"plane/{k}", lambda p=plane: pictures.as_halves(p, pictures.scale_of(p)))  # type: ignore[misc]
+            offer(f"plane/{k}", lambda p=plane: as_halves(p, scale_of(p)))  # type: ignore[misc]
             offer(f"thumb/{k}", lambda k=k: pictures.small(basis, k))  # type: ignore[misc]
             if clean is None:
                 self.pictures.withdraw(f"clean/{k}")
             else:
-                self.pictures.put(f"clean/{k}", clean.planes[k])
-        offer("present", lambda: pictures.as_halves(session.present))
+                self.pictures.put(f"clean/{k}", clean.halves[k])
+        offer("present", lambda: as_halves(session.present))
         offer("painting", lambda: session.image.copy())
         offer("importance", lambda: session.importance.copy())
         if basis.features is not None:
             albedo = basis.features.albedo
-            offer("albedo", lambda: pictures.as_halves(albedo))
+            offer("albedo", lambda: as_halves(albedo))
         if basis.objects is not None:
             index = basis.objects.index
             offer("objects", lambda: index.astype(np.int16))
@@ -288,7 +295,7 @@ class Studio:
     def _of_basis(self, basis: Basis, session: Session) -> dict[str, Any]:
         wanted = self.subject.wanted
         looks = self._looks.listed() if self._looks is not None else []
-        scales = [pictures.scale_of(plane) for plane in basis.images]
+        scales = [scale_of(plane) for plane in basis.images]
         return {
             "size": list(basis.size),
             "lights": [
@@ -326,19 +333,18 @@ class Studio:
         basis = session.basis
         if not basis.knows_noise or "clean/0" in self.pictures.generations:
             return
-        planes = np.empty(basis.images.shape, np.float16)
-        for k, plane in enumerate(basis.images):
+        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        planes = CleanPlanes(halves, scales, session.present)
+        for k in range(len(basis.lights)):
             if not self._is_open or session.basis is not basis:
                 return
-            clean = planes[k] = pictures.as_halves(
-                pictures.clean_plane(basis, k), pictures.scale_of(plane)
-            )
+            planes.halves[k], planes.scales[k] = clean_plane(basis, k)
             with self._lock:
-                self.pictures.put(f"clean/{k}", clean)
+                self.pictures.put(f"clean/{k}", planes.halves[k])
                 new = {f"clean/{k}": self.pictures.generations[f"clean/{k}"]}
             self._say(Message("renewed", {"resources": new}))
         if self.subject.settings.use_cache:
-            keep_clean(basis, Clean(session.present, planes))
+            keep_planes(basis, planes)
 
     def _ring(self) -> None:
         with self._bell:
@@ -434,7 +440,7 @@ class Studio:
         with self._render:
             picture, said, agrees = verified(self.subject, moment.basis, lighting, hears)
         with self._lock:
-            self.pictures.put("verified", pictures.as_halves(picture))
+            self.pictures.put("verified", as_halves(picture))
             new = {"verified": self.pictures.generations["verified"]}
         self._say(Message("renewed", {"resources": new}))
         self._say(Message("verified", {"agrees": agrees, "text": said}))

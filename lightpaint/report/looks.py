@@ -70,7 +70,7 @@ class Looks:
         if (planes := clean_planes(basis)) is None:
             shown = denoised(basis.present_look, features), denoised(predicted, features)
         else:
-            shown = planes.mix(basis.present_weights), planes.mix(weights)
+            shown = planes.present, planes.mix(weights)
         return cls(*shown, verified, texts, planes)
 
     @classmethod

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.paint import protocol
-from lightpaint.paint.clean import Clean, keep_clean, kept_clean
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import Moment
 from lightpaint.paint.store import Store
@@ -150,7 +150,7 @@ def test_clean_planes_come_later_and_keep_the_light(
         assert clean.mean() == pytest.approx(raw.mean(), rel=0.1)
     np.testing.assert_allclose(heard.studio.resource("painting"), heard.studio.session.image)
     until = time.monotonic() + 30
-    while not kept_clean(basis) and time.monotonic() < until:
+    while not kept_planes(basis) and time.monotonic() < until:
         time.sleep(0.01)
     # The next session has the same at once, and one of other pixels has not.
     again = Heard(basis, tmp_path / "again")
@@ -160,7 +160,7 @@ def test_clean_planes_come_later_and_keep_the_light(
         same = (one.studio.resource(f"clean/{k}") for one in (heard, again))
         np.testing.assert_array_equal(*same)
     np.testing.assert_array_equal(again.studio.session.present, heard.studio.session.present)
-    assert kept_clean(replace(basis, images=2 * basis.images)) is None
+    assert kept_planes(replace(basis, images=2 * basis.images)) is None
     for one in (heard, again):
         one.studio.close()
 
@@ -169,20 +169,21 @@ def test_kept_pictures_that_are_damaged_are_made_again(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
-    clean = Clean(basis.present_look, basis.images.astype(np.float16))
-    assert kept_clean(basis) is None
-    assert keep_clean(basis, clean)
+    scales = np.ones(len(basis.lights))
+    clean = CleanPlanes(basis.images.astype(np.float16), scales, basis.present_look)
+    assert kept_planes(basis) is None
+    assert keep_planes(basis, clean)
     [path] = tmp_path.iterdir()
     data = path.read_bytes()
     for damage in (b"", b"no file", data[: len(data) // 2], data[:2000] + bytes(99) + data[2099:]):
         path.write_bytes(damage)
-        assert kept_clean(basis) is None
-    assert keep_clean(basis, Clean(clean.present, clean.planes[:1]))
-    assert kept_clean(basis) is None
-    assert keep_clean(basis, clean)
-    found = kept_clean(basis)
+        assert kept_planes(basis) is None
+    assert keep_planes(basis, replace(clean, halves=clean.halves[:1]))
+    assert kept_planes(basis) is None
+    assert keep_planes(basis, clean)
+    found = kept_planes(basis)
     assert found is not None
-    np.testing.assert_array_equal(found.planes, clean.planes)
+    np.testing.assert_array_equal(found.halves, clean.halves)
 
 
 def test_a_look_is_gone_back_to_and_undone(heard: Heard):
