@@ -5,7 +5,9 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from functools import cache
-from typing import TypeVar
+from itertools import count
+from threading import Event
+from typing import Any, TypeVar
 
 # The controller finds the libraries that are loaded: numpy has to be.
 import numpy as np  # noqa: F401
@@ -50,8 +52,55 @@ def linear_algebra() -> tuple[str, str]:
 def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
     """work(job) of each job, several at a time with BLAS on one thread; results in order.
 
-    What comes out has the bits that one job after the other would give.
+    What comes out has the bits that one job after the other would give. Of several errors the one
+    of the first job is raised. A job may have jobs side by side of its own.
     """
-    # One thread more than processors: three channels then share two of them evenly.
-    with one_thread(), ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:
-        return list(pool.map(work, jobs))
+    waiting = list(jobs)
+    results: list[Any] = [None] * len(waiting)
+    errors: dict[int, Exception] = {}
+    turns = count()
+    ended = Event()
+
+    def take_turns() -> None:
+        while not ended.is_set() and (k := next(turns)) < len(waiting):
+            try:
+                results[k] = work(waiting[k])
+            except Exception as error:
+                errors[k] = error
+
+    with one_thread():
+        # One thread more than processors: three channels then share two of them evenly.
+        hands = min(os.cpu_count() or 1, len(waiting) - 1)
+        helpers = [_pool().submit(take_turns) for _ in range(hands)]
+        try:
+            take_turns()
+        except BaseException:
+            ended.set()  # an interrupt waits for no job that has not begun
+            raise
+        finally:
+            # Who has not begun by now finds nothing to do, and others may need all there are.
+            for helper in helpers:
+                if not helper.cancel():
+                    helper.result()
+    if errors:
+        raise errors[min(errors)]
+    return results
+
+
+#: By the niceness of their threads.
+_pools: dict[int, ThreadPoolExecutor] = {}
+
+
+def _pool() -> ThreadPoolExecutor:
+    """Threads that stay, since to begin them anew takes longer than many a job.
+
+    As nice as the one that asks, which on Linux is what those that it begins are.
+    """
+    nice = os.getpriority(os.PRIO_PROCESS, 0) if hasattr(os, "getpriority") else 0
+    if nice not in _pools:
+        _pools[nice] = ThreadPoolExecutor((os.cpu_count() or 1) + 1, f"lightpaint-beside-{nice}")
+    return _pools[nice]
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pools.clear)  # threads are not forked

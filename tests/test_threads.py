@@ -1,5 +1,6 @@
 """The limit on BLAS's threads: within, nested, in jobs side by side, and lifted after."""
 
+import os
 from threading import Barrier
 
 import numpy as np
@@ -55,6 +56,31 @@ def test_results_in_order_and_errors_come_through():
     assert side_by_side(abs, []) == []
     with pytest.raises(ZeroDivisionError):
         side_by_side(lambda k: 1 // k, [1, 0])
+    with pytest.raises(RuntimeError, match=r"^2$"):
+        side_by_side(_fail_from_2_on, range(9))
+
+
+def _fail_from_2_on(k: int) -> None:
+    if k >= 2:
+        raise RuntimeError(str(k))
+
+
+def test_jobs_within_jobs_wait_for_nobody():
+    """However many ask at once for threads that are all busy."""
+
+    def tree(depth: int) -> int:
+        return 1 if depth == 0 else sum(side_by_side(tree, [depth - 1] * 4))
+
+    assert tree(4) == 4**4
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="fork")
+def test_a_fork_has_threads_of_its_own():
+    assert side_by_side(abs, [-1, -2]) == [1, 2]
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if side_by_side(abs, [-1, -2]) == [1, 2] else 1)
+    assert os.waitpid(child, 0)[1] == 0
 
 
 def test_inner_products_of_few_lights_are_formed_on_one_thread(monkeypatch: pytest.MonkeyPatch):
