@@ -16,6 +16,9 @@ from lightpaint.settings import Settings
 #: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
 WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)
 
+#: What is there in the place of a scene, and is rendered already.
+BASES = ("basis", "light_groups")
+
 #: Keys of `Constraints.of`, as they stand in a lights file.
 CONSTRAINED = ("light", "tie", "prefer_current", "sparse")
 
@@ -29,16 +32,21 @@ def check_together(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> N
         )
     elif len(subjects) > 1:
         mistakes.add(where, f"{' and '.join(subjects)} at once: give one of them")
-    if "scene" not in look and "basis" not in look:
+    given = [key for key in BASES if key in look]
+    if "scene" not in look and not given:
         mistakes.add(where, "no scene and no basis: give one, here or in [defaults]")
+    elif len(given) > 1 or ("scene" in look and "light_groups" in look):
+        mistakes.add(where, "light_groups stand for scene and basis: give them alone")
+    if "pattern" in look and "light_groups" not in look:
+        mistakes.add(where, "pattern is of light_groups: leave it out, or give them")
     several = "views" in look or "sensors" in look
     if "sensor" in look and "sensors" in look:
         mistakes.add(where, "sensor and sensors at once: give one of them")
     elif "views" in look and ("sensor" in look or "sensors" in look):
         mistakes.add(where, "views name their sensors: leave sensor and sensors out")
-    elif several and "basis" in look:
+    elif several and given:
         mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
-    elif "scene" not in look and "basis" in look:
+    elif "scene" not in look and given:
         _check_of_basis(mistakes, where, look)
     want = look.get("want", ())
     if ("lighting" in look or "lightings" in look) and (
@@ -52,7 +60,7 @@ def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> 
     for step in ("verify", "render"):
         if step in look.get("want", ()):
             mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
-    if idle := [key for key in SOURCE if key in look and key != "basis"]:
+    if idle := [key for key in SOURCE if key in look and key not in (*BASES, "pattern")]:
         mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
 
 
@@ -91,6 +99,9 @@ def constraints_of(manifest: Manifest, where: str, look: Mapping[str, Any]) -> C
 
 def check_files(manifest: Manifest, where: str, look: Mapping[str, Any]) -> None:
     """What is named is there, so that a slip of the pen is no failed look at midnight."""
+    groups = look.get("light_groups")
+    if groups is not None and not (manifest.folder / groups).exists():
+        manifest.mistakes.add(where, f"light_groups: no such file or folder: {groups}")
     for key in ("scene", "basis", "mask", "lights_file"):
         if key in look and not (manifest.folder / look[key]).is_file():
             manifest.mistakes.add(where, f"{key}: no such file: {look[key]}")

@@ -26,7 +26,7 @@ from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, Painting, SceneFile
+from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Entry:
     name: str
     where: str
     scenes: tuple[SceneFile, ...] = ()
-    basis: BasisFile | None = None
+    basis: BasisFile | GroupsFile | None = None
     paintings: tuple[Painting, ...] = ()
     constraints: Constraints = field(default_factory=Constraints)
     settings: Settings = field(default_factory=Settings)
@@ -84,11 +84,11 @@ class _Sources:
     def __init__(self, manifest: Manifest) -> None:
         self._base = manifest.folder
         self._scenes: dict[str, SceneFile] = {}
-        self._bases: dict[str, BasisFile] = {}
+        self._bases: dict[str, BasisFile | GroupsFile] = {}
 
     def scene(self, look: Mapping[str, Any], sensor: str | int | None) -> SceneFile:
         said = {key: look[key] for key in SOURCE if key in look}
-        for key in ("basis", "sensors"):
+        for key in ("basis", "light_groups", "pattern", "sensors"):
             said.pop(key, None)
         path = str(self._base / said.pop("scene"))
         if "lights_file" in said:
@@ -97,9 +97,21 @@ class _Sources:
         made = SceneFile(path, **{**said, "sensor": sensor})
         return self._scenes.setdefault(repr(made), made)
 
-    def basis(self, path: str) -> BasisFile:
-        given = str(self._base / path)
-        return self._bases.setdefault(given, BasisFile(given))
+    def basis(self, look: Mapping[str, Any]) -> BasisFile | GroupsFile | None:
+        made: BasisFile | GroupsFile
+        if "light_groups" in look:
+            # In a folder of them may lie what is painted with.
+            pictures = [look[key] for key in ("painting", "mask") if key in look]
+            pictures += look.get("paintings", [])
+            aside = [x for path in pictures for x in matching(self._base, path)]
+            path = str(self._base / look["light_groups"])
+            leave_out = tuple(aside) if Path(path).is_dir() else ()
+            made = GroupsFile(path, look.get("pattern"), leave_out)
+        elif "basis" in look:
+            made = BasisFile(str(self._base / look["basis"]))
+        else:
+            return None
+        return self._bases.setdefault(repr(made), made)
 
 
 def _of_look(
@@ -118,7 +130,7 @@ def _of_look(
         check_final(mistakes, where, look)
     if len(mistakes.found) > before:
         return []
-    basis = sources.basis(look["basis"]) if "basis" in look else None
+    basis = sources.basis(look)
     is_given = "lighting" in look or "lightings" in look
     entry = Entry(
         "",

@@ -56,6 +56,8 @@ TABLE: Check = a(dict, "a table")
 SOURCE: dict[str, Check] = {
     "scene": TEXT,
     "basis": TEXT,
+    "light_groups": TEXT,
+    "pattern": TEXT,
     "sensor": (
         lambda v: isinstance(v, str | int) and not isinstance(v, bool) and v != "",
         "the id of a sensor, or its index",

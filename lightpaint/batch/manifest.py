@@ -24,7 +24,7 @@ TABLES: Mapping[str, Check] = {
 GIVEN = ("predict", "render")
 
 #: Keys that say what a look is of: a look's own replace all of those by default.
-PLACES = ("scene", "basis"), ("sensor", "sensors")
+PLACES = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
 
 
 @dataclass(frozen=True)

@@ -10,22 +10,46 @@ from lightpaint.batch.journal import Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
 from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Kind, Task
+from lightpaint.job import Job
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 
-def write_gallery_of(folder: Path, names: Sequence[str], failed: Mapping[str, str]) -> list[Row]:
+def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> Entry:
+    """What a gallery says of a look.
+
+    It was solved by `job` or, where there is a `folder`, made of its answer. variation: its word.
+    """
+    scenes = tuple(scene for scene in job.scenes if isinstance(scene, SceneFile))
+    basis = job.basis if isinstance(job.basis, BasisFile | GroupsFile) else None
+    return Entry(
+        (folder or job.folder).name,
+        "",
+        scenes,
+        basis,
+        by_sensor=job.by_sensor,
+        variation=variation,
+        of=() if folder is None else (job.folder.name,),
+    )
+
+
+def write_gallery_of(
+    folder: Path, entries: Sequence[Entry], failed: Mapping[str, str]
+) -> list[Row]:
     """Write the gallery of the looks in `folder`, by the names of their folders there.
 
     failed: why, by name, of those that came to nothing.
     """
     looks, lines = [], {}
-    for name in names:
+    for entry in entries:
+        name = entry.name
         made_of = "" if name in failed else _content(folder / name / "lighting.json")
         step = Step(Task(name, "answer", ""), made_of, True)
-        looks.append(PlannedLook(Entry(name, ""), folder / name, (step,)))
+        looks.append(PlannedLook(entry, folder / name, (step,)))
         key: tuple[str, Kind] = (name, "answer")
         state = "failed" if name in failed else "done"
         lines[key] = Line(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
-    plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, frozenset(names))
+    names = frozenset(entry.name for entry in entries)
+    plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, names)
     return write_gallery(folder, plan, lines)
 
 

@@ -12,7 +12,7 @@ from lightpaint.batch.variations import SHIFTED
 from lightpaint.errors import BatchError
 from lightpaint.records import read_record, strict_json
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, SceneFile, to_json
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile, to_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
 
@@ -115,9 +115,9 @@ def bases_of(entry: Entry) -> tuple[str, ...]:
     return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
 
 
-def key_of_basis(basis: BasisFile) -> str:
-    """Of a saved one."""
-    return json.dumps({"basis": basis.path})
+def key_of_basis(basis: BasisFile | GroupsFile) -> str:
+    """Of a saved one, or of light groups."""
+    return json.dumps({"basis": asdict(basis)})
 
 
 def key_of_scene(scene: SceneFile, settings: Settings) -> str:

@@ -28,6 +28,7 @@ from lightpaint.cli.solve_options import (
     add_paintings,
     add_pattern,
     add_several,
+    add_variations,
     add_wanted,
 )
 from lightpaint.version import __version__
@@ -117,6 +118,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         "with their radiometry, and how sure they are (default: %(default)s)",
     )
     add_several(parser)
+    add_variations(parser)
     add_method(parser)
     add_wanted(parser)
     add_unit(parser)

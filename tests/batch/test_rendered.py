@@ -32,6 +32,7 @@ sensors = ["camera", "side"]
 [[look]]
 name = "both"
 views = { camera = "bright.exr", side = "dark.exr" }
+variations = ["warmer"]
 
 [[look]]
 name = "final"
@@ -79,7 +80,7 @@ def test_each_basis_is_obtained_once_for_all_its_looks(done: dict[str, Any]) -> 
     names = [look["look"] for look in done["looks"]]
     assert names == [
         *("bright-camera", "bright-side", "dark-camera", "dark-side", "both", "both"),
-        *("final", "final-warmer", "preset"),
+        *("both-warmer", "both-warmer", "final", "final-warmer", "preset"),
     ]
     # The first sensor by its name, by default, and both for the design in two views.
     assert len(done["asked"]) <= 5
@@ -94,7 +95,8 @@ def test_only_what_is_wanted_is_rendered(here: Path, done: dict[str, Any]) -> No
     assert not (out / "dark-side" / "verified.exr").exists()
     assert not (out / "dark-side" / "report.html").exists()
     assert (out / "final" / "report.html").is_file()
-    assert (out / "both" / "side" / "predicted.exr").is_file()
+    for name in ("both", "both-warmer"):
+        assert (out / name / "side" / "predicted.exr").is_file()
     for name in ("final", "final-warmer"):
         render = read_estimate(out / name / "relit.exr")[0]
         assert render.size == (10, 12)
