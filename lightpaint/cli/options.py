@@ -76,6 +76,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
                 "to": options.to,
                 "scene": _scene_to_export(options),
                 "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
+                "stage": Path(options.stage) if options.stage else None,
                 "output": output,
                 "force": options.force,
             }
