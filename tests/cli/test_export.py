@@ -61,6 +61,7 @@ def test_a_patch_changes_the_lights_and_nothing_else(here: Path, tmp_path: Path)
 
 class _Socket:
     default_value: Any = None
+    is_linked = False
 
 
 def _blender() -> ModuleType:
