@@ -5,13 +5,16 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.keys import SOURCE, Mistakes
+from lightpaint.batch.keys import SOURCE, Handover, Mistakes
 from lightpaint.batch.manifest import Manifest, subject
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.relit.export.usd import check_usd
+from lightpaint.relit.forms import FORMS
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
+from lightpaint.sources import GroupsFile
 
 #: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
 WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)
@@ -64,10 +67,29 @@ def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> 
         mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
 
 
-def check_final(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
-    """That a render which is told of is wanted."""
-    if "render" in look and "render" not in look.get("want", ()):
-        mistakes.add(where, "[render] says how, and want does not have 'render': add it there")
+def check_wanted(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """That a render or an export which is told of is wanted."""
+    for step in ("render", "export"):
+        if step in look and step not in look.get("want", ()):
+            mistakes.add(where, f"[{step}] says how, and want does not have {step!r}: add it there")
+
+
+def check_handover(mistakes: Mistakes, where: str, asked: Handover, entry: Any) -> None:
+    """That a look has what other programs are told from. entry: one of its looks."""
+    has_groups = isinstance(entry.basis, GroupsFile)
+    for form in asked.to:
+        if FORMS[form][has_groups] is None:
+            needed = "light groups" if form == "nuke" else "a scene, and no light groups"
+            mistakes.add(f"{where}, export", f"{form!r} is of {needed}: leave it out")
+        elif not has_groups and not entry.scenes and form not in ("csv", "json"):
+            mistakes.add(f"{where}, export", f"{form!r} needs the scene: give scene = ...")
+    if asked.stage and not Path(asked.stage).is_file():
+        mistakes.add(f"{where}, export", f"stage: no such file: {asked.stage}")
+    elif "usd" in asked.to:
+        try:
+            check_usd()
+        except LightpaintError as error:
+            mistakes.add(f"{where}, export", str(error))
 
 
 def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:

@@ -10,13 +10,14 @@ from lightpaint.batch.checks import (
     SHOWN,
     WANTED,
     check_files,
-    check_final,
+    check_handover,
     check_together,
+    check_wanted,
     constraints_of,
     matching,
     settings_of,
 )
-from lightpaint.batch.keys import PAINTED, SOURCE, Final, Space
+from lightpaint.batch.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
 from lightpaint.batch.manifest import Manifest
 from lightpaint.batch.sequence import at_frame
 from lightpaint.batch.variations import SHIFTED
@@ -49,6 +50,7 @@ class Entry:
     by_sensor: bool = False
     want: tuple[str, ...] = WANTED
     final: Final = field(default_factory=Final)
+    handover: Handover = field(default_factory=Handover)
     variation: str = ""
     lighting: str = ""
     of: tuple[str, ...] = ()
@@ -126,8 +128,9 @@ def _of_look(
     settings = settings_of(mistakes, where, look)
     constraints = constraints_of(manifest, where, look)
     final = mistakes.final(look.get("render", {}), where)
+    handover = mistakes.handover(look.get("export", {}), where, manifest.folder)
     if len(mistakes.found) == before:
-        check_final(mistakes, where, look)
+        check_wanted(mistakes, where, look)
     if len(mistakes.found) > before:
         return []
     basis = sources.basis(look)
@@ -140,6 +143,7 @@ def _of_look(
         settings=settings,
         want=tuple(look.get("want", SHOWN if is_given else WANTED)),
         final=final,
+        handover=handover,
     )
     try:
         made = list(_of_subject(manifest, sources, entry, look))
@@ -147,6 +151,8 @@ def _of_look(
     except LightpaintError as error:
         mistakes.add(where, str(error))
         return []
+    if made and "export" in entry.want:
+        check_handover(mistakes, where, handover, made[0])
     for one in made:
         if not is_name(one.name):
             mistakes.add(where, f"{one.name!r} is no name for a folder: say name = ...")
@@ -211,7 +217,7 @@ def _varied(entry: Entry, word: str) -> Entry:
 
 def _given(want: Sequence[str]) -> tuple[str, ...]:
     """What is wanted of a lighting that is made of others."""
-    return tuple(step for step in want if step in ("predict", "render")) or SHOWN
+    return tuple(step for step in want if step in GIVEN) or SHOWN
 
 
 def _of_sequence(
@@ -234,7 +240,9 @@ def _of_sequence(
     if any(end.by_sensor for end in ends):
         mistakes.add(where, "through: a look of several views has no one picture: take single ones")
         return []
+    check_wanted(mistakes, where, said)
     final = mistakes.final(said.get("render", {}), where)
+    handover = mistakes.handover(said.get("export", {}), where, manifest.folder)
     frames, digits = said["frames"], len(str(said["frames"] - 1))
     if not is_name(said["name"]):
         mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
@@ -253,10 +261,13 @@ def _of_sequence(
             space=said.get("space", "log"),
             want=tuple(said.get("want", SHOWN)),
             final=final,
+            handover=handover,
         )
         made.append(frame)
     if "render" in said.get("want", ()) and not ends[0].scenes:
         mistakes.add(where, "want has 'render', which needs the scene of its looks")
+    if "export" in said.get("want", ()):
+        check_handover(mistakes, where, handover, made[0])
     return made
 
 

@@ -16,7 +16,7 @@ from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.made import adjusted, made_folder
 from lightpaint.batch.manifest import Manifest, read_manifest
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
-from lightpaint.batch.task import answer_task, bases_of, render_task
+from lightpaint.batch.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.variations import varied
 from lightpaint.batch.work import Held
 from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
@@ -108,20 +108,26 @@ class _Planner:
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
 
     def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
-        """The answer, and its render if that is wanted."""
+        """The answer, and its render and what other programs get, if that is wanted."""
         how: dict[str, Any] = {"force": self._force, "command": self._command}
         tasks = [answer_task(entry, self._folders, **how)]
         made_of = [self._prints.answer(entry, reads)]
         if "render" in entry.want:
             tasks.append(render_task(entry, self._folders, **how))
             made_of.append(self._prints.render(entry))
-        is_whole = is_possible and is_as_written(self._folders[entry.name])
+        if "export" in entry.want:
+            tasks.append(export_task(entry, self._folders, **how))
+            made_of.append(self._prints.export(entry))
+        folder = self._folders[entry.name]
+        is_whole = is_possible and is_as_written(folder)
         steps = []
         for task, its in zip(tasks, made_of, strict=True):
             line = self._journal.lines.get((task.look, task.kind))
             is_done = line is not None and (line.state, line.made_of) == ("done", its)
             # What was rendered of an earlier answer went with it.
             is_whole = is_whole and is_done
+            if task.kind == "export":
+                is_whole = is_whole and is_as_written(folder / EXPORT)
             steps.append(Step(task, its, is_whole))
         return tuple(steps)
 

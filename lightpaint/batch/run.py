@@ -132,7 +132,8 @@ class _Run:
         for keys in dict.fromkeys(step.task.bases for step in answers):
             self._of_bases([x for x in answers if x.task.bases == keys], executor)
         self._held.only(())
-        self._together([x for x in left if x.task.kind == "render"], executor)
+        for kind in ("render", "export"):
+            self._together([x for x in left if x.task.kind == kind], executor)
 
     def _of_bases(self, steps: Sequence[Step], executor: Executor) -> None:
         """Looks that share their bases; those that are made of others come after them."""

@@ -14,7 +14,7 @@ from PIL import Image
 
 from lightpaint.batch.journal import Line
 from lightpaint.batch.planned import Plan, PlannedLook
-from lightpaint.batch.task import Kind
+from lightpaint.batch.task import EXPORT, Kind
 from lightpaint.colour.display import choose_exposure, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
@@ -25,6 +25,7 @@ from lightpaint.images.estimate import read_estimate
 from lightpaint.lighting.file import read_lighting
 from lightpaint.records import strict_json
 from lightpaint.relit.export.exports import plain_cell
+from lightpaint.result_folder import RECORD
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-batch 1"
@@ -142,6 +143,8 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) ->
     names = ("report.html", "comparison.png", "relit.png", "relit.exr", "lighting.json")
     places = dict.fromkeys((folder, look.folder))
     there = [place / x for place in places for x in names if (place / x).is_file()]
+    if any(step.task.kind == "export" for step in look.steps):
+        there += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
     return Row(
         entry.name,
         state,

@@ -13,16 +13,18 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.keys import Space
 from lightpaint.batch.made import dimmed, made_folder, write_made
 from lightpaint.batch.sequence import between
-from lightpaint.batch.task import Done, Task, key_of_basis, key_of_scene
+from lightpaint.batch.task import EXPORT, Done, Task, key_of_basis, key_of_scene
 from lightpaint.batch.variations import shifted
 from lightpaint.errors import LightpaintError
-from lightpaint.files import first_line, one_line
+from lightpaint.files import first_line, one_line, write_text
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline import obtain, run
 from lightpaint.progress import Listener
+from lightpaint.relit.forms import Source, names_of_forms, writer_of
 from lightpaint.renders import relight_look, relit_folder
+from lightpaint.result_folder import ResultFolder
 from lightpaint.results import view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
@@ -74,7 +76,8 @@ def do(task: Task, held: Held, listen: Listener) -> Done:
     begun = time.perf_counter()
     failure, full = "", False
     try:
-        (_answer if task.kind == "answer" else _render)(task, held, listen)
+        does = {"answer": _answer, "render": _render, "export": _export}
+        does[task.kind](task, held, listen)
     except LightpaintError as error:
         failure, full = str(error), is_full(error)
     except MemoryError:
@@ -169,3 +172,24 @@ def _render(task: Task, held: Held, listen: Listener) -> None:
     relight_look(
         fields["scenes"][0].content, read_lighting(lighting), results, progress=listen, **how
     )
+
+
+def _export(task: Task, held: Held, listen: Listener) -> None:
+    """What other programs get of a look that is answered."""
+    fields = fields_of(task, held)
+    lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT
+    given = content(fields["basis"])
+    source = Source(
+        fields["scenes"][0].content if fields["scenes"] else None,
+        given if isinstance(given, LightGroups) else None,
+        Path(task.handover.stage) if task.handover.stage else None,
+    )
+    names = names_of_forms(task.handover.to, source)
+    files, reads = tuple(folder / name for name in names.values()), (lighting, *source.files)
+    force = fields["settings"].force
+    results = ResultFolder(folder, files, reads, (lighting,), force=force)
+    results.check()
+    answer = read_lighting(lighting)
+    with results.filled() as stage:
+        for form, name in names.items():
+            write_text(stage / name, writer_of(form, answer, source, folder, listen)())
