@@ -8,6 +8,7 @@ from typing import Any
 from lightpaint.batch.keys import SOURCE, Handover, Mistakes
 from lightpaint.batch.manifest import Manifest, subject
 from lightpaint.errors import LightpaintError
+from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.relit.export.usd import check_usd
@@ -90,6 +91,22 @@ def check_handover(mistakes: Mistakes, where: str, asked: Handover, entry: Any) 
             check_usd()
         except LightpaintError as error:
             mistakes.add(f"{where}, export", str(error))
+
+
+def check_sequence(mistakes: Mistakes, where: str, said: Mapping[str, Any]) -> None:
+    """That it goes somewhere: through several looks, or along a path of sensors."""
+    path, frames = said.get("sensors"), said.get("frames")
+    if "name" not in said or "through" not in said or (frames is None and path is None):
+        lacking = next(key for key in ("name", "through", "frames") if key not in said)
+        mistakes.add(where, f"{lacking} is missing: give name, through and frames (or sensors)")
+    elif not is_name(said["name"]):
+        mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
+    elif len(said["through"]) < 2 and path is None:
+        mistakes.add(where, f"through is {said['through']}: expected at least two names of looks")
+    elif path is not None and frames not in (None, len(path)):
+        mistakes.add(where, f"{frames} frames of {len(path)} sensors: leave frames out")
+    elif path is not None and len(path) < 2:
+        mistakes.add(where, "sensors has one: a path goes through two or more")
 
 
 def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:

@@ -19,13 +19,11 @@ from lightpaint.batch.checks import (
 )
 from lightpaint.batch.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
 from lightpaint.batch.manifest import Manifest
-from lightpaint.batch.sequence import at_frame
 from lightpaint.batch.variations import SHIFTED
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
 
@@ -63,21 +61,11 @@ class Entry:
         return bool(self.paintings)
 
 
-def entries_of(manifest: Manifest) -> tuple[Entry, ...]:
-    """All looks in the order of the manifest; what is wrong is added to its mistakes."""
-    found: list[Entry] = []
+def looks_of(manifest: Manifest) -> list[Entry]:
+    """All looks that tables ask for, in their order; what is wrong is added to the mistakes."""
     sources = _Sources(manifest)
-    for where, look in manifest.looks:
-        found += _of_look(manifest, sources, where, look)
-    for where, sequence in manifest.sequences:
-        found += _of_sequence(manifest, found, where, sequence)
-    names = [entry.name for entry in found]
-    for name in dict.fromkeys(x for x in names if names.count(x) > 1):
-        wheres = some_names(dict.fromkeys(x.where for x in found if x.name == name), " and ")
-        manifest.mistakes.add(
-            wheres, f"more than one look would be called {name!r}: say name = ... in one of them"
-        )
-    return tuple(found)
+    tables = manifest.looks
+    return [x for where, look in tables for x in _of_look(manifest, sources, where, look)]
 
 
 class _Sources:
@@ -218,59 +206,3 @@ def _varied(entry: Entry, word: str) -> Entry:
 def _given(want: Sequence[str]) -> tuple[str, ...]:
     """What is wanted of a lighting that is made of others."""
     return tuple(step for step in want if step in GIVEN) or SHOWN
-
-
-def _of_sequence(
-    manifest: Manifest, looks: Sequence[Entry], where: str, said: Mapping[str, Any]
-) -> list[Entry]:
-    """A look for each frame."""
-    mistakes, by_name = manifest.mistakes, {look.name: look for look in looks}
-    if lacking := [key for key in ("name", "through", "frames") if key not in said]:
-        mistakes.add(where, f"{lacking[0]} is missing: give name, through and frames")
-        return []
-    through = said["through"]
-    if unknown := [name for name in through if name not in by_name]:
-        if not mistakes.found:  # else it may be a look that has mistakes of its own
-            mistakes.add(where, f"through: no look is called {unknown[0]!r}")
-        return []
-    ends = [by_name[name] for name in through]
-    if any(_place(end) != _place(ends[0]) for end in ends):
-        mistakes.add(where, "through: its looks are of different scenes, sensors or bases")
-        return []
-    if any(end.by_sensor for end in ends):
-        mistakes.add(where, "through: a look of several views has no one picture: take single ones")
-        return []
-    check_wanted(mistakes, where, said)
-    final = mistakes.final(said.get("render", {}), where)
-    handover = mistakes.handover(said.get("export", {}), where, manifest.folder)
-    frames, digits = said["frames"], len(str(said["frames"] - 1))
-    if not is_name(said["name"]):
-        mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
-    made = []
-    for k in range(frames):
-        first, share = at_frame(k, frames, len(through))
-        frame = replace(
-            ends[first],
-            name=f"{said['name']}-{k:0{digits}}",
-            where=where,
-            paintings=(),
-            lighting="",
-            variation="",
-            of=tuple(through[first : first + 2]),
-            share=share,
-            space=said.get("space", "log"),
-            want=tuple(said.get("want", SHOWN)),
-            final=final,
-            handover=handover,
-        )
-        made.append(frame)
-    if "render" in said.get("want", ()) and not ends[0].scenes:
-        mistakes.add(where, "want has 'render', which needs the scene of its looks")
-    if "export" in said.get("want", ()):
-        check_handover(mistakes, where, handover, made[0])
-    return made
-
-
-def _place(entry: Entry) -> tuple[Any, ...]:
-    """What two looks of one sequence have in common."""
-    return entry.scenes, entry.basis

@@ -115,7 +115,8 @@ DEFAULTS: dict[str, Check] = {**SOURCE, **PAINTED, **ASKED}
 LOOK: dict[str, Check] = {"name": TEXT, **SUBJECTS, **DEFAULTS}
 SEQUENCE: dict[str, Check] = {
     "name": TEXT,
-    "through": (lambda v: _texts(v) and len(v) > 1, "a list of at least two names of looks"),
+    "through": (_texts, "a list of names of looks"),
+    "sensors": TEXTS,
     "frames": whole(2, MOST_FRAMES),
     "space": one_of(Space),
     "want": _some_of(GIVEN),

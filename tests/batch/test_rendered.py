@@ -15,6 +15,9 @@ from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
 from lightpaint.scene.scene import load_scene
 
+#: A look, and the frame that begins with it.
+NAMED = ("bright-camera", "path-0")
+
 SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
     <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">
     <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
@@ -40,6 +43,11 @@ painting = "dark.exr"
 want = ["solve", "verify", "report", "render"]
 render = { spp = 4, resolution = "1/2" }
 variations = ["warmer"]
+
+[[sequence]]
+name = "path"
+through = ["bright-camera", "dark-side"]
+sensors = ["camera", "side", "camera"]
 
 [[look]]
 name = "preset"
@@ -81,7 +89,12 @@ def test_each_basis_is_obtained_once_for_all_its_looks(done: dict[str, Any]) -> 
     assert names == [
         *("bright-camera", "bright-side", "dark-camera", "dark-side", "both", "both"),
         *("both-warmer", "both-warmer", "final", "final-warmer", "preset"),
+        *("path-0", "path-1", "path-2"),
     ]
+    seen = [look["sensor"] for look in done["looks"] if look["look"].startswith("path")]
+    assert seen == ["camera", "side", "camera"]
+    bright, path = (read_lighting(here / "out" / x / "lighting.json") for x in NAMED)
+    assert bright.emission == path.emission
     # The first sensor by its name, by default, and both for the design in two views.
     assert len(done["asked"]) <= 5
     assert {look["sensor"] for look in done["looks"] if look["look"] == "both"} == {
