@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from lightpaint.basis.basis import Basis
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.gallery import FILES, spoken_counts
 from lightpaint.batch.made import write_shifted
@@ -77,7 +78,7 @@ def solve(
         for view, look in zip(job.views, looks, strict=True):
             results.append((job, view, look))
             shortfalls += [f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.seen)]
-    _show_all(several.together, entries, failed)
+    _show_all(several.together, entries, failed, obtained or [])
     if jobs and not jobs[0].scenes and jobs[0].groups is None:
         terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
     if shortfalls:
@@ -102,7 +103,12 @@ def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
         terminal.write(f"for other programs: {there}")
 
 
-def _show_all(together: Path | None, entries: list[Entry], failed: Mapping[str, str]) -> None:
+def _show_all(
+    together: Path | None,
+    entries: list[Entry],
+    failed: Mapping[str, str],
+    bases: Sequence[Basis],
+) -> None:
     """What failed, and the gallery."""
     for name, why in failed.items():
         terminal.complain("solve", f"{name}: {why}")
@@ -110,5 +116,5 @@ def _show_all(together: Path | None, entries: list[Entry], failed: Mapping[str, 
         return
     named = {entry.name for entry in entries}
     lost = [Entry(name, "") for name in failed if name not in named]
-    rows = write_gallery_of(together, [*entries, *lost], failed)
+    rows = write_gallery_of(together, [*entries, *lost], failed, bases)
     terminal.write(f"{together / FILES[0]}: {spoken_counts(rows)}")

@@ -7,13 +7,14 @@ a mixer in any browser, offline.
 
 import base64
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis, BasisLight, mix
 from lightpaint.browser import bundled, styles
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display import to_8_bit
@@ -72,13 +73,13 @@ def mixer_html(
     transform = transform or ViewTransform()
     data = {
         "size": list(pictures[0].shape[:2]),
-        "planes": [_written(compact(picture)) for picture in pictures],
+        "planes": [told_plane(picture) for picture in pictures],
         "lights": [_light(basis, lighting, k) for k in shown],
         "rest": _rest(basis, lighting, shown),
-        "kelvins": _kelvins(),
-        "transform": _transform(transform),
+        "kelvins": kelvins(),
+        "transform": told_transform(transform),
         "painting": None if painting is None else _painting(painting, basis, len(pictures)),
-        "lighting": _file(lighting),
+        "lighting": told_file(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
     # In a script nothing is escaped, and only `<` can end it.
@@ -110,12 +111,17 @@ def _factor(basis: Basis, count: int) -> int:
 def _pictures(basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool) -> list[Floats]:
     """Of each light its plane; then all others, as they are in the answer and at present."""
     rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    factor = _factor(basis, len(shown) + 2 * bool(rest.size))
     planes = [basis.images[k] for k in shown]
     for weights in (lighting.weights_for(basis), basis.present_weights) if rest.size else ():
         its = np.zeros_like(weights)
         its[rest] = weights[rest]
         planes.append(mix(basis.images, its))
+    return small_planes(basis, planes, is_clean=is_clean)
+
+
+def small_planes(basis: Basis, planes: Sequence[Floats], *, is_clean: bool) -> list[Floats]:
+    """Pictures of a basis as small as a page takes them. is_clean: whether they are denoised."""
+    factor = _factor(basis, len(planes))
     small = [np.asarray(block_mean(plane, factor), np.float32) for plane in planes]
     if not is_clean or factor >= ENOUGH:
         return small
@@ -127,12 +133,19 @@ def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:
     light = basis.lights[k]
     looks = {"present": light.emission, "answer": lighting[light.name].emission}
     return {
+        **told_light(light),
+        **{look: [float(x) for x in emission] for look, emission in looks.items()},
+        "kelvin": {look: _kelvin(emission, light.unit) for look, emission in looks.items()},
+    }
+
+
+def told_light(light: BasisLight) -> dict[str, Any]:
+    """A light for the page, whatever it is set to."""
+    return {
         "name": light.name,
         "unit": light.unit,
         "isFixed": light.is_fixed,
         "isScalar": light.is_scalar,
-        **{look: [float(x) for x in emission] for look, emission in looks.items()},
-        "kelvin": {look: _kelvin(emission, light.unit) for look, emission in looks.items()},
     }
 
 
@@ -157,7 +170,8 @@ def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | 
     }
 
 
-def _kelvins() -> list[Any]:
+def kelvins() -> list[Any]:
+    """Colours of luminance 1 by temperature, for the sliders."""
     mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
     return [
         [float(1e6 / mired), [round(float(x), 6) for x in kelvin_to_rgb(float(1e6 / mired))]]
@@ -165,7 +179,7 @@ def _kelvins() -> list[Any]:
     ]
 
 
-def _transform(transform: ViewTransform) -> dict[str, Any]:
+def told_transform(transform: ViewTransform) -> dict[str, Any]:
     """A transform for the page: sRGB it knows; else a curve, or where channels mix a lattice."""
     about: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
     plain = ViewTransform(transform.name)
@@ -183,12 +197,17 @@ def _painting(painting: Floats, basis: Basis, count: int) -> str:
     return data_uri(to_8_bit(np.clip(small, 0, 1)))
 
 
+def told_plane(picture: Floats) -> dict[str, Any]:
+    """A picture of light, (h, w, 3), for the page."""
+    return _written(compact(picture))
+
+
 def _written(its: Compact) -> dict[str, Any]:
     data = "data:;base64," + base64.b64encode(its.data).decode("ascii")
     return {"data": data, "scale": its.scale, "dropped": its.dropped, "size": list(its.size)}
 
 
-def _file(lighting: Lighting) -> dict[str, Any]:
+def told_file(lighting: Lighting) -> dict[str, Any]:
     """The answer's file without what is said of the answer alone."""
     lights = tuple(
         replace(
