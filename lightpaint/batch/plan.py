@@ -10,7 +10,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.fingerprint import Fingerprints
-from lightpaint.batch.frames import entries_of
+from lightpaint.batch.looks import entries_of
 from lightpaint.batch.gallery import check_gallery
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
