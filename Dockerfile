@@ -13,6 +13,7 @@ COPY lightpaint lightpaint
 # The demo's room and painting, which the package links to.
 COPY scenes/gallery scenes/gallery
 COPY targets/gallery targets/gallery
+# The last command starts this Python, which ends what a wheel leaves to its first start, as root.
 RUN python -m venv /opt/lightpaint \
     && /opt/lightpaint/bin/pip install --no-cache-dir -c constraints.txt '.[cluster,usd]' \
     && /opt/lightpaint/bin/pip uninstall --yes pip setuptools
