@@ -40,7 +40,7 @@ def made_folder(
     return ResultFolder(folder, tuple(files), reads, answers, force=force)
 
 
-def write_made(
+def leave_made(
     results: ResultFolder,
     lighting: Lighting,
     bases: Sequence[Basis],
@@ -115,7 +115,7 @@ def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
     }
 
 
-def write_shifted(
+def leave_shifted(
     job: Job, word: str, results: ResultFolder, lighting: Lighting, bases: Sequence[Basis]
 ) -> None:
     """Write a variation of the answer of `job`. bases: of its views."""
@@ -125,7 +125,7 @@ def write_shifted(
         "groups": job.groups,
         "spp": job.settings.spp,
     }
-    write_made(results, varied_, bases, views=_views(job), **how)
+    leave_made(results, varied_, bases, views=_views(job), **how)
 
 
 def _views(job: Job) -> list[str]:

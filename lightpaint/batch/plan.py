@@ -10,10 +10,10 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.fingerprint import Fingerprints
-from lightpaint.batch.looks import entries_of
 from lightpaint.batch.gallery import check_gallery
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
+from lightpaint.batch.looks import entries_of
 from lightpaint.batch.made import adjusted, made_folder
 from lightpaint.batch.manifest import Manifest, read_manifest
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step

@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.keys import Space
-from lightpaint.batch.made import dimmed, made_folder, write_made
+from lightpaint.batch.made import dimmed, leave_made, made_folder
 from lightpaint.batch.planes import keep_planes
 from lightpaint.batch.sequence import between
 from lightpaint.batch.task import EXPORT, Done, Task, key_of_basis, key_of_scene
@@ -155,7 +155,7 @@ def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> N
     scene = scenes[0] if scenes else None
     how: dict[str, Any] = {"views": views, "groups": groups}
     results = made_folder(fields["folder"], scene, task.lightings, **how, force=settings.force)
-    write_made(results, lighting, bases, **how, scene=scene, spp=settings.spp)
+    leave_made(results, lighting, bases, **how, scene=scene, spp=settings.spp)
     _keep_planes(task, fields["folder"], bases, held)
 
 

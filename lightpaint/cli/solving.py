@@ -7,7 +7,7 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.gallery import FILES, spoken_counts
-from lightpaint.batch.made import write_shifted
+from lightpaint.batch.made import leave_shifted
 from lightpaint.batch.plan import ALONE
 from lightpaint.batch.solved import entry_of, write_gallery_of
 from lightpaint.batch.work import is_full
@@ -67,7 +67,7 @@ def solve(
             # Several paintings of one scene share its basis.
             obtained = [look.basis for look in looks]
             for word, place in several.made.get(job.folder, {}).items():
-                write_shifted(job, word, place, looks[0].lighting, obtained)
+                leave_shifted(job, word, place, looks[0].lighting, obtained)
                 entries.append(entry_of(job, place.folder, word))
         except ALONE as error:
             if not several.keep_going or is_full(error):
