@@ -14,13 +14,11 @@ from typing import Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
-from lightpaint.batch.gallery import check_gallery
-from lightpaint.batch.made import shifted_folders, sibling_folder, siblings
 from lightpaint.batch.plan import ALONE
 from lightpaint.batch.run import How
 from lightpaint.batch.variations import words_of
 from lightpaint.cli.order import options_but
-from lightpaint.cli.solving import Several
+from lightpaint.cli.several import several_of
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
@@ -28,7 +26,6 @@ from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
-from lightpaint.result_folder import ResultFolder
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
@@ -186,57 +183,18 @@ def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
     """What `solve` is asked for, with a gallery where it is of several looks."""
     failed: dict[str, str] = {}
     words = words_of(options.variations)
-    jobs = jobs_of(options, settings, failed)
-    _check_apart([job.folder for job in jobs], words)
-    found: list[Job] = []
-    called: dict[Path, str] = {}
-    made: dict[Path, dict[str, ResultFolder]] = {}
-    for job in jobs:
-        try:
-            anew, places = siblings(job, words), shifted_folders(job, words)
-        except ALONE as error:
-            if not options.keep_going:
-                raise
-            failed[job.folder.name] = str(error)
-            continue
-        found += [job, *anew.values()]
-        called |= {sibling.folder: word for word, sibling in anew.items()}
-        made[job.folder] = places
-    together = None
-    if len(options.targets) > 1 or words:
-        together = _together(options, [job.folder for job in jobs])
-    return {
-        "jobs": found,
-        "table": options.table,
-        "wanted": Wanted(options.max_miss, options.min_fit),
-        "failed": failed,
-        "several": Several(together, options.keep_going, called, made),
-    }
-
-
-def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
-    """Raise OutputError where a variation would go to the folder of another painting."""
-    for folder in (sibling_folder(x, word) for x in folders for word in words):
-        if folder in folders:
-            raise OutputError(
-                f"a variation and a painting would both go to {folder}: solve them apart, each "
-                "with its own -o"
-            )
-
-
-def _together(options: Namespace, folders: Sequence[Path]) -> Path | None:
-    """Where the gallery of all looks goes: beside their folders.
-
-    None where none was named and somebody else's page lies there.
-    """
-    place = folders[0].parent if folders else Path(options.output or "")
-    try:
-        check_gallery(place, force=options.force)
-    except OutputError:
-        if options.output is not None:
-            raise
-        return None
-    return place
+    jobs, several = several_of(
+        jobs_of(options, settings, failed),
+        words,
+        failed,
+        is_shown=len(options.targets) > 1 or bool(words),
+        output=Path(options.output) if options.output else None,
+        keep_going=options.keep_going,
+        force=options.force,
+    )
+    wanted = Wanted(options.max_miss, options.min_fit)
+    how = {"table": options.table, "wanted": wanted, "failed": failed, "several": several}
+    return {"jobs": jobs, **how}
 
 
 def _scene_to_export(options: Namespace) -> SceneFile | None:

@@ -1,7 +1,6 @@
 """What `lightpaint solve` does: one painting or several, their variations, a gallery of all."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
@@ -14,31 +13,16 @@ from lightpaint.batch.work import is_full
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.answer import Table, show_look, spoken_settings
 from lightpaint.cli.manner import Outcome
+from lightpaint.cli.several import Several
 from lightpaint.cli.wanted import Wanted
 from lightpaint.job import Job
 from lightpaint.pipeline import run
 from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.result_folder import ResultFolder
 from lightpaint.results import Look
 from lightpaint.screen import some_of
 
 #: Of an answer of which nothing is asked.
 ANY = Wanted()
-
-
-@dataclass(frozen=True)
-class Several:
-    """What several looks of one command are to each other.
-
-    together: folder of a gallery of all. keep_going: whether one that is bad fails alone. called:
-    by folder, what is a variation of another. made: by the folder of an answer, the variations that
-    are made of it, and where they go.
-    """
-
-    together: Path | None = None
-    keep_going: bool = False
-    called: Mapping[Path, str] = field(default_factory=dict)
-    made: Mapping[Path, Mapping[str, ResultFolder]] = field(default_factory=dict)
 
 
 def solve(
