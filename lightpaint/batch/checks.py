@@ -5,16 +5,23 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.keys import SOURCE, Mistakes
+from lightpaint.batch.keys import SOURCE, Handover, Mistakes
 from lightpaint.batch.manifest import Manifest, subject
 from lightpaint.errors import LightpaintError
+from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.relit.export.usd import check_usd
+from lightpaint.relit.forms import FORMS
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
+from lightpaint.sources import GroupsFile
 
 #: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
 WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)
+
+#: What is there in the place of a scene, and is rendered already.
+BASES = ("basis", "light_groups")
 
 #: Keys of `Constraints.of`, as they stand in a lights file.
 CONSTRAINED = ("light", "tie", "prefer_current", "sparse")
@@ -29,16 +36,21 @@ def check_together(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> N
         )
     elif len(subjects) > 1:
         mistakes.add(where, f"{' and '.join(subjects)} at once: give one of them")
-    if "scene" not in look and "basis" not in look:
+    given = [key for key in BASES if key in look]
+    if "scene" not in look and not given:
         mistakes.add(where, "no scene and no basis: give one, here or in [defaults]")
+    elif len(given) > 1 or ("scene" in look and "light_groups" in look):
+        mistakes.add(where, "light_groups stand for scene and basis: give them alone")
+    if "pattern" in look and "light_groups" not in look:
+        mistakes.add(where, "pattern is of light_groups: leave it out, or give them")
     several = "views" in look or "sensors" in look
     if "sensor" in look and "sensors" in look:
         mistakes.add(where, "sensor and sensors at once: give one of them")
     elif "views" in look and ("sensor" in look or "sensors" in look):
         mistakes.add(where, "views name their sensors: leave sensor and sensors out")
-    elif several and "basis" in look:
+    elif several and given:
         mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
-    elif "scene" not in look and "basis" in look:
+    elif "scene" not in look and given:
         _check_of_basis(mistakes, where, look)
     want = look.get("want", ())
     if ("lighting" in look or "lightings" in look) and (
@@ -52,14 +64,49 @@ def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> 
     for step in ("verify", "render"):
         if step in look.get("want", ()):
             mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
-    if idle := [key for key in SOURCE if key in look and key != "basis"]:
+    if idle := [key for key in SOURCE if key in look and key not in (*BASES, "pattern")]:
         mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
 
 
-def check_final(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
-    """That a render which is told of is wanted."""
-    if "render" in look and "render" not in look.get("want", ()):
-        mistakes.add(where, "[render] says how, and want does not have 'render': add it there")
+def check_wanted(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """That a render or an export which is told of is wanted."""
+    for step in ("render", "export"):
+        if step in look and step not in look.get("want", ()):
+            mistakes.add(where, f"[{step}] says how, and want does not have {step!r}: add it there")
+
+
+def check_handover(mistakes: Mistakes, where: str, asked: Handover, entry: Any) -> None:
+    """That a look has what other programs are told from. entry: one of its looks."""
+    has_groups = isinstance(entry.basis, GroupsFile)
+    for form in asked.to:
+        if FORMS[form][has_groups] is None:
+            needed = "light groups" if form == "nuke" else "a scene, and no light groups"
+            mistakes.add(f"{where}, export", f"{form!r} is of {needed}: leave it out")
+        elif not has_groups and not entry.scenes and form not in ("csv", "json"):
+            mistakes.add(f"{where}, export", f"{form!r} needs the scene: give scene = ...")
+    if asked.stage and not Path(asked.stage).is_file():
+        mistakes.add(f"{where}, export", f"stage: no such file: {asked.stage}")
+    elif "usd" in asked.to:
+        try:
+            check_usd()
+        except LightpaintError as error:
+            mistakes.add(f"{where}, export", str(error))
+
+
+def check_sequence(mistakes: Mistakes, where: str, said: Mapping[str, Any]) -> None:
+    """That it goes somewhere: through several looks, or along a path of sensors."""
+    path, frames = said.get("sensors"), said.get("frames")
+    if "name" not in said or "through" not in said or (frames is None and path is None):
+        lacking = next(key for key in ("name", "through", "frames") if key not in said)
+        mistakes.add(where, f"{lacking} is missing: give name, through and frames (or sensors)")
+    elif not is_name(said["name"]):
+        mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
+    elif len(said["through"]) < 2 and path is None:
+        mistakes.add(where, f"through is {said['through']}: expected at least two names of looks")
+    elif path is not None and frames not in (None, len(path)):
+        mistakes.add(where, f"{frames} frames of {len(path)} sensors: leave frames out")
+    elif path is not None and len(path) < 2:
+        mistakes.add(where, "sensors has one: a path goes through two or more")
 
 
 def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:
@@ -91,6 +138,9 @@ def constraints_of(manifest: Manifest, where: str, look: Mapping[str, Any]) -> C
 
 def check_files(manifest: Manifest, where: str, look: Mapping[str, Any]) -> None:
     """What is named is there, so that a slip of the pen is no failed look at midnight."""
+    groups = look.get("light_groups")
+    if groups is not None and not (manifest.folder / groups).exists():
+        manifest.mistakes.add(where, f"light_groups: no such file or folder: {groups}")
     for key in ("scene", "basis", "mask", "lights_file"):
         if key in look and not (manifest.folder / look[key]).is_file():
             manifest.mistakes.add(where, f"{key}: no such file: {look[key]}")

@@ -10,23 +10,22 @@ from lightpaint.batch.checks import (
     SHOWN,
     WANTED,
     check_files,
-    check_final,
+    check_handover,
     check_together,
+    check_wanted,
     constraints_of,
     matching,
     settings_of,
 )
-from lightpaint.batch.keys import PAINTED, SOURCE, Final, Space
+from lightpaint.batch.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
 from lightpaint.batch.manifest import Manifest
-from lightpaint.batch.sequence import at_frame
 from lightpaint.batch.variations import SHIFTED
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.screen import some_names
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, Painting, SceneFile
+from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
 
 
 @dataclass(frozen=True)
@@ -42,13 +41,14 @@ class Entry:
     name: str
     where: str
     scenes: tuple[SceneFile, ...] = ()
-    basis: BasisFile | None = None
+    basis: BasisFile | GroupsFile | None = None
     paintings: tuple[Painting, ...] = ()
     constraints: Constraints = field(default_factory=Constraints)
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
     want: tuple[str, ...] = WANTED
     final: Final = field(default_factory=Final)
+    handover: Handover = field(default_factory=Handover)
     variation: str = ""
     lighting: str = ""
     of: tuple[str, ...] = ()
@@ -61,21 +61,11 @@ class Entry:
         return bool(self.paintings)
 
 
-def entries_of(manifest: Manifest) -> tuple[Entry, ...]:
-    """All looks in the order of the manifest; what is wrong is added to its mistakes."""
-    found: list[Entry] = []
+def looks_of(manifest: Manifest) -> list[Entry]:
+    """All looks that tables ask for, in their order; what is wrong is added to the mistakes."""
     sources = _Sources(manifest)
-    for where, look in manifest.looks:
-        found += _of_look(manifest, sources, where, look)
-    for where, sequence in manifest.sequences:
-        found += _of_sequence(manifest, found, where, sequence)
-    names = [entry.name for entry in found]
-    for name in dict.fromkeys(x for x in names if names.count(x) > 1):
-        wheres = some_names(dict.fromkeys(x.where for x in found if x.name == name), " and ")
-        manifest.mistakes.add(
-            wheres, f"more than one look would be called {name!r}: say name = ... in one of them"
-        )
-    return tuple(found)
+    tables = manifest.looks
+    return [x for where, look in tables for x in _of_look(manifest, sources, where, look)]
 
 
 class _Sources:
@@ -84,11 +74,11 @@ class _Sources:
     def __init__(self, manifest: Manifest) -> None:
         self._base = manifest.folder
         self._scenes: dict[str, SceneFile] = {}
-        self._bases: dict[str, BasisFile] = {}
+        self._bases: dict[str, BasisFile | GroupsFile] = {}
 
     def scene(self, look: Mapping[str, Any], sensor: str | int | None) -> SceneFile:
         said = {key: look[key] for key in SOURCE if key in look}
-        for key in ("basis", "sensors"):
+        for key in ("basis", "light_groups", "pattern", "sensors"):
             said.pop(key, None)
         path = str(self._base / said.pop("scene"))
         if "lights_file" in said:
@@ -97,9 +87,21 @@ class _Sources:
         made = SceneFile(path, **{**said, "sensor": sensor})
         return self._scenes.setdefault(repr(made), made)
 
-    def basis(self, path: str) -> BasisFile:
-        given = str(self._base / path)
-        return self._bases.setdefault(given, BasisFile(given))
+    def basis(self, look: Mapping[str, Any]) -> BasisFile | GroupsFile | None:
+        made: BasisFile | GroupsFile
+        if "light_groups" in look:
+            # In a folder of them may lie what is painted with.
+            pictures = [look[key] for key in ("painting", "mask") if key in look]
+            pictures += look.get("paintings", [])
+            aside = [x for path in pictures for x in matching(self._base, path)]
+            path = str(self._base / look["light_groups"])
+            leave_out = tuple(aside) if Path(path).is_dir() else ()
+            made = GroupsFile(path, look.get("pattern"), leave_out)
+        elif "basis" in look:
+            made = BasisFile(str(self._base / look["basis"]))
+        else:
+            return None
+        return self._bases.setdefault(repr(made), made)
 
 
 def _of_look(
@@ -114,11 +116,12 @@ def _of_look(
     settings = settings_of(mistakes, where, look)
     constraints = constraints_of(manifest, where, look)
     final = mistakes.final(look.get("render", {}), where)
+    handover = mistakes.handover(look.get("export", {}), where, manifest.folder)
     if len(mistakes.found) == before:
-        check_final(mistakes, where, look)
+        check_wanted(mistakes, where, look)
     if len(mistakes.found) > before:
         return []
-    basis = sources.basis(look["basis"]) if "basis" in look else None
+    basis = sources.basis(look)
     is_given = "lighting" in look or "lightings" in look
     entry = Entry(
         "",
@@ -128,6 +131,7 @@ def _of_look(
         settings=settings,
         want=tuple(look.get("want", SHOWN if is_given else WANTED)),
         final=final,
+        handover=handover,
     )
     try:
         made = list(_of_subject(manifest, sources, entry, look))
@@ -135,6 +139,8 @@ def _of_look(
     except LightpaintError as error:
         mistakes.add(where, str(error))
         return []
+    if made and "export" in entry.want:
+        check_handover(mistakes, where, handover, made[0])
     for one in made:
         if not is_name(one.name):
             mistakes.add(where, f"{one.name!r} is no name for a folder: say name = ...")
@@ -199,55 +205,4 @@ def _varied(entry: Entry, word: str) -> Entry:
 
 def _given(want: Sequence[str]) -> tuple[str, ...]:
     """What is wanted of a lighting that is made of others."""
-    return tuple(step for step in want if step in ("predict", "render")) or SHOWN
-
-
-def _of_sequence(
-    manifest: Manifest, looks: Sequence[Entry], where: str, said: Mapping[str, Any]
-) -> list[Entry]:
-    """A look for each frame."""
-    mistakes, by_name = manifest.mistakes, {look.name: look for look in looks}
-    if lacking := [key for key in ("name", "through", "frames") if key not in said]:
-        mistakes.add(where, f"{lacking[0]} is missing: give name, through and frames")
-        return []
-    through = said["through"]
-    if unknown := [name for name in through if name not in by_name]:
-        if not mistakes.found:  # else it may be a look that has mistakes of its own
-            mistakes.add(where, f"through: no look is called {unknown[0]!r}")
-        return []
-    ends = [by_name[name] for name in through]
-    if any(_place(end) != _place(ends[0]) for end in ends):
-        mistakes.add(where, "through: its looks are of different scenes, sensors or bases")
-        return []
-    if any(end.by_sensor for end in ends):
-        mistakes.add(where, "through: a look of several views has no one picture: take single ones")
-        return []
-    final = mistakes.final(said.get("render", {}), where)
-    frames, digits = said["frames"], len(str(said["frames"] - 1))
-    if not is_name(said["name"]):
-        mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
-    made = []
-    for k in range(frames):
-        first, share = at_frame(k, frames, len(through))
-        frame = replace(
-            ends[first],
-            name=f"{said['name']}-{k:0{digits}}",
-            where=where,
-            paintings=(),
-            lighting="",
-            variation="",
-            of=tuple(through[first : first + 2]),
-            share=share,
-            space=said.get("space", "log"),
-            want=tuple(said.get("want", SHOWN)),
-            final=final,
-        )
-        made.append(frame)
-    if "render" in said.get("want", ()) and not ends[0].scenes:
-        mistakes.add(where, "want has 'render', which needs the scene of its looks")
-    return made
-
-
-def _place(entry: Entry) -> tuple[Any, ...]:
-    """What two looks of one sequence have in common."""
-    return entry.scenes, entry.basis
+    return tuple(step for step in want if step in GIVEN) or SHOWN

@@ -63,7 +63,7 @@ def _look_s(look: PlannedLook, plan: Plan) -> float:
         spent_s += pixels * (PIXEL_S + PIXEL_LIGHT_S * lights) * look.entry.is_solved
         spent_s += REPORT_S * pixels * ("report" in want)
         spent_s += SAMPLE_S * sum(cost.samples for cost in costs) * ("verify" in want)
-    if "render" in want and not look.steps[-1].is_done:
+    if any(step.task.kind == "render" and not step.is_done for step in look.steps):
         spent_s += SAMPLE_S * _final_samples(look, costs)
     return spent_s
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.batch.entries import Entry
-from lightpaint.batch.keys import Final
+from lightpaint.batch.keys import Final, Handover
 from lightpaint.errors import OutputError
 from lightpaint.version import __version__
 
@@ -27,7 +27,7 @@ class Fingerprints:
 
         reads: files whose content counts. Raises OutputError for one that cannot be read.
         """
-        told = asdict(replace(entry, where="", want=(), final=Final()))
+        told = asdict(replace(entry, where="", want=(), final=Final(), handover=Handover()))
         made_of = [
             __version__,
             _relative(told, self._base),
@@ -40,6 +40,12 @@ class Fingerprints:
     def render(self, entry: Entry) -> str:
         """Of all that goes into a final render."""
         return _sum(json.dumps([self._answers[entry.name], asdict(entry.final)]))
+
+    def export(self, entry: Entry) -> str:
+        """Of all that other programs get."""
+        stage = [self._content(Path(entry.handover.stage))] if entry.handover.stage else []
+        told = _relative(asdict(entry.handover), self._base)
+        return _sum(json.dumps([self._answers[entry.name], told, stage]))
 
     def _content(self, file: Path) -> str:
         """SHA-256 of a file; each is read once."""

@@ -14,7 +14,7 @@ HEAD = """\
 
 [defaults]
 scene = {scene}
-want = ["solve", "predict", "verify", "report"]  # and "render": a final render
+want = ["solve", "predict", "verify", "report"]  # "render": a final render; "export": for others
 
 [defaults.settings]
 quality = "preview"

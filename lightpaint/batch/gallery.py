@@ -1,8 +1,7 @@
 """index.html, one self-contained page of all looks, and contact.png, a sheet of them."""
 
 import base64
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from html import escape
 from importlib import resources
@@ -15,6 +14,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.batch.journal import Line
+from lightpaint.batch.mixers import in_script, mixers_html, transforms_of
+from lightpaint.batch.planes import drop_planes, planes_name
 from lightpaint.batch.planned import Plan
 from lightpaint.batch.summary import (
     Row,
@@ -23,8 +24,10 @@ from lightpaint.batch.summary import (
     rows_of,
     summary_csv,
     summary_json,
+    view_folders,
 )
 from lightpaint.batch.task import Kind
+from lightpaint.browser import bundled, styles
 from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.png import png_bytes
@@ -60,15 +63,33 @@ def write_gallery(folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], Lin
     rows = rows_of(plan, lines)
     rows.sort(key=lambda row: ("failed", "waiting", "done").index(row.state))
     drop_pictures(folder, rows)
+    bases = bases_of_rows(folder, plan)
+    drop_planes(folder, set(bases.values()))
     write_text(folder / "summary.json", summary_json(rows))
     write_text(folder / "summary.csv", summary_csv(rows))
-    write_text(folder / "index.html", gallery_page(folder, plan.manifest.name, rows))
+    write_text(folder / "index.html", gallery_page(folder, plan.manifest.name, rows, bases))
     write_bytes(folder / "contact.png", png_bytes(contact_sheet(folder, rows)))
     return rows
 
 
-def gallery_page(folder: Path, title: str, rows: list[Row]) -> str:
-    """The page as HTML text. folder: where the small pictures are."""
+def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
+    """By the folder of each picture, which planes its mixer has."""
+    return {
+        place.relative_to(plan.folder).as_posix(): planes_name(folder, key)
+        for look in plan.looks
+        for place, key in zip(view_folders(look), look.steps[0].task.bases, strict=False)
+    }
+
+
+def gallery_page(
+    folder: Path, title: str, rows: Sequence[Row], bases: Mapping[str, str] | None = None
+) -> str:
+    """The page as HTML text.
+
+    folder: where the small pictures and planes are. bases: planes of each row, by its folder.
+    """
+    shown = [row for row in rows if row.state == "done"]
+    mixers = mixers_html(folder, shown, bases or {})
     told = []
     for row in rows:
         its = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
@@ -77,19 +98,24 @@ def gallery_page(folder: Path, title: str, rows: list[Row]) -> str:
         if row.picture:
             data = base64.b64encode((folder / row.picture).read_bytes()).decode("ascii")
             its["picture"] = f"data:image/jpeg;base64,{data}"
+        if (bases or {}).get(row.folder) in mixers:
+            its["basis"] = (bases or {})[row.folder]
         told.append(its)
-    # In a script nothing is escaped, and only `<` can end it.
-    text = json.dumps(told, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     template = resources.files("lightpaint.batch").joinpath("gallery.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(visible(title)),
         about=escape(spoken_counts(rows)),
-        looks=text.replace("<", "\\u003c"),
+        failed=" failed" if any(row.state == "failed" for row in rows) else "",
+        looks=in_script(told),
+        transforms=in_script(transforms_of(shown) if mixers else {}),
+        mixers="\n".join(mixers.values()),
+        style=styles("gallery.css", "mixer.css"),
+        script=bundled("gallery.js"),
         version=escape(__version__),
     )
 
 
-def spoken_counts(rows: list[Row]) -> str:
+def spoken_counts(rows: Sequence[Row]) -> str:
     """`12 looks: 1 failed, 2 not done yet`."""
     counts = {state: sum(row.state == state for row in rows) for state in ("failed", "waiting")}
     told = [f"{counts['failed']} failed"] * bool(counts["failed"])

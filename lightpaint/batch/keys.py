@@ -2,19 +2,24 @@
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from lightpaint.batch.variations import VARIATIONS
 from lightpaint.errors import LightpaintError
 from lightpaint.expected import BRIGHTEST, SWITCH, Check, a, one_of, whole
 from lightpaint.files import one_line
+from lightpaint.relit.forms import FORMS
 from lightpaint.scene.film import check_resolution
 from lightpaint.settings import Settings
 from lightpaint.target.read import Paint
 
 #: What can be wanted of a look.
-Step = Literal["solve", "predict", "verify", "report", "render"]
+Step = Literal["solve", "predict", "verify", "report", "render", "export"]
+
+#: What can be wanted of a lighting that is there already.
+GIVEN: tuple[Step, ...] = ("predict", "render", "export")
 
 #: What a sequence is even in: stops of each channel, or lightness and hue as people see them.
 Space = Literal["log", "oklab"]
@@ -56,6 +61,8 @@ TABLE: Check = a(dict, "a table")
 SOURCE: dict[str, Check] = {
     "scene": TEXT,
     "basis": TEXT,
+    "light_groups": TEXT,
+    "pattern": TEXT,
     "sensor": (
         lambda v: isinstance(v, str | int) and not isinstance(v, bool) and v != "",
         "the id of a sensor, or its index",
@@ -91,6 +98,7 @@ ASKED: dict[str, Check] = {
     "settings": TABLE,
     "want": _some_of(get_args(Step)),
     "render": TABLE,
+    "export": TABLE,
     "variations": _some_of(VARIATIONS),
 }
 
@@ -107,11 +115,13 @@ DEFAULTS: dict[str, Check] = {**SOURCE, **PAINTED, **ASKED}
 LOOK: dict[str, Check] = {"name": TEXT, **SUBJECTS, **DEFAULTS}
 SEQUENCE: dict[str, Check] = {
     "name": TEXT,
-    "through": (lambda v: _texts(v) and len(v) > 1, "a list of at least two names of looks"),
+    "through": (_texts, "a list of names of looks"),
+    "sensors": TEXTS,
     "frames": whole(2, MOST_FRAMES),
     "space": one_of(Space),
-    "want": _some_of(("predict", "render")),
+    "want": _some_of(GIVEN),
     "render": TABLE,
+    "export": TABLE,
 }
 
 #: Of `Settings`, what does not stand elsewhere in a manifest or on the command line.
@@ -132,6 +142,17 @@ class Final:
 
 
 FINAL: dict[str, Check] = {"spp": whole(2), "resolution": TEXT, "seed": whole(0)}
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What other programs get. to: forms, as of `lightpaint export`. stage: of USD, by its path."""
+
+    to: tuple[str, ...] = ("csv", "json")
+    stage: str = ""
+
+
+HANDOVER: dict[str, Check] = {"to": _some_of(FORMS), "stage": TEXT}
 
 
 @dataclass
@@ -184,6 +205,15 @@ class Mistakes:
             self.add(f"{where}, render", str(error))
             return Final()
         return Final(**said)
+
+    def handover(self, given: Mapping[str, Any], where: str, base: Path) -> Handover:
+        """What a table asks for other programs. base: what its paths are relative to."""
+        right = self.keys(given, HANDOVER, f"{where}, export")
+        said = {name: value for name, value in given.items() if name in right}
+        made = Handover(tuple(said.get("to", Handover.to)), said.get("stage", ""))
+        if made.stage and "usd" not in made.to:
+            self.add(f"{where}, export", "stage is of the form 'usd': add that, or leave it out")
+        return replace(made, stage=str(base / made.stage) if made.stage else "")
 
 
 def _near(key: str, known: Iterable[str]) -> str:

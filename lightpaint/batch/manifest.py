@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.keys import DEFAULTS, LOOK, SEQUENCE, SUBJECTS, Mistakes
+from lightpaint.batch.keys import DEFAULTS, GIVEN, LOOK, SEQUENCE, SUBJECTS, Mistakes
 from lightpaint.errors import BatchError
 from lightpaint.expected import Check, a
 from lightpaint.files import one_line, read_text
@@ -20,11 +20,11 @@ TABLES: Mapping[str, Check] = {
     "sequence": a(list, "tables, [[sequence]]"),
 }
 
-#: What can be wanted of a lighting that is there already.
-GIVEN = ("predict", "render")
+#: Tables of which a look's own keys stand beside those by default.
+JOINED = ("settings", "parameters", "render", "export")
 
 #: Keys that say what a look is of: a look's own replace all of those by default.
-PLACES = ("scene", "basis"), ("sensor", "sensors")
+PLACES = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def _merged(defaults: Mapping[str, Any], look: Mapping[str, Any]) -> dict[str, A
         if any(key in look for key in keys):
             said = {key: value for key, value in said.items() if key not in keys}
     for key, value in look.items():
-        if key in ("settings", "parameters", "render") and isinstance(said.get(key), dict):
+        if key in JOINED and isinstance(said.get(key), dict):
             value = {**said[key], **value}
         if key == "constraints" and key in said:
             value = [said[key], value]
@@ -117,8 +117,9 @@ def _leave_idle(said: dict[str, Any], look: Mapping[str, Any]) -> None:
     """Take out what is wanted by default, and a look like this has no use of."""
     if "want" in said and "want" not in look and {"lighting", "lightings"} & set(look):
         said["want"] = [step for step in said["want"] if step in GIVEN] or list(GIVEN[:1])
-    if "render" not in look and "render" not in said.get("want", ()):
-        said.pop("render", None)
+    for step in ("render", "export"):
+        if step not in look and step not in said.get("want", ()):
+            said.pop(step, None)
 
 
 def _listed(said: Mapping[str, Any]) -> dict[str, Any]:

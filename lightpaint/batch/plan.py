@@ -5,17 +5,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.render import memory_needed
-from lightpaint.batch.entries import Entry, entries_of
+from lightpaint.batch.entries import Entry
 from lightpaint.batch.fingerprint import Fingerprints
 from lightpaint.batch.gallery import check_gallery
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
+from lightpaint.batch.looks import entries_of
+from lightpaint.batch.made import adjusted, made_folder
 from lightpaint.batch.manifest import Manifest, read_manifest
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
-from lightpaint.batch.task import answer_task, bases_of, render_task
+from lightpaint.batch.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.variations import varied
-from lightpaint.batch.work import Held, made_folder
+from lightpaint.batch.work import Held
 from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
@@ -23,6 +27,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import read_lighting
 from lightpaint.relit.relight import scene_of
 from lightpaint.result_folder import is_as_written
+from lightpaint.results import view_names
 from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
@@ -104,20 +109,26 @@ class _Planner:
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
 
     def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
-        """The answer, and its render if that is wanted."""
+        """The answer, and its render and what other programs get, if that is wanted."""
         how: dict[str, Any] = {"force": self._force, "command": self._command}
         tasks = [answer_task(entry, self._folders, **how)]
         made_of = [self._prints.answer(entry, reads)]
         if "render" in entry.want:
             tasks.append(render_task(entry, self._folders, **how))
             made_of.append(self._prints.render(entry))
-        is_whole = is_possible and is_as_written(self._folders[entry.name])
+        if "export" in entry.want:
+            tasks.append(export_task(entry, self._folders, **how))
+            made_of.append(self._prints.export(entry))
+        folder = self._folders[entry.name]
+        is_whole = is_possible and is_as_written(folder)
         steps = []
         for task, its in zip(tasks, made_of, strict=True):
             line = self._journal.lines.get((task.look, task.kind))
             is_done = line is not None and (line.state, line.made_of) == ("done", its)
             # What was rendered of an earlier answer went with it.
             is_whole = is_whole and is_done
+            if task.kind == "export":
+                is_whole = is_whole and is_as_written(folder / EXPORT)
             steps.append(Step(task, its, is_whole))
         return tuple(steps)
 
@@ -132,10 +143,8 @@ class _Planner:
         settings, asked = entry.settings, entry.constraints
         job = self._job(entry, scenes, basis, settings, asked)
         if entry.variation:
-            lights = _adjusted(job)
-            settings, asked = varied(
-                entry.variation, replace(settings, hold=job.fit.hold), asked, lights
-            )
+            how = replace(settings, hold=job.fit.hold)
+            settings, asked = varied(entry.variation, how, asked, adjusted(job))
             job = self._job(entry, scenes, basis, settings, asked)
         self._note_costs(entry, [view.scene for view in job.views], job.settings)
         if entry.final.resolution is not None and "render" in entry.want:
@@ -160,10 +169,14 @@ class _Planner:
 
     def _made(self, entry: Entry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         """Of a look that is made of lightings: those of files are looked at."""
-        scene: Scene | None = entry.scenes[0].content if entry.scenes else None
-        lights = entry.basis.content.lights if entry.basis is not None else None
+        scenes: list[Scene] = [file.content for file in entry.scenes]
+        scene = scenes[0] if scenes else None
+        given = None if entry.basis is None else entry.basis.content
+        groups = given if isinstance(given, LightGroups) else None
         reads: tuple[Path, ...] = () if scene is None else scene.read_files
-        if entry.basis is not None:
+        if groups is not None:
+            reads += tuple(groups.files)
+        elif entry.basis is not None:
             reads += (Path(entry.basis.path),)
         if entry.lighting:
             lighting = read_lighting(entry.lighting)
@@ -175,23 +188,28 @@ class _Planner:
                         f"{entry.lighting} has the lights {some_names(sorted(have))}, and the "
                         f"scene {some_names(sorted(want))}: load it with the same lights and groups"
                     )
-            elif lights is not None and set(lighting) != {light.name for light in lights}:
-                raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
+            elif isinstance(given, LightGroups | Basis):
+                names = (given.basis if isinstance(given, LightGroups) else given).names
+                if set(lighting) != set(names):
+                    raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
         folders = [str(self._folders[name] / "lighting.json") for name in entry.of]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
-        folder = self._folders[entry.name]
-        made_folder(folder, scene, lightings, force=self._force).check()
-        if scene is not None:
-            film = on_film(scene, entry.settings.quality, entry.settings.resolution)
-            self._note_costs(entry, [film], entry.settings)
-            if entry.final.resolution is not None and "render" in entry.want:
-                on_film(scene, None, entry.final.resolution)
+        views = view_names(scenes) if entry.by_sensor else [""]
+        how: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
+        made_folder(self._folders[entry.name], scene, lightings, **how).check()
+        settings = entry.settings
+        films = [on_film(one, settings.quality, settings.resolution) for one in scenes]
+        self._note_costs(entry, films, settings)
+        if scene is not None and entry.final.resolution is not None and "render" in entry.want:
+            on_film(scene, None, entry.final.resolution)
         return reads, ()
 
     def _note_costs(self, entry: Entry, films: Sequence[Scene | None], settings: Settings) -> None:
         """What each basis costs that is to be obtained. films: on which it is rendered."""
+        if entry.basis is not None:
+            return
         for key, film in zip(bases_of(entry), films, strict=True):
-            if film is None or entry.basis is not None or key in self.costs:
+            if film is None or key in self.costs:
                 continue
             asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
             self.costs[key] = Cost(
@@ -201,14 +219,3 @@ class _Planner:
                 film.spp if asked is None else asked,
                 memory_needed(film),
             )
-
-
-def _adjusted(job: Job) -> int:
-    """How many lights are adjusted."""
-    first = job.views[0]
-    lights: Sequence[Any] = ()
-    if first.basis is not None:
-        lights = first.basis.lights
-    elif first.scene is not None:
-        lights = first.scene.lights
-    return sum(not light.is_fixed for light in lights)

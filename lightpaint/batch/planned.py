@@ -1,6 +1,6 @@
 """What is planned: looks, their steps, what they cost."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -92,3 +92,22 @@ class Plan:
             if look.entry.name in wanted:
                 wanted |= set(look.entry.of)
         return replace(self, chosen=frozenset(wanted))
+
+
+def by_bases(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[list[Step]]:
+    """Steps together that share their bases, after all that they are made of through others."""
+    left, groups = list(steps), []
+    while left:
+        ready = {step.task.look: step.task.bases for step in left}
+        pending, waits = dict(ready), True
+        while waits:
+            waits = False
+            for look, bases in list(ready.items()):
+                made_of = [x for x in looks[look].entry.of if x in pending]
+                if any(ready.get(x) != bases for x in made_of):
+                    del ready[look]
+                    waits = True
+        for keys in dict.fromkeys(ready.values()):
+            groups.append([step for step in left if ready.get(step.task.look) == keys])
+        left = [step for step in left if step.task.look not in ready]
+    return groups

@@ -14,7 +14,7 @@ from lightpaint.basis.file import write_basis
 from lightpaint.batch.executor import Executor, InProcess, Processes
 from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.journal import Journal, Line
-from lightpaint.batch.planned import Plan, PlannedLook, Step
+from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases
 from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Done, Task
 from lightpaint.batch.work import fields_of, is_full
@@ -129,10 +129,11 @@ class _Run:
         if self._how.workers > 1:
             executor = stack.enter_context(Processes(self._how.workers))
         answers = [step for step in left if step.task.kind == "answer"]
-        for keys in dict.fromkeys(step.task.bases for step in answers):
-            self._of_bases([x for x in answers if x.task.bases == keys], executor)
+        for together in by_bases(answers, self._looks):
+            self._of_bases(together, executor)
         self._held.only(())
-        self._together([x for x in left if x.task.kind == "render"], executor)
+        for kind in ("render", "export"):
+            self._together([x for x in left if x.task.kind == kind], executor)
 
     def _of_bases(self, steps: Sequence[Step], executor: Executor) -> None:
         """Looks that share their bases; those that are made of others come after them."""

@@ -34,6 +34,8 @@ TO_LAB = np.array(
 
 def at_frame(frame: int, frames: int, keys: int) -> tuple[int, float]:
     """Between which two of `keys` lightings a frame lies, by the first, and how far, 0 to 1."""
+    if keys == 1:
+        return 0, 0.0
     position = frame * (keys - 1) / (frames - 1)
     first = min(floor(position), keys - 2)
     return first, position - first

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 from PIL import Image
 
+from lightpaint.arrays import RGB
 from lightpaint.batch.journal import Line
 from lightpaint.batch.planned import Plan, PlannedLook
-from lightpaint.batch.task import Kind
+from lightpaint.batch.task import EXPORT, Kind
 from lightpaint.colour.display import choose_exposure, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
@@ -25,6 +26,7 @@ from lightpaint.images.estimate import read_estimate
 from lightpaint.lighting.file import read_lighting
 from lightpaint.records import strict_json
 from lightpaint.relit.export.exports import plain_cell
+from lightpaint.result_folder import RECORD
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-batch 1"
@@ -57,8 +59,10 @@ class LightRow:
 
     name: str
     y: float
+    emission: RGB | None = None
     hex: str | None = None
     kelvin: float | None = None
+    duv: float | None = None
     stops: float | None = None
 
 
@@ -96,7 +100,7 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
     views: dict[str, tuple[str, float] | None] = {}
     for look in plan.looks:
         state, why = state_of(look, lines)
-        for folder in _view_folders(look):
+        for folder in view_folders(look):
             row = _row(plan, look, folder, state, why)
             # What was made of others is shown as they are.
             like = row.view or next((views[x] for x in look.entry.of if views.get(x)), None)
@@ -123,7 +127,7 @@ def _key(look: PlannedLook, lines: Mapping[tuple[str, Kind], Line]) -> str:
     return lines[look.entry.name, "answer"].made_of[:16]
 
 
-def _view_folders(look: PlannedLook) -> list[Path]:
+def view_folders(look: PlannedLook) -> list[Path]:
     """Where the pictures of each view are."""
     if not look.entry.by_sensor:
         return [look.folder]
@@ -142,6 +146,8 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) ->
     names = ("report.html", "comparison.png", "relit.png", "relit.exr", "lighting.json")
     places = dict.fromkeys((folder, look.folder))
     there = [place / x for place in places for x in names if (place / x).is_file()]
+    if any(step.task.kind == "export" for step in look.steps):
+        there += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
     return Row(
         entry.name,
         state,
@@ -168,7 +174,8 @@ def _lights(folder: Path, told: Mapping[str, Any]) -> tuple[LightRow, ...]:
         for light in lighting.lights:
             seen = lighting.photometry(light)
             stops = (told.get("lights") or {}).get(light.name, {}).get("stops")
-            rows.append(LightRow(light.name, seen.y, seen.hex, seen.kelvin, stops))
+            told_ = (light.emission, seen.hex, seen.kelvin, seen.duv, stops)
+            rows.append(LightRow(light.name, seen.y, *told_))
         return tuple(rows)
     return ()
 
@@ -197,9 +204,13 @@ def _with_picture(
             transform = ViewTransform(*view) if view else ViewTransform("srgb", stops)
             with replacing(path) as beside:
                 shown = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
-                shown.save(beside, "JPEG", quality=QUALITY, subsampling=0)
+                how = {"quality": QUALITY, "subsampling": 0}
+                shown.save(beside, "JPEG", **how, comment=f"{transform.name} {transform.stops!r}")
         with Image.open(path) as opened:
-            size = opened.size
+            size, comment = opened.size, opened.info.get("comment", b"").decode()
+        # What it is seen through, chosen here or not, a mixer needs as well.
+        seen, _, stops = comment.partition(" ")
+        view = (seen, float(stops)) if stops else view
         return Row(**{**vars(row), "picture": name, "size": size, "view": view})
     return row
 

@@ -7,17 +7,20 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lightpaint.batch.entries import Entry
-from lightpaint.batch.keys import Final, Space
+from lightpaint.batch.keys import Final, Handover, Space
 from lightpaint.batch.variations import SHIFTED
 from lightpaint.errors import BatchError
 from lightpaint.records import read_record, strict_json
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, SceneFile, to_json
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile, to_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
 
-#: The answer, and its final render.
-Kind = Literal["answer", "render"]
+#: The answer, its final render, and what other programs get of it.
+Kind = Literal["answer", "render", "export"]
+
+#: Where the last goes, in the folder of the look.
+EXPORT = "export"
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,8 @@ class Task:
 
     look: name. kind: step. job: as `Job.to_json` writes it; of an answer that is made of others
     without a target. lightings: files that it is made of; share, space: between two of them;
-    mireds: how much warmer. final: how it is rendered. bases: keys of what it is solved with, and
+    mireds: how much warmer. final: how it is rendered. handover: what other
+    programs get. bases: keys of what it is solved with, and
     files where that is kept, "" where it is to be obtained.
     """
 
@@ -38,6 +42,7 @@ class Task:
     space: Space = "log"
     mireds: float = 0.0
     final: Final = field(default_factory=Final)
+    handover: Handover = field(default_factory=Handover)
     bases: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     format: Literal["lightpaint-task 1"] = FORMAT
@@ -96,6 +101,7 @@ def answer_task(entry: Entry, folders: Mapping[str, Path], *, force: bool, comma
         entry.space,
         SHIFTED.get(entry.variation, 0.0),
         entry.final,
+        entry.handover,
         bases_of(entry),
         ("",) * len(bases_of(entry)),
     )
@@ -108,6 +114,13 @@ def render_task(entry: Entry, folders: Mapping[str, Path], *, force: bool, comma
     return Task(entry.name, "render", answer.job, (lighting,), final=entry.final)
 
 
+def export_task(entry: Entry, folders: Mapping[str, Path], *, force: bool, command: str) -> Task:
+    """What other programs get of a look."""
+    answer = answer_task(entry, folders, force=force, command=command)
+    lighting = str(folders[entry.name] / "lighting.json")
+    return Task(entry.name, "export", answer.job, (lighting,), handover=entry.handover)
+
+
 def bases_of(entry: Entry) -> tuple[str, ...]:
     """The key of each basis that a look is solved with: equal keys, equal bases."""
     if entry.basis is not None:
@@ -115,9 +128,9 @@ def bases_of(entry: Entry) -> tuple[str, ...]:
     return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
 
 
-def key_of_basis(basis: BasisFile) -> str:
-    """Of a saved one."""
-    return json.dumps({"basis": basis.path})
+def key_of_basis(basis: BasisFile | GroupsFile) -> str:
+    """Of a saved one, or of light groups."""
+    return json.dumps({"basis": asdict(basis)})
 
 
 def key_of_scene(scene: SceneFile, settings: Settings) -> str:

@@ -1,6 +1,6 @@
 """Named variations of a look: one word, and what it changes."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from math import ceil
 
@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.photometry import photometry
+from lightpaint.errors import BatchError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.lighting.lighting import Lighting
@@ -31,6 +32,18 @@ WARMEST, COOLEST = 2000.0, 15000.0
 
 #: Colour temperature of what has none of its own, in kelvin.
 NEUTRAL = 6504.0
+
+
+def words_of(given: Iterable[str]) -> tuple[str, ...]:
+    """Variations by their words, each once; hyphens may stand for spaces.
+
+    Raises BatchError for a word that is none.
+    """
+    words = dict.fromkeys(word.replace("-", " ") for word in given)
+    if unknown := [word for word in words if word not in VARIATIONS]:
+        known = ", ".join(word.replace(" ", "-") for word in VARIATIONS)
+        raise BatchError(f"there is no variation {unknown[0]!r}: known are {known}")
+    return tuple(words)
 
 
 def varied(

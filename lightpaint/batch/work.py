@@ -2,32 +2,35 @@
 
 import errno
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
+from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.keys import Space
+from lightpaint.batch.made import dimmed, leave_made, made_folder
+from lightpaint.batch.planes import keep_planes
 from lightpaint.batch.sequence import between
-from lightpaint.batch.task import Done, Task, key_of_basis, key_of_scene
+from lightpaint.batch.task import EXPORT, Done, Task, key_of_basis, key_of_scene
 from lightpaint.batch.variations import shifted
 from lightpaint.errors import LightpaintError
-from lightpaint.files import first_line, one_line
+from lightpaint.files import first_line, one_line, write_text
 from lightpaint.job import Job
-from lightpaint.lighting.file import read_lighting, write_lighting
-from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline import obtain, run
 from lightpaint.progress import Listener
-from lightpaint.relit.relight import check_relightable, relight, settle
+from lightpaint.relit.forms import Source, names_of_forms, writer_of
 from lightpaint.renders import relight_look, relit_folder
 from lightpaint.result_folder import ResultFolder
-from lightpaint.results import write_predicted
+from lightpaint.results import view_names
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, SceneFile, from_json
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile, content, from_json
 
 #: What the system says of a disk that takes no more.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -41,16 +44,18 @@ class Held:
 
     def __init__(self) -> None:
         self._scenes: dict[str, SceneFile] = {}
-        self._saved: dict[str, BasisFile] = {}
+        self._saved: dict[str, BasisFile | GroupsFile] = {}
         self._bases: dict[str, Basis] = {}
+        #: Keys of bases whose planes lie beside the looks.
+        self.kept: set[str] = set()
 
     def scene(self, given: SceneFile) -> SceneFile:
         """The one that equals `given`, and is loaded by and by."""
         return self._scenes.setdefault(repr(given), given)
 
-    def saved(self, given: BasisFile) -> BasisFile:
+    def saved(self, given: BasisFile | GroupsFile) -> BasisFile | GroupsFile:
         """The one of the same file, which is read by and by."""
-        return self._saved.setdefault(given.path, given)
+        return self._saved.setdefault(repr(given), given)
 
     def basis(self, scene: Scene, key: str, settings: Settings, listen: Listener) -> Basis:
         """That of `scene` on its film: held, kept or rendered. key: `key_of_scene`."""
@@ -74,7 +79,8 @@ def do(task: Task, held: Held, listen: Listener) -> Done:
     begun = time.perf_counter()
     failure, full = "", False
     try:
-        (_answer if task.kind == "answer" else _render)(task, held, listen)
+        does = {"answer": _answer, "render": _render, "export": _export}
+        does[task.kind](task, held, listen)
     except LightpaintError as error:
         failure, full = str(error), is_full(error)
     except MemoryError:
@@ -102,7 +108,7 @@ def fields_of(task: Task, held: Held) -> dict[str, Any]:
     """Those of the task's job, with scenes and basis shared."""
     fields = from_json(task.job)
     fields["scenes"] = tuple(map(held.scene, fields["scenes"]))
-    if isinstance(fields["basis"], BasisFile):
+    if isinstance(fields["basis"], BasisFile | GroupsFile):
         fields["basis"] = held.saved(fields["basis"])
     return fields
 
@@ -122,37 +128,43 @@ def _answer(task: Task, held: Held, listen: Listener) -> None:
             for view, file in zip(job.views, fields["scenes"], strict=True)
             if view.scene is not None
         ]
-    run(job, listen, bases=bases)
+    run(job, listen, bases=None if bases is None else list(bases))
+    if bases is None:
+        bases = [view.basis for view in job.views if view.basis is not None]
+    _keep_planes(task, job.folder, bases, held)
 
 
 def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> None:
     """An answer that is made of others: a lighting as it is, warmer, or between two."""
     settings: Settings = fields["settings"]
-    scene: Scene | None = None
-    if fields["scenes"]:
-        [file] = fields["scenes"]
-        scene = file.content
-    if fields["basis"] is not None:
-        basis = fields["basis"].content
-    else:
-        assert scene is not None
-        film = on_film(scene, settings.quality, settings.resolution)
-        basis = held.basis(film, task.bases[0], settings, listen)
-    lighting = made_of(task.lightings, basis, share=task.share, space=task.space)
+    scenes: list[Scene] = [file.content for file in fields["scenes"]]
+    given = content(fields["basis"])
+    groups = given if isinstance(given, LightGroups) else None
+    bases: list[Basis] = [given if groups is None else groups.basis]
+    if given is None:
+        films = [on_film(scene, settings.quality, settings.resolution) for scene in scenes]
+        bases = [
+            held.basis(film, key, settings, listen)
+            for film, key in zip(films, task.bases, strict=True)
+        ]
+    lighting = made_of(task.lightings, bases[0], share=task.share, space=task.space)
     if task.mireds:
-        dimmed = {light.name for light in basis.lights if light.is_scalar}
-        lighting = shifted(lighting, task.mireds, dimmed)
+        lighting = shifted(lighting, task.mireds, dimmed(bases[0]))
     lighting = replace(lighting.named(task.look), cd_per_unit=settings.cd_per_unit)
-    results = made_folder(fields["folder"], scene, task.lightings, force=settings.force)
-    results.check()
-    with results.filled() as folder:
-        write_lighting(folder / "lighting.json", lighting)
-        predicted = combine(basis, lighting)
-        spp = settings.spp or basis.origin.spp
-        write_predicted(folder / "predicted.exr", predicted, origin=basis.origin, spp=spp)
-        if scene is not None:
-            relight(scene, lighting, folder / "relit.xml")
-            settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")
+    views = view_names(scenes) if fields["by_sensor"] else [""]
+    scene = scenes[0] if scenes else None
+    how: dict[str, Any] = {"views": views, "groups": groups}
+    results = made_folder(fields["folder"], scene, task.lightings, **how, force=settings.force)
+    leave_made(results, lighting, bases, **how, scene=scene, spp=settings.spp)
+    _keep_planes(task, fields["folder"], bases, held)
+
+
+def _keep_planes(task: Task, folder: Path, bases: Sequence[Basis], held: Held) -> None:
+    """What the gallery needs of the bases of a look, once in a process. folder: of the look."""
+    for key, basis in zip(task.bases, bases, strict=True):
+        if key not in held.kept:
+            keep_planes(folder.parent, key, basis)
+            held.kept.add(key)
 
 
 def made_of(files: tuple[str, ...], basis: Basis, *, share: float, space: Space) -> Lighting:
@@ -161,19 +173,6 @@ def made_of(files: tuple[str, ...], basis: Basis, *, share: float, space: Space)
     lighting = lightings[0] if len(lightings) == 1 else between(lightings, share, space=space)
     lighting.weights_for(basis)
     return lighting
-
-
-def made_folder(
-    folder: Path, scene: Scene | None, lightings: tuple[str, ...], *, force: bool
-) -> ResultFolder:
-    """Where an answer goes that is made of others."""
-    reads = tuple(map(Path, lightings))
-    files = [folder / "lighting.json", folder / "predicted.exr"]
-    if scene is not None:
-        files += check_relightable(scene, folder / "relit.xml")
-        reads += scene.read_files
-    answers = tuple(map(Path, lightings))
-    return ResultFolder(folder, tuple(files), reads, answers, force=force)
 
 
 def _render(task: Task, held: Held, listen: Listener) -> None:
@@ -188,3 +187,24 @@ def _render(task: Task, held: Held, listen: Listener) -> None:
     relight_look(
         fields["scenes"][0].content, read_lighting(lighting), results, progress=listen, **how
     )
+
+
+def _export(task: Task, held: Held, listen: Listener) -> None:
+    """What other programs get of a look that is answered."""
+    fields = fields_of(task, held)
+    lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT
+    given = content(fields["basis"])
+    source = Source(
+        fields["scenes"][0].content if fields["scenes"] else None,
+        given if isinstance(given, LightGroups) else None,
+        Path(task.handover.stage) if task.handover.stage else None,
+    )
+    names = names_of_forms(task.handover.to, source)
+    files, reads = tuple(folder / name for name in names.values()), (lighting, *source.files)
+    force = fields["settings"].force
+    results = ResultFolder(folder, files, reads, (lighting,), force=force)
+    results.check()
+    answer = read_lighting(lighting)
+    with results.filled() as stage:
+        for form, name in names.items():
+            write_text(stage / name, writer_of(form, answer, source, folder, listen)())

@@ -7,12 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.file import write_basis
-from lightpaint.batch.gallery import FILES, spoken_counts
-from lightpaint.batch.plan import ALONE
-from lightpaint.batch.solved import write_gallery_of
-from lightpaint.batch.work import is_full
 from lightpaint.cli import documents, tables, terminal
-from lightpaint.cli.answer import Table, show_look, spoken_settings
 from lightpaint.cli.batch import batch as batch
 from lightpaint.cli.export import export as export
 from lightpaint.cli.listing import lights as lights
@@ -20,17 +15,16 @@ from lightpaint.cli.listing import note_scene
 from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.cli.painter import paint as paint
+from lightpaint.cli.solving import solve as solve
 from lightpaint.cli.upkeep import cache as cache
 from lightpaint.cli.upkeep import doctor as doctor
-from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
-from lightpaint.pipeline import obtain, run
-from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.pipeline import obtain
 from lightpaint.relit.relight import scene_of
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.renders import (
@@ -44,14 +38,10 @@ from lightpaint.results import result_folders, verify_result
 from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
-from lightpaint.screen import some_of
 from lightpaint.settings import Settings
 from lightpaint.sources import Painting, SceneFile
 from lightpaint.staging import finish
 from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
-
-#: Of an answer of which nothing is asked.
-ANY = Wanted()
 
 
 def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
@@ -136,64 +126,6 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
     terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
     about = {"scene": str(made.scene), "painting": str(made.painting), "command": command}
     return replace(solved, told=lambda: about | solved.told())
-
-
-def solve(
-    *,
-    jobs: Sequence[Job],
-    table: Table = "short",
-    wanted: Wanted = ANY,
-    failed: dict[str, str] | None = None,
-    together: Path | None = None,
-    keep_going: bool = False,
-) -> Outcome:
-    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`
-
-    failed: names of those that cannot be done, and why. together: folder of a gallery of all.
-    """
-    listen, obtained = terminal.Listener(), None
-    results, shortfalls, failed = [], [], failed or {}
-    # Those of all before the first is run, which says its own again: once is enough.
-    for remark in (remark for job in jobs for remark in job.remarks):
-        listen.say(remark)
-    for job in jobs:
-        listen.note(f"files read; {spoken_settings(job.fit)}")
-        try:
-            with listen:
-                looks = run(job, listen, bases=None if obtained is None else list(obtained))
-        except ALONE as error:
-            if not keep_going or is_full(error):
-                raise
-            failed[job.folder.name] = str(error)
-            continue
-        # Several paintings of one scene share its basis.
-        obtained = [look.basis for look in looks]
-        for view, look in zip(job.views, looks, strict=True):
-            results.append((job, view, look))
-            shortfalls += [f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.seen)]
-            if job.by_sensor:
-                terminal.write("")
-                terminal.write(f"{look.basis.origin.sensor}:")
-            show_look(look, view.folder, table=table)
-            if look.suggestions is not None:
-                tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
-        if job.groups is not None:
-            there = ", ".join(name for name in EXPORTS if (job.folder / name).is_file())
-            terminal.write(f"for other programs: {there}")
-    for name, why in failed.items():
-        terminal.complain("solve", f"{name}: {why}")
-    if together is not None:
-        names = [*(job.folder.name for job in jobs), *failed]
-        rows = write_gallery_of(together, list(dict.fromkeys(names)), failed)
-        terminal.write(f"{together / FILES[0]}: {spoken_counts(rows)}")
-    if jobs and not jobs[0].scenes and jobs[0].groups is None:
-        terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
-    if shortfalls:
-        terminal.complain("solve", some_of(shortfalls, joint="; "))
-    return Outcome(
-        lambda: {"results": [documents.result_document(*x, wanted) for x in results]},
-        1 if shortfalls or failed else 0,
-    )
 
 
 def relight(

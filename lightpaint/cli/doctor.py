@@ -42,6 +42,7 @@ def examine(variant: str | None = None) -> list[Finding]:
     findings += [_package(name) for name in PACKAGES]
     findings.append(_denoiser())
     findings.append(_extra("OpenColorIO", "opencolorio", "ocio"))
+    findings.append(_extra("USD", "usd-core", "usd"))
     findings.append(_extra("painter", "uvicorn", "paint"))
     findings.append(_extra("painter in notebooks", "anywidget", "notebook"))
     findings.append(_extra("shell completion", "argcomplete", "completion"))

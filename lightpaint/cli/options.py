@@ -62,16 +62,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             output = output or Path("lightpaint-demo")
             return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
-            wanted = Wanted(options.max_miss, options.min_fit)
-            failed: dict[str, str] = {}
-            jobs = jobs_of(options, settings, failed)
-            together = None if len(options.targets) < 2 else output
-            if together is not None:
-                from lightpaint.batch.gallery import check_gallery
-
-                check_gallery(together, force=options.force)
-            how = {"failed": failed, "together": together, "keep_going": options.keep_going}
-            return {"jobs": jobs, "table": options.table, "wanted": wanted, **how}
+            return _to_solve(options, settings)
         case "batch":
             return _to_do(options)
         case "export":
@@ -80,6 +71,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
                 "to": options.to,
                 "scene": _scene_to_export(options),
                 "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
+                "stage": Path(options.stage) if options.stage else None,
                 "output": output,
                 "force": options.force,
             }
@@ -165,10 +157,16 @@ def jobs_of(
             raise TargetError("-s cannot be used with --target, which names the sensors")
         scenes = tuple(scene_of(options, sensor=sensor) for sensor, _ in options.views)
         folder = Path(options.output or Path(paths[0]).stem)
+        if options.output and options.variations:
+            folder /= Path(paths[0]).stem
         return [Job(scenes, tuple(paintings), folder, None, asked, settings, by_sensor=True)]
     # One scene, which is loaded once for all.
     source = () if basis is not None else (scene_of(options),)
-    folders = folders_of(options.output and Path(options.output), [Path(p).stem for p in paths])
+    output = options.output and Path(options.output)
+    names = [Path(path).stem for path in paths]
+    # With its variations beside it, one painting is several looks.
+    is_several = bool(options.variations) and len(names) == 1 and output
+    folders = [output / names[0]] if is_several else folders_of(output, names)
     jobs = []
     for painting, folder in zip(paintings, folders, strict=True):
         try:
@@ -181,6 +179,27 @@ def jobs_of(
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
+    """What `solve` is asked for, with a gallery where it is of several looks."""
+    from lightpaint.batch.variations import words_of
+    from lightpaint.cli.several import several_of
+
+    failed: dict[str, str] = {}
+    words = words_of(options.variations)
+    jobs, several = several_of(
+        jobs_of(options, settings, failed),
+        words,
+        failed,
+        is_shown=len(options.targets) > 1 or bool(words),
+        output=Path(options.output) if options.output else None,
+        keep_going=options.keep_going,
+        force=options.force,
+    )
+    wanted = Wanted(options.max_miss, options.min_fit)
+    how = {"table": options.table, "wanted": wanted, "failed": failed, "several": several}
+    return {"jobs": jobs, **how}
 
 
 def _scene_to_export(options: Namespace) -> SceneFile | None:

@@ -28,6 +28,7 @@ from lightpaint.cli.solve_options import (
     add_paintings,
     add_pattern,
     add_several,
+    add_variations,
     add_wanted,
 )
 from lightpaint.version import __version__
@@ -117,6 +118,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         "with their radiometry, and how sure they are (default: %(default)s)",
     )
     add_several(parser)
+    add_variations(parser)
     add_method(parser)
     add_wanted(parser)
     add_unit(parser)
@@ -227,10 +229,10 @@ def _export(parser: argparse.ArgumentParser) -> None:
         type=arguments.names_of,
         action="extend",
         required=True,
-        metavar="csv,json,mitsuba,blender,nuke",
+        metavar="csv,json,mitsuba,usd,blender,nuke",
         help="one or several. csv, json: fixtures with colour, kelvin, lumen and DMX; mitsuba: a "
-        "patch of the scene's XML; blender: Python that sets lights by their names; nuke: a script "
-        "that multiplies light groups",
+        "patch of the scene's XML; usd: a layer that overrides lights of a stage; blender: Python "
+        "that sets lights by their names; nuke: a script that multiplies light groups",
     )
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--scene", metavar="SCENE.xml", help="scene that it was solved for")
@@ -241,6 +243,12 @@ def _export(parser: argparse.ArgumentParser) -> None:
         help="light groups of another renderer that it was solved from, or a folder of them",
     )
     add_pattern(parser)
+    parser.add_argument(
+        "--stage",
+        metavar="FILE.usd",
+        help="of usd: the stage whose lights, by the names they have in the scene, are overridden "
+        "(default: prims below /lights)",
+    )
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
     add_force(parser)

@@ -7,6 +7,9 @@ from typing import Any
 from lightpaint.cli import arguments
 from lightpaint.cli.option_groups import add_view_transform
 
+#: Variations, as they are typed.
+VARIATIONS = "warmer,cooler,fewer-lights,white-only,held-harder"
+
 
 def add_paintings(parser: argparse.ArgumentParser) -> None:
     """What was painted, of one view or several."""
@@ -157,6 +160,18 @@ def add_several(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="of several paintings: one that cannot be read or answered fails alone, the others go "
         "on, and the exit code is 1 (default: all are checked first, and nothing is begun)",
+    )
+
+
+def add_variations(parser: argparse.ArgumentParser) -> None:
+    """Siblings of each answer."""
+    parser.add_argument(
+        "--variations",
+        type=arguments.names_of,
+        action="extend",
+        default=[],
+        metavar=VARIATIONS,
+        help="one or several: siblings of each answer, in folders beside it",
     )
 
 

@@ -10,6 +10,8 @@ from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.relight import relit_files, scene_of, settings_of
 from lightpaint.relit.xml_edit import tag
+from lightpaint.scene.emission import Scaling
+from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.scene import Scene
 
 #: A folder that is not there, and stands for wherever the relit scene might be.
@@ -48,12 +50,20 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
 
 
 def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
-    """Name, Mitsuba's parameter and emission of every emitter that is adjusted."""
+    """Name, Mitsuba's parameter and emission of every emitter that is adjusted.
+
+    The parameter is "" where the emission is a multiple of what the scene has, as of a sky.
+    """
     tied = scene_of(scene, lighting)
     return [
-        (emitter.name, "" if emitter.kind is None else emitter.kind.parameter, rgb)
+        (emitter.name, _quantity(emitter), rgb)
         for emitter, rgb in settings_of(tied, lighting.emission)
     ]
+
+
+def _quantity(emitter: Emitter) -> str:
+    kind = emitter.kind
+    return kind.parameter if kind is not None and kind.scaling is Scaling.COLOUR else ""
 
 
 def _lines(text: str) -> list[str]:

@@ -7,13 +7,15 @@ a mixer in any browser, offline.
 
 import base64
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.basis.clean import CleanPlanes
 from lightpaint.browser import bundled, styles
 from lightpaint.colour.color import kelvin_to_rgb
@@ -76,13 +78,13 @@ def mixer_html(
     transform = transform or ViewTransform()
     data = {
         "size": list(pictures[0].shape[:2]),
-        "planes": side_by_side(lambda picture: _written(compact(picture)), pictures),
+        "planes": side_by_side(told_plane, pictures),
         "lights": [_light(basis, lighting, k) for k in shown],
         "rest": _rest(basis, lighting, shown),
-        "kelvins": _kelvins(),
-        "transform": _transform(transform),
+        "kelvins": kelvins(),
+        "transform": told_transform(transform),
         "painting": None if painting is None else _painting(painting, basis, len(pictures)),
-        "lighting": _file(lighting),
+        "lighting": told_file(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
     # In a script nothing is escaped, and only `<` can end it.
@@ -121,19 +123,32 @@ def _pictures(
 ) -> list[Floats]:
     """Of each light its plane; then all others, as they are in the answer and at present."""
     rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    factor = _factor(basis, len(shown) + 2 * bool(rest.size))
     looks = [lighting.weights_for(basis), basis.present_weights] if rest.size else []
     looks = [np.where(np.isin(np.arange(len(x)), rest)[:, None], x, 0) for x in looks]
+    makes: list[Callable[[], Floats]] = [partial(plane_of, basis, planes, k) for k in shown]
+    makes += [partial((planes or basis).mix, its) for its in looks]
+    return small_planes(basis, makes, is_noisy=is_clean and planes is None)
 
-    def small(k: int) -> Floats:
-        if k < len(shown):
-            plane = planes.plane(shown[k]) if planes else basis.images[shown[k]]
-        else:
-            plane = (planes or basis).mix(looks[k - len(shown)])
-        return np.asarray(block_mean(plane, factor), np.float32)
 
-    pictures = side_by_side(small, range(len(shown) + len(looks)))
-    if not is_clean or planes or factor >= ENOUGH:
+def plane_of(basis: Basis, planes: CleanPlanes | None, k: int) -> Floats:
+    """What light k does, (h, w, 3), without its grain where that is known."""
+    return planes.plane(k) if planes else np.asarray(basis.images[k])
+
+
+def small_planes(
+    basis: Basis, makes: Sequence[Callable[[], Floats]], *, is_noisy: bool
+) -> list[Floats]:
+    """Pictures of a basis as small as a page takes them.
+
+    makes: what makes each, (h, w, 3). is_noisy: whether they are to be denoised.
+    """
+    factor = _factor(basis, len(makes))
+
+    def small(make: Callable[[], Floats]) -> Floats:
+        return np.asarray(block_mean(make(), factor), np.float32)
+
+    pictures = side_by_side(small, makes)
+    if not is_noisy or factor >= ENOUGH:
         return pictures
     features = basis.features and basis.features.reduced(factor)
     return [denoised(picture, features) for picture in pictures]
@@ -143,12 +158,19 @@ def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:
     light = basis.lights[k]
     looks = {"present": light.emission, "answer": lighting[light.name].emission}
     return {
+        **told_light(light),
+        **{look: [float(x) for x in emission] for look, emission in looks.items()},
+        "kelvin": {look: _kelvin(emission, light.unit) for look, emission in looks.items()},
+    }
+
+
+def told_light(light: BasisLight) -> dict[str, Any]:
+    """A light for the page, whatever it is set to."""
+    return {
         "name": light.name,
         "unit": light.unit,
         "isFixed": light.is_fixed,
         "isScalar": light.is_scalar,
-        **{look: [float(x) for x in emission] for look, emission in looks.items()},
-        "kelvin": {look: _kelvin(emission, light.unit) for look, emission in looks.items()},
     }
 
 
@@ -173,7 +195,8 @@ def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | 
     }
 
 
-def _kelvins() -> list[Any]:
+def kelvins() -> list[Any]:
+    """Colours of luminance 1 by temperature, for the sliders."""
     mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
     return [
         [float(1e6 / mired), [round(float(x), 6) for x in kelvin_to_rgb(float(1e6 / mired))]]
@@ -181,7 +204,7 @@ def _kelvins() -> list[Any]:
     ]
 
 
-def _transform(transform: ViewTransform) -> dict[str, Any]:
+def told_transform(transform: ViewTransform) -> dict[str, Any]:
     """A transform for the page: sRGB it knows; else a curve, or where channels mix a lattice."""
     about: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
     plain = ViewTransform(transform.name)
@@ -199,12 +222,17 @@ def _painting(painting: Floats, basis: Basis, count: int) -> str:
     return data_uri(to_8_bit(np.clip(small, 0, 1)))
 
 
+def told_plane(picture: Floats) -> dict[str, Any]:
+    """A picture of light, (h, w, 3), for the page."""
+    return _written(compact(picture))
+
+
 def _written(its: Compact) -> dict[str, Any]:
     data = "data:;base64," + base64.b64encode(its.data).decode("ascii")
     return {"data": data, "scale": its.scale, "dropped": its.dropped, "size": list(its.size)}
 
 
-def _file(lighting: Lighting) -> dict[str, Any]:
+def told_file(lighting: Lighting) -> dict[str, Any]:
     """The answer's file without what is said of the answer alone."""
     lights = tuple(
         replace(

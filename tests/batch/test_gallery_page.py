@@ -1,15 +1,24 @@
-"""The gallery in a browser: failures first, filter, order, two looks under a border, the table."""
+"""The gallery in a browser: failures first, filter, order, two under a border, lights, mixer."""
 
+import json
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from batches import NAMES, run_all, write_batch
+from accessible import axe_source
+from batches import NAMES, run_all, small_basis, write_batch
+from command import succeed
 
 from lightpaint.batch.gallery import gallery_page
+from lightpaint.batch.planes import keep_planes, planes_name, read_planes
 from lightpaint.batch.summary import LightRow, Row
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.lighting.file import read_lighting
 
 
 @pytest.fixture(scope="module")
@@ -38,54 +47,215 @@ def page(browser: Any) -> Iterator[Any]:
     assert said == []
 
 
+@pytest.fixture(scope="module")
+def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a batch of three lights."""
+    here = tmp_path_factory.mktemp("batch")
+    run_all(str(write_batch(here)), str(here / "out"))
+    return here / "out"
+
+
 def _names(page: Any) -> list[str]:
     return list(page.locator("#cards .name").all_text_contents())
 
 
-def test_two_looks_under_a_border(page: Any, tmp_path: Path) -> None:
-    run_all(str(write_batch(tmp_path)), str(tmp_path / "out"))
-    page.goto((tmp_path / "out" / "index.html").as_uri())
+def test_two_looks_under_a_border(page: Any, batch: Path) -> None:
+    page.goto((batch / "index.html").as_uri())
     assert _names(page) == NAMES
     assert page.locator("#wipe").is_hidden()
     page.get_by_label("p0 as A", exact=True).click()
+    assert page.locator("#wipe").is_hidden()
+    assert page.locator("#tray").is_visible()
     page.get_by_label("dusk-1 as B", exact=True).click()
-    assert page.locator("#wipe").is_visible()
+    page.locator("#wipe").wait_for()
     assert page.locator(".stage span").all_text_contents() == ["p0", "dusk-1"]
-    shown = page.locator(".stage img").evaluate_all("all => all.map((x) => x.naturalWidth)")
-    assert min(shown) > 0
+    page.wait_for_function(
+        "[...document.querySelectorAll('.stage img')].every(x => x.naturalWidth)"
+    )
     page.locator("#slide").fill("25")
     assert page.locator(".stage").evaluate("x => x.style.getPropertyValue('--p')") == "25%"
+    # The lights of both, with what changes, those that change most first.
+    changes = page.locator("#beside-body td:last-child").all_text_contents()
+    sizes = [abs(float(x.replace("−", "-"))) for x in changes]
+    assert sizes == sorted(sizes, reverse=True)
+    page.get_by_text("Swap").click()
+    assert page.locator(".stage span").all_text_contents() == ["dusk-1", "p0"]
+    page.get_by_label("The next look").click()
+    assert page.locator(".stage span").all_text_contents() == ["dusk-1", "p1"]
+    page.keyboard.press("Escape")
+    page.locator("#wipe").wait_for(state="hidden")
     page.get_by_label("p1 as A", exact=True).click()
     assert page.locator("[data-side=a][aria-pressed=true]").count() == 1
-    # Links lead to what is there, and the table has a row for each look.
-    links = page.locator("#cards a").evaluate_all("all => all.map((x) => x.href)")
+
+
+def test_one_look_large(page: Any, batch: Path) -> None:
+    page.goto((batch / "index.html").as_uri())
+    page.get_by_label("Look at third", exact=True).click()
+    page.locator("#wipe").wait_for()
+    assert page.locator("#slide").is_hidden()
+    assert page.locator("#beside-body tr").count() == 3
+    page.keyboard.press("ArrowRight")
+    assert page.locator("#pair").text_content() == "dusk-0"
+    page.get_by_text("Close").click()
+    page.locator("#tray").wait_for(state="hidden")
+
+
+def test_links_lead_to_what_is_there_and_lights_to_each_look(page: Any, batch: Path) -> None:
+    page.goto((batch / "index.html").as_uri())
+    links = page.locator("a").evaluate_all("all => all.map((x) => x.href)")
+    assert len(links) > len(NAMES)
     assert all(Path(link.removeprefix("file://")).is_file() for link in links)
+    page.get_by_role("tab", name="Lights").click()
     assert page.locator("#lights tbody tr").count() == len(NAMES)
-    assert page.locator("#lights thead th").all_text_contents()[1:] == [
-        "lamp 0",
-        "lamp 1",
-        "lamp 2",
-    ]
+    heads = page.locator("#lights thead th").all_text_contents()
+    assert heads == ["look", "lamp 0", "lamp 1", "lamp 2"]
+    page.locator("#filter").fill("dusk")
+    assert page.locator("#lights tbody th").all_text_contents() == ["dusk-0", "dusk-1", "dusk-2"]
 
 
-def test_a_thousand_looks_are_filtered_and_ordered(page: Any, tmp_path: Path) -> None:
-    lights = (LightRow("<b>key", 0.0), LightRow("fill", 2.5, "#ff8800", stops=-1.25))
+def pixels(page: Any) -> Any:
+    """Codes truly on the canvas of the mix, (h, w, 3)."""
+    h, w, flat = page.evaluate(
+        """async () => {
+          for (let k = 0; k < 3; k++) await new Promise(requestAnimationFrame)
+          const canvas = document.querySelector('.mixer:not([hidden]) .mixer-mix')
+          const { width, height } = canvas
+          const data = canvas.getContext('2d').getImageData(0, 0, width, height).data
+          return [height, width, [...data]]
+        }"""
+    )
+    return np.array(flat, np.int16).reshape(h, w, 4)[..., :3]
+
+
+def test_every_look_can_be_mixed_from_planes_that_are_there_once(page: Any, batch: Path) -> None:
+    page.goto((batch / "index.html").as_uri())
+    basis = small_basis()
+    assert page.locator(".mixer").count() == 1
+    for name in ("p1", "dusk-1", "p0-warmer"):
+        page.locator(".card", has=page.get_by_text(name, exact=True)).get_by_label(
+            f"Mix the lights of {name}", exact=True
+        ).click()
+        page.locator(".mixer:not([hidden]) .mixer-body").wait_for()
+        assert page.locator("#from option:checked").text_content() == name
+        weights = read_lighting(batch / name / "lighting.json").weights_for(basis)
+        wanted = to_8_bit(ViewTransform().encode(basis.mix(weights)))
+        # Until what has begun is drawn: another look's picture is far off.
+        page.wait_for_function("document.querySelectorAll('.mixer-light').length === 3")
+        for _ in range(50):
+            off = np.abs(pixels(page) - wanted.astype(np.int16))
+            if off.max() <= 2:
+                break
+            page.wait_for_timeout(100)
+        assert off.max() <= 2  # a code of rounding of the planes, and of their sum
+        page.get_by_role("tab", name="Looks").click()
+
+
+def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Path) -> None:
+    few = small_basis()
+    lights = tuple(replace(few.lights[0], name=f"lamp {k}") for k in range(60))
+    images = np.repeat(few.images, 20, 0)
+    made = replace(few, lights=lights, images=images, half_differences=0 * images)
+    key = '{"view": 0}'
+    keep_planes(tmp_path, key, made)
+    run_all(str(write_batch(tmp_path)), str(tmp_path / "out"))
+    (tmp_path / "many").mkdir()
+    text = (tmp_path / "out" / "p0" / "lighting.json").read_text(encoding="utf-8")
+    (tmp_path / "many" / "lighting.json").write_text(text, encoding="utf-8")
+    told = tuple(
+        LightRow(light.name, 0.0 if k < 20 else 1.0, (1.0, 1.0, 1.0))
+        for k, light in enumerate(lights)
+    )
+    rows = [Row("many", "done", "", "many", lights=told)]
+    name = planes_name(tmp_path, key)
+    page_text = gallery_page(tmp_path, "many", rows, {"many": name})
+    (tmp_path / "index.html").write_text(page_text, encoding="utf-8")
+    page.goto((tmp_path / "index.html").as_uri())
+    page.get_by_role("tab", name="Mixer").click()
+    page.locator(".mixer-light").first.wait_for()
+    assert page.locator(".mixer-light").count() == 40
+    assert page.locator(".mixer-name").first.text_content() == "lamp 20"
+
+
+def test_planes_are_written_once_and_follow_their_basis(tmp_path: Path) -> None:
+    basis, key = small_basis(), json.dumps({"basis": {"path": f"{tmp_path}/b.basis.exr"}})
+    path = tmp_path / "out" / "thumbnails" / f"{planes_name(tmp_path / 'out', key)}.planes.json"
+    keep_planes(tmp_path / "out", key, basis)
+    told, before = read_planes(path), path.stat().st_ino
+    assert [x["name"] for x in told["lights"]] == list(basis.names)
+    keep_planes(tmp_path / "out", key, basis)
+    assert path.stat().st_ino == before
+    keep_planes(tmp_path / "out", key, small_basis(seed=1))
+    assert read_planes(path)["planes"] != told["planes"]
+    # Found again where all of it was moved.
+    other = json.dumps({"basis": {"path": f"{tmp_path}/there/b.basis.exr"}})
+    assert planes_name(tmp_path / "there" / "out", other) == path.name.split(".")[0]
+    assert read_planes(tmp_path / "none") == {}
+
+
+def many(folder: Path, count: int = 1000) -> Path:
+    """A page of so many looks, one of which failed."""
+    lights = (LightRow("<b>key", 0.0), LightRow("fill", 2.5, hex="#ff8800", stops=-1.25))
     rows = [Row("broken", "failed", "no such file: <i>x</i>", "broken")]
     rows += [
         Row(f"look {k}", "done", "", f"look {k}", delta_e=k % 17 / 2, lights=lights)
-        for k in range(1000)
+        for k in range(count)
     ]
-    (tmp_path / "index.html").write_text(gallery_page(tmp_path, "many", rows), encoding="utf-8")
-    page.goto((tmp_path / "index.html").as_uri())
+    (folder / "index.html").write_text(gallery_page(folder, "many", rows), encoding="utf-8")
+    return folder / "index.html"
+
+
+def test_a_thousand_looks_are_filtered_and_ordered(page: Any, tmp_path: Path) -> None:
+    page.goto(many(tmp_path).as_uri())
     assert page.locator("#count").text_content() == "1001 of 1001"
+    assert page.locator("#mixer-tab").is_hidden()
     assert _names(page)[0] == "broken"
     assert page.locator(".why").text_content() == "no such file: <i>x</i>"
     page.locator("#filter").fill("LOOK 99")
     assert len(_names(page)) == 19  # with both words, in any place
+    page.locator("#filter").fill("nothing at all")
+    assert page.get_by_text("No look matches").is_visible()
     page.locator("#filter").fill("")
+    page.locator("#order").select_option("look")
+    assert _names(page)[:4] == ["broken", "look 0", "look 1", "look 2"]
     page.locator("#order").select_option("delta_e")
     assert _names(page)[0] == "look 16"
+    page.get_by_role("tab", name="Lights").click()
+    cells = page.locator("#lights tbody tr").first.locator("td").all_text_contents()
+    assert cells == ["off", "2.5"]
+    page.locator("#unit").select_option("stops")
+    cells = page.locator("#lights tbody tr").first.locator("td").all_text_contents()
+    assert cells == ["off", "−1.3"]
+    page.get_by_role("tab", name="Looks").click()
     page.locator("#state").select_option("failed")
     assert _names(page) == ["broken"]
-    cells = page.locator("#lights tbody tr").first.locator("td").all_text_contents()
-    assert cells == ["off", "2.5 (−1.3)"]
+
+
+def test_axe_finds_nothing(page: Any, batch: Path) -> None:
+    source = axe_source()
+    page.goto((batch / "index.html").as_uri())
+    page.evaluate(source)
+
+    def found() -> list[Any]:
+        told = page.evaluate("() => axe.run()")
+        return [(one["id"], [n["html"] for n in one["nodes"]]) for one in told["violations"]]
+
+    assert found() == []
+    page.get_by_label("p0 as A", exact=True).click()
+    assert found() == []
+    page.get_by_label("third as B", exact=True).click()
+    page.locator("#wipe").wait_for()
+    assert found() == []
+    page.keyboard.press("Escape")
+    page.get_by_role("tab", name="Lights").click()
+    assert found() == []
+    page.get_by_role("tab", name="Mixer").click()
+    page.locator(".mixer:not([hidden]) .mixer-body").wait_for()
+    assert found() == []
+
+
+def test_several_paintings_of_solve_are_mixed_as_well(page: Any, tmp_path: Path) -> None:
+    write_batch(tmp_path)
+    succeed(tmp_path, "solve", "b.basis.exr", "p0.exr", "p1.exr", "-o", "out")
+    page.goto((tmp_path / "out" / "index.html").as_uri())
+    page.get_by_label("Mix the lights of p1", exact=True).click()
+    page.locator(".mixer:not([hidden]) .mixer-body").wait_for()

@@ -15,6 +15,9 @@ from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
 from lightpaint.scene.scene import load_scene
 
+#: A look, and the frame that begins with it.
+NAMED = ("bright-camera", "path-0")
+
 SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
     <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">
     <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
@@ -32,6 +35,7 @@ sensors = ["camera", "side"]
 [[look]]
 name = "both"
 views = { camera = "bright.exr", side = "dark.exr" }
+variations = ["warmer"]
 
 [[look]]
 name = "final"
@@ -39,6 +43,11 @@ painting = "dark.exr"
 want = ["solve", "verify", "report", "render"]
 render = { spp = 4, resolution = "1/2" }
 variations = ["warmer"]
+
+[[sequence]]
+name = "path"
+through = ["bright-camera", "dark-side"]
+sensors = ["camera", "side", "camera"]
 
 [[look]]
 name = "preset"
@@ -74,15 +83,20 @@ def done(here: Path) -> dict[str, Any]:
     return {**told, "asked": asked}
 
 
-def test_each_basis_is_obtained_once_for_all_its_looks(done: dict[str, Any]) -> None:
+def test_each_basis_is_obtained_once_for_all_its_looks(here: Path, done: dict[str, Any]) -> None:
     assert done["failed"] == 0
     names = [look["look"] for look in done["looks"]]
     assert names == [
         *("bright-camera", "bright-side", "dark-camera", "dark-side", "both", "both"),
-        *("final", "final-warmer", "preset"),
+        *("both-warmer", "both-warmer", "final", "final-warmer", "preset"),
+        *("path-0", "path-1", "path-2"),
     ]
+    seen = [look["sensor"] for look in done["looks"] if look["look"].startswith("path")]
+    assert seen == ["camera", "side", "camera"]
+    bright, path = (read_lighting(here / "out" / x / "lighting.json") for x in NAMED)
+    assert bright.emission == path.emission
     # The first sensor by its name, by default, and both for the design in two views.
-    assert len(done["asked"]) <= 5
+    assert len(done["asked"]) <= 7
     assert {look["sensor"] for look in done["looks"] if look["look"] == "both"} == {
         "camera",
         "side",
@@ -94,7 +108,8 @@ def test_only_what_is_wanted_is_rendered(here: Path, done: dict[str, Any]) -> No
     assert not (out / "dark-side" / "verified.exr").exists()
     assert not (out / "dark-side" / "report.html").exists()
     assert (out / "final" / "report.html").is_file()
-    assert (out / "both" / "side" / "predicted.exr").is_file()
+    for name in ("both", "both-warmer"):
+        assert (out / name / "side" / "predicted.exr").is_file()
     for name in ("final", "final-warmer"):
         render = read_estimate(out / name / "relit.exr")[0]
         assert render.size == (10, 12)
@@ -135,7 +150,7 @@ def test_other_samples_of_a_final_render_render_it_alone_again(
 
 def test_a_scene_is_checked_before_its_first_sample(here: Path) -> None:
     for text, said in (
-        (LOOKS.replace('"side"]', '"back"]'), "back"),
+        (LOOKS.replace('side = "dark', 'back = "dark'), "back"),
         (LOOKS.replace('resolution = "1/2"', 'resolution = "7x5"'), "7x5"),
         (LOOKS.replace("preset.json", "other.json"), "other.json"),
     ):

@@ -149,6 +149,18 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
         SEQUENCE + 'through = ["one", "two"]\nframes = 4\nspace = "rgb"\n',
         ("space is 'rgb'", "'oklab'"),
     ),
+    "a path of one sensor": (
+        SEQUENCE + 'through = ["one"]\nsensors = ["a"]\n',
+        ("sequence 'seq'", "sensors has one"),
+    ),
+    "a path of other frames": (
+        SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\nframes = 3\n',
+        ("sequence 'seq'", "3 frames of 2 sensors"),
+    ),
+    "a path through a basis": (
+        SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\n',
+        ("sequence 'seq'", "of no scene"),
+    ),
     "a sequence that is solved": (
         SEQUENCE + 'through = ["one", "two"]\nframes = 4\nwant = ["solve"]\n',
         ("want is ['solve']",),

@@ -61,6 +61,7 @@ def test_a_patch_changes_the_lights_and_nothing_else(here: Path, tmp_path: Path)
 
 class _Socket:
     default_value: Any = None
+    is_linked = False
 
 
 def _blender() -> ModuleType:
@@ -118,10 +119,37 @@ def test_light_groups_go_to_nuke_and_blender(here: Path, tmp_path: Path) -> None
     assert (tmp_path / "relit.nk").read_text().startswith("version 12.0")
 
 
+def test_a_layer_of_usd_relights_a_stage(here: Path, tmp_path: Path) -> None:
+    pxr = pytest.importorskip("pxr.Usd", reason="usd-core")
+    from pxr import UsdLux
+
+    stage = pxr.Stage.CreateNew(str(tmp_path / "hall.usda"))
+    UsdLux.RectLight.Define(stage, "/hall/panel")
+    UsdLux.SphereLight.Define(stage, "/hall/bulb")
+    stage.Save()
+    given = ("look/lighting.json", "--to", "usd", "--scene", "room.xml")
+    done = run(here, "export", *given, "--stage", tmp_path / "hall.usda", "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert "hall.usda takes sun: set it by hand" in done.stderr
+    wanted = read_lighting(here / "look" / "lighting.json").emission
+    relit = pxr.Stage.Open(str(tmp_path / "out" / "lights.usda"))
+    for name, factor in (("panel", 1.0), ("bulb", 4.0)):
+        light = UsdLux.LightAPI(relit.GetPrimAtPath(f"/hall/{name}"))
+        found = light.GetIntensityAttr().Get() * np.array(light.GetColorAttr().Get())
+        np.testing.assert_allclose(found / factor, wanted[name], rtol=FLOAT32)
+    assert "--stage is of the form usd" in refused(
+        here, "export", *given[:1], "--to", "csv", "--stage", "hall.usda"
+    )
+    (tmp_path / "torn.usda").write_text("#usda 1.0\n(", encoding="utf-8")
+    for name, said in (("gone.usda", "no such stage"), ("torn.usda", "is no stage of USD")):
+        line = refused(here, "export", *given, "--stage", tmp_path / name, "-o", "none")
+        assert said in line
+
+
 def test_what_it_lacks_is_one_line(here: Path) -> None:
     lighting = "look/lighting.json"
     wrong = {
-        (lighting, "--to", "maya"): "no form 'maya': known are csv, json, mitsuba, blender, nuke",
+        (lighting, "--to", "maya"): "no form 'maya': known are csv, json, mitsuba, usd",
         (lighting, "--to", "mitsuba"): "mitsuba needs the scene: give it with --scene",
         (lighting, "--to", "nuke"): "give them with --lights",
         (lighting, "--to", "mitsuba", "--lights", "groups.exr"): "leave --lights out",

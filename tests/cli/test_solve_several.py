@@ -7,6 +7,9 @@ import pytest
 from batches import write_batch
 from command import refused, run, succeed
 
+from lightpaint.cli.solve_options import VARIATIONS
+from lightpaint.lighting.file import read_lighting
+
 
 @pytest.fixture
 def here(tmp_path: Path) -> Path:
@@ -55,3 +58,48 @@ def test_somebody_elses_page_is_kept(here: Path) -> None:
         assert "out/index.html is there, and of no batch: name another folder (-o)" in said
     succeed(here, "solve", "b.basis.exr", *PAINTINGS, "-o", "out", "--force")
     assert (here / "out" / "index.html").read_text() != "mine"
+
+
+def test_variations_are_what_a_batch_makes_of_them(here: Path) -> None:
+    words = ("warmer", "cooler", "fewer lights", "white only", "held harder")
+    (here / "looks.toml").write_text(
+        f'[[look]]\nbasis = "b.basis.exr"\npainting = "p0.exr"\nvariations = {json.dumps(words)}\n'
+    )
+    told = json.loads(succeed(here, "batch", "looks.toml", "-o", "many", "--json", "-q"))
+    typed = ",".join(word.replace(" ", "-") for word in words)
+    assert typed == VARIATIONS
+    output = succeed(
+        here,
+        "solve",
+        "b.basis.exr",
+        "p0.exr",
+        "--variations",
+        typed,
+        "-o",
+        "few",
+        "--table",
+        "full",
+    )
+    assert "few/index.html: 6 looks: all done" in output
+    rows = json.loads((here / "few" / "summary.json").read_text())["looks"]
+    assert {(x["look"], x.get("variation")) for x in rows} == {
+        (x["look"], x.get("variation")) for x in told["looks"]
+    }
+    for row in rows:
+        name = row["look"]
+        ours, theirs = (read_lighting(here / x / name / "lighting.json") for x in ("few", "many"))
+        assert ours.emission == theirs.emission
+    # Without a folder they lie beside each other, with the gallery of both.
+    succeed(here, "solve", "b.basis.exr", "p0.exr", "--variations", "warmer")
+    assert (here / "p0-warmer" / "predicted.exr").is_file()
+    assert "2 looks" in (here / "index.html").read_text()
+
+
+def test_what_is_wrong_with_variations_is_one_line(here: Path) -> None:
+    command = ("solve", "b.basis.exr", "p0.exr", "p1.exr", "-o", "out")
+    line = refused(here, *command, "--variations", "warm")
+    assert "there is no variation 'warm': known are warmer, cooler, fewer-lights" in line
+    (here / "p0-warmer.exr").write_bytes((here / "p1.exr").read_bytes())
+    line = refused(here, *command, "p0-warmer.exr", "--variations", "warmer")
+    assert "would both go to out/p0-warmer" in line
+    assert not (here / "out").exists()

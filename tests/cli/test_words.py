@@ -15,6 +15,7 @@ from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import _SAID, OPTIONS, SPELLINGS, spoken
 from lightpaint.job import NOT_IN_GROUPS
 from lightpaint.paint.launch import paint_in_browser
+from lightpaint.relit.forms import Source
 from lightpaint.settings import Settings
 from lightpaint.target.read import read_target
 
@@ -111,6 +112,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     known |= {*inspect.signature(lightpaint.read_light_groups).parameters}
     known |= {*inspect.signature(lightpaint.paint_with_light).parameters}
     known |= {*inspect.signature(paint_in_browser).parameters}
+    known |= {*inspect.signature(Source).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
     assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= known
 

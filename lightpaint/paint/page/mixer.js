@@ -13,13 +13,19 @@ import { unpacked } from './unpack.js';
 /** @typedef {import("./mixer_light.js").Light} Light */
 /** @typedef {import("./engine/protocol.js").RGB} RGB */
 
-/** lights: those with a plane of their own, in the order of the planes. rest: the others together,
+/** lights: those with a plane of their own, in the order of the planes. shown: of these, which have
+ * sliders; the others are as they are in the look. rest: the others together,
  * as they are in the answer and at present: two more planes. lighting: the answer's file.
- * @typedef {{size: [number, number], planes: Compact[], lights: Light[],
+ * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
  *   rest: {label: string, answer: Record<string, RGB>, present: Record<string, RGB>} | null,
  *   kelvins: [number, RGB][], transform: {stops: number, low: number, high: number,
  *   curve: number[] | null, lattice: Compact | null}, painting: string | null,
- *   lighting: {lights: Record<string, {emission: RGB, weight: RGB}>}, command: string | null}} Data */
+ *   lighting: {target?: string, lights: Record<string, {emission: RGB, weight: RGB}>},
+ *   command: string | null}} Data */
+
+/** What a mixer of many looks begins from.
+ * @typedef {{name: string, emission: Map<string, RGB>, kelvin: Map<string, number | null>,
+ *   transform: Data['transform']}} Look */
 
 /** Size of the picture of a light in its row, and which of its pixels is white there. */
 const [THUMB, BRIGHT] = [88, 0.98];
@@ -40,6 +46,9 @@ class Mixer {
     const changed = () => this.draw();
     /** @type {Row[]} */
     this.rows = data.lights.map((light) => new Row(light, kelvins, changed));
+    this.rows.forEach((row, k) => (row.plane = k));
+    const { shown } = data;
+    if (shown) this.rows = this.rows.filter((row) => shown.includes(row.plane));
     if (data.rest) {
       const one = /** @type {RGB} */ ([1, 1, 1]);
       const about = {
@@ -55,14 +64,16 @@ class Mixer {
         answer: one,
         kelvin: { present: null, answer: null },
       };
-      this.rows.push(new Row(light, kelvins, changed));
+      const rest = new Row(light, kelvins, changed);
+      rest.plane = this.rows.length;
+      this.rows.push(rest);
     }
     const view = this.stage();
     view.append(...this.buttons());
     const list = made('div', 'mixer-lights');
     list.append(...this.rows.map((row) => row.element));
     root.append(view, list);
-    this.rows.forEach((row, k) => this.thumb(row, k));
+    for (const row of this.rows) this.thumb(row);
     this.reset('answer');
   }
 
@@ -136,13 +147,20 @@ class Mixer {
   weights() {
     const isSolo = this.rows.some((row) => row.isSolo);
     const weights = new Float64Array(3 * this.planes.length);
-    this.rows.forEach((row, k) => {
+    if (!isSolo) for (const k of this.others()) weights.set(this.data.lights[k][this.look], 3 * k);
+    for (const row of this.rows) {
       const isHeard = isSolo ? row.isSolo : !row.isMute;
       // Of the rest, the plane of the look that was last gone back to.
-      const plane = row.light.isRest && this.look === 'present' ? k + 1 : k;
+      const plane = row.light.isRest && this.look === 'present' ? row.plane + 1 : row.plane;
       if (isHeard) weights.set(row.rgb, 3 * plane);
-    });
+    }
     return weights;
+  }
+
+  /** Lights that have a plane and no sliders. @returns {number[]} */
+  others() {
+    const { shown, lights } = this.data;
+    return shown ? lights.map((_, k) => k).filter((k) => !shown.includes(k)) : [];
   }
 
   draw() {
@@ -156,13 +174,13 @@ class Mixer {
     });
   }
 
-  /** A small picture of what one light does alone. @param {Row} row @param {number} k */
-  thumb(row, k) {
+  /** A small picture of what one light does alone. @param {Row} row */
+  thumb(row) {
     const [height, width] = this.data.size;
     const alone = new Mix(this.data.size);
     alone.weights = new Float64Array(3 * this.planes.length);
     const { rgb } = row;
-    alone.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * k);
+    alone.weights.set(luminance(rgb) > 0 ? rgb : [1, 1, 1], 3 * row.plane);
     alone.update(this.planes, 1, false);
     const bright = alone.light.filter((x) => x > 0).sort();
     const white = bright[Math.floor(BRIGHT * (bright.length - 1))] || 1;
@@ -183,6 +201,10 @@ class Mixer {
     const set = (name, rgb) => {
       Object.assign(file.lights[name], { emission: [...rgb], weight: [...rgb] });
     };
+    for (const k of this.others()) {
+      const light = this.data.lights[k];
+      set(light.name, light[this.look]);
+    }
     for (const { light, rgb } of this.rows) {
       if (!light.isRest) set(light.name, rgb);
       else if (this.data.rest)
@@ -288,18 +310,43 @@ async function lutOf({ low, high, curve, lattice }) {
   return { shaper: { side: lattice.size[1], low, high }, lattice: values, curve: null };
 }
 
-/** @param {HTMLElement} root */
-async function start(root) {
-  root.dataset.ready = '';
+/** What stands in a mixer, unpacked once. @type {WeakMap<HTMLElement, Promise<[Data, Uint16Array[]]>>} */
+const read = new WeakMap();
+
+/** @param {HTMLElement} root @returns {Promise<[Data, Uint16Array[]]>} */
+function contents(root) {
+  const known = read.get(root);
+  if (known) return known;
   const text = root.querySelector('script[type="application/json"]')?.textContent ?? '';
   /** @type {Data} */
   const data = JSON.parse(text);
-  const planes = await Promise.all(data.planes.map(unpacked));
+  const made = Promise.all(data.planes.map(unpacked)).then(
+    (planes) => /** @type {[Data, Uint16Array[]]} */ ([data, planes]),
+  );
+  read.set(root, made);
+  return made;
+}
+
+/** Show a mixer as its answer has it, or as a look has its lights.
+ * @param {HTMLElement} root @param {Look} [look] */
+export async function begin(root, look) {
+  root.dataset.ready = '';
+  let [data, planes] = await contents(root);
+  if (look) {
+    const lights = data.lights.map((light) => {
+      const answer = look.emission.get(light.name) ?? light.present;
+      const kelvin = { ...light.kelvin, answer: look.kelvin.get(light.name) ?? null };
+      return { ...light, answer, kelvin };
+    });
+    const lighting = { ...data.lighting, target: `${look.name}-mix` };
+    data = { ...data, lights, lighting, transform: look.transform };
+  }
   const body = made('div', 'mixer-body');
   new Mixer(body, data, planes, await lutOf(data.transform));
+  root.querySelector('.mixer-body')?.remove();
   root.append(body);
   root.hidden = false;
 }
 
 for (const root of document.querySelectorAll('.mixer:not([data-ready])'))
-  if (root instanceof HTMLElement) start(root);
+  if (root instanceof HTMLElement) begin(root);

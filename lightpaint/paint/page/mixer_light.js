@@ -36,6 +36,8 @@ export class Row {
   /** @param {Light} light @param {Kelvins} kelvins @param {() => void} changed */
   constructor(light, kelvins, changed) {
     this.light = light;
+    /** Which of the planes is its. */
+    this.plane = 0;
     this.kelvins = kelvins;
     this.changed = changed;
     this.rgb = light.answer;

@@ -21,7 +21,7 @@ def scene_script(target: str, source: str, emitters: Iterable[tuple[str, str, RG
     """
     rows, left = [], []
     for name, parameter, emission in emitters:
-        if parameter not in KINDS:
+        if parameter not in KINDS:  # a multiple, which says nothing of what it is to be
             left.append(name)
             continue
         numbers = ", ".join(f"{channel:.9g}" for channel in emission)

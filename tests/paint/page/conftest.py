@@ -1,8 +1,6 @@
 """One browser for all tests of the page, and a site that serves its modules and arrays."""
 
-import os
 import shutil
-import subprocess
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 import pytest
+from accessible import axe_source
 from renderer import REPOSITORY
 
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
@@ -45,17 +44,8 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def axe() -> str:
-    """The source of axe-core: LIGHTPAINT_AXE, or where npm has it."""
-    places = [Path("node_modules")]
-    if npm := shutil.which("npm"):
-        found = subprocess.run([npm, "root", "-g"], capture_output=True, text=True, check=False)
-        places.append(Path(found.stdout.strip()))
-    candidates = [Path(os.environ.get("LIGHTPAINT_AXE", "/nowhere"))]
-    candidates += [place / "axe-core" / "axe.min.js" for place in places]
-    for path in candidates:
-        if path.is_file():
-            return path.read_text(encoding="utf8")
-    pytest.skip("axe-core")
+    """The source of axe-core."""
+    return axe_source()
 
 
 @dataclass

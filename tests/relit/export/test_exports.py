@@ -4,12 +4,9 @@ import ast
 import csv
 import io
 import json
-import os
 import re
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +14,7 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
+from blender import in_blender
 from hypothesis import example, given
 from hypothesis import strategies as st
 from light_groups import channels, interleaved, multi_part, pictures, write
@@ -434,30 +432,10 @@ def test_no_renderer_is_imported(tmp_path: Path):
 # ------------------------------------------------------------------------------- in Blender
 
 
-@pytest.fixture(scope="module")
-def blender() -> Iterator[list[str]]:
-    """How to run Python in Blender: $LIGHTPAINT_BPY, a Python that has its module, or Blender."""
-    if python := os.environ.get("LIGHTPAINT_BPY"):
-        yield [python]
-    elif found := shutil.which("blender"):
-        yield [found, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
-    else:
-        pytest.skip("Blender (LIGHTPAINT_BPY: a Python with its module bpy)")
-
-
-def _in_blender(blender: list[str], script: Path, *arguments: object) -> str:
-    dashes = ["--"] if len(blender) > 1 else []
-    run = [*blender, str(script), *dashes, *map(str, arguments)]
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-    done = subprocess.run(run, capture_output=True, text=True, env=environment, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
 def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[str]):
     """Cycles' own groups, solved on, set by the script and rendered again."""
     scene = Path(__file__).parent / "blender_scene.py"
-    _in_blender(blender, scene, "render", tmp_path)
+    in_blender(blender, scene, "render", tmp_path)
     groups = read_light_groups(tmp_path / "first.exr")
     assert groups.basis.names == ('Key "Area"', "fill", "glow", "world", "rest")
     assert groups.exceeding is not None
@@ -471,7 +449,7 @@ def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[s
     np.testing.assert_allclose(found, weights, atol=FLOAT32)
 
     write_exports(tmp_path, groups, look.lighting)
-    _in_blender(blender, scene, "again", tmp_path)
+    in_blender(blender, scene, "again", tmp_path)
     relit = OpenEXR.File(str(tmp_path / "relit.exr")).parts[0].channels["RGBA"].pixels[..., :3]
     once, thrice, other_seed = (
         read_light_groups(tmp_path / f"{name}.exr").beauty for name in ("once", "thrice", "seed")
@@ -499,7 +477,7 @@ def test_lights_set_in_blender_render_the_answer(tmp_path: Path, blender: list[s
 def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, blender: list[str]):
     groups = _groups(tmp_path, names=["a", "b", "gone", "linked", "world"])
     write_exports(tmp_path, groups, _lighting(groups))
-    told = _in_blender(blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
+    told = in_blender(blender, Path(__file__).parent / "blender_scene.py", "kinds", tmp_path)
     assert "all as expected" in told
     assert "no light is in the group gone" in told
     assert "inside the node group hidden, set it by hand" in told

@@ -1,0 +1,130 @@
+"""A lighting as a layer of USD that overrides lights of a stage, and nothing else.
+
+What UsdLux calls intensity is radiance, of lights that normalize it the flux of all their surface.
+So that neither radius nor size of a prim matter, panels and skies are written unnormalized, at
+their radiance, and suns and points normalized: a sun at its irradiance, a sphere, whose surface is
+four times what is seen of it from afar, at four times its intensity.
+"""
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lightpaint.arrays import RGB
+from lightpaint.errors import OutputError
+from lightpaint.files import one_line
+
+#: Of Mitsuba's parameters, whether the light is normalized.
+NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
+
+#: What a prim's surface is of what is seen of it along its axis, or from the side.
+SURFACE = {"SphereLight": 4.0, "CylinderLight": 3.141592653589793}
+
+#: Where lights are taken to be where there is no stage to look for them.
+SCOPE = "/lights"
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """The layer as text; the names of lights that are not in it; and of what is in the stage."""
+
+    text: str
+    left: tuple[str, ...]
+
+
+def check_usd() -> None:
+    """Raise OutputError where the library is not installed."""
+    try:
+        import pxr.UsdLux  # noqa: F401
+    except ImportError:
+        raise OutputError(
+            "USD needs a library that is not installed: pip install 'lightpaint[usd]'"
+        ) from None
+
+
+def usd_overrides(
+    emitters: Iterable[tuple[str, str, RGB]], stage: Path | None, folder: Path, *, about: str = ""
+) -> Overrides:
+    """The layer.
+
+    Args:
+        emitters: Name, Mitsuba's parameter and emission of each that is adjusted; "" where it is a
+            multiple of what there is, and by what is left to who opens the layer.
+        stage: Any USD file, whose lights go by these names: the layer lies over it. Without one
+            they are taken to be prims below /lights.
+        folder: Where the layer is to lie.
+        about: Of what it is, for its comment.
+
+    Raises OutputError where the library is not installed, or cannot read the stage.
+    """
+    check_usd()
+    from pxr import Sdf, Tf, Usd
+
+    there = None if stage is None else _lights_of(stage)
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    over = Usd.Stage.Open(layer)
+    layer.comment = about
+    if stage is not None:
+        layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
+        _like(layer, stage)
+    left = []
+    for name, parameter, emission in emitters:
+        identifier = Tf.MakeValidIdentifier(name)
+        places = {f"{SCOPE}/{identifier}": "SphereLight"}
+        if there is not None:
+            places = there.get(name) or there.get(identifier) or {}
+        if parameter not in NORMALIZED or len(places) != 1:
+            left.append(name)
+            continue
+        [(path, kind)] = places.items()
+        _override(over.OverridePrim(path), kind, parameter, emission)
+    return Overrides(layer.ExportToString(), tuple(left))
+
+
+def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
+    """Set all of a light that its brightness and colour depend on."""
+    from pxr import Gf, UsdLux
+
+    brightest = max(emission)
+    color = [channel / brightest for channel in emission] if brightest > 0 else [1.0] * 3
+    surface = SURFACE.get(kind, 1.0) if parameter == "intensity" else 1.0
+    light = UsdLux.LightAPI(prim)
+    light.CreateIntensityAttr(surface * max(brightest, 0.0))
+    light.CreateExposureAttr(0.0)
+    light.CreateColorAttr(Gf.Vec3f(*color))
+    light.CreateEnableColorTemperatureAttr(False)
+    light.CreateNormalizeAttr(NORMALIZED[parameter])
+
+
+def _lights_of(stage: Path) -> Mapping[str, dict[str, str]]:
+    """By name, the path and the type of each light of a stage."""
+    from pxr import Tf, Usd, UsdLux
+
+    if not stage.is_file():
+        raise OutputError(f"no such stage: {stage}")
+    try:
+        opened = Usd.Stage.Open(str(stage))
+    except Tf.ErrorException as error:
+        said = one_line(str(error), limit=200)
+        raise OutputError(f"{stage} is no stage of USD: {said}") from None
+    found: dict[str, dict[str, str]] = {}
+    for prim in opened.Traverse():
+        if prim.HasAPI(UsdLux.LightAPI):
+            for name in dict.fromkeys((prim.GetName(), prim.GetDisplayName())):
+                if name:
+                    found.setdefault(name, {})[str(prim.GetPath())] = str(prim.GetTypeName())
+    return found
+
+
+def _like(layer: Any, stage: Path) -> None:
+    """Say of the layer what its stage says: axes, units and the prim to begin with."""
+    from pxr import Sdf
+
+    root = Sdf.Layer.FindOrOpen(str(stage))
+    if root.HasDefaultPrim():
+        layer.defaultPrim = root.defaultPrim
+    for key in ("upAxis", "metersPerUnit"):
+        if root.pseudoRoot.HasInfo(key):
+            layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))

@@ -1,0 +1,131 @@
+"""Looks of light groups, and what other programs get of each look."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from batches import contents
+from command import refused, run, succeed
+from light_groups import interleaved, pictures
+
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.file import read_lighting
+
+LOOKS = """
+[defaults]
+light_groups = "groups.exr"
+want = ["predict", "export"]
+export = { to = ["csv", "nuke"] }
+
+[[look]]
+painting = "dim.exr"
+variations = ["warmer", "white only"]
+
+[[look]]
+painting = "bright.exr"
+
+[[look]]
+name = "by hand"
+lighting = "by-hand.json"
+want = ["predict"]
+
+[[sequence]]
+name = "on"
+through = ["dim", "bright"]
+frames = 3
+want = ["predict", "export"]
+export = { to = ["json"] }
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    """Light groups of another renderer, two paintings of them, and an answer by hand."""
+    images = pictures()
+    interleaved(
+        tmp_path / "groups.exr", {f"RGBA_{n}": x for n, x in zip("abc", images, strict=True)}
+    )
+    write_rgb(tmp_path / "dim.exr", sum(images) / 4)
+    write_rgb(tmp_path / "bright.exr", 2 * images[0] + images[2])
+    succeed(tmp_path, "solve", "groups.exr", "dim.exr", "-o", "solved")
+    (tmp_path / "by-hand.json").write_bytes((tmp_path / "solved" / "lighting.json").read_bytes())
+    (tmp_path / "looks.toml").write_text(LOOKS, encoding="utf-8")
+    return tmp_path
+
+
+def looks(here: Path, *how: Any) -> dict[str, Any]:
+    """What the batch says of itself."""
+    return dict(json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q", *how)))
+
+
+def test_light_groups_stand_for_a_scene(here: Path) -> None:
+    told = looks(here, "--workers", "2")
+    assert told["failed"] == 0
+    names = ["dim", "bright", "dim-warmer", "dim-white-only", "by hand", "on-0", "on-1", "on-2"]
+    assert sorted(x["look"] for x in told["looks"]) == sorted(names)
+    out = here / "out"
+    # As solve answers them, with what it leaves for other programs.
+    alone, many = (read_lighting(x / "lighting.json") for x in (here / "solved", out / "dim"))
+    assert alone.emission == many.emission
+    for name in ("dim", "dim-warmer", "by hand", "on-1"):
+        assert (out / name / "relit.nk").is_file()
+    assert sorted(x.name for x in (out / "dim-warmer" / "export").iterdir()) == [
+        *("fixtures.csv", "relit.nk", "result.json")
+    ]
+    assert (out / "on-1" / "export" / "fixtures.json").is_file()
+    assert not (out / "by hand" / "export").exists()
+    by_name = {look["look"]: look for look in told["looks"]}
+    assert "dim/export/fixtures.csv" in by_name["dim"]["files"]
+    # The same to the last byte by one process.
+    before = contents(out)
+    assert "done earlier" in run(here, "batch", "looks.toml", "-o", "out").stderr
+    assert contents(out) == before
+
+
+def test_what_other_programs_get_is_made_again_alone(here: Path) -> None:
+    looks(here)
+    out = here / "out"
+    kept = {name: (out / name / "lighting.json").stat().st_ino for name in ("dim", "bright")}
+    text = LOOKS.replace('"csv", "nuke"', '"json"')
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    looks(here)
+    assert sorted(x.name for x in (out / "dim" / "export").iterdir()) == [
+        *("fixtures.json", "result.json")
+    ]
+    for name, inode in kept.items():
+        assert (out / name / "lighting.json").stat().st_ino == inode
+    # What somebody has deleted, and what follows from another painting, comes again.
+    (out / "bright" / "export" / "fixtures.json").unlink()
+    write_rgb(here / "dim.exr", 3 * pictures()[1])
+    before = (out / "dim" / "export" / "fixtures.json").read_bytes()
+    looks(here)
+    assert (out / "bright" / "export" / "fixtures.json").is_file()
+    assert (out / "dim" / "export" / "fixtures.json").read_bytes() != before
+    # As if nothing had been there.
+    again = contents(out)
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    succeed(here, "batch", "looks.toml", "-o", "fresh", "-q")
+    assert contents(here / "fresh").keys() == again.keys()
+
+
+def test_forms_that_a_look_has_nothing_for_are_told_before(here: Path) -> None:
+    (here / "room.xml").write_text("<scene/>", encoding="utf-8")
+    groups, want = 'light_groups = "groups.exr"\n', 'want = ["export"]\n'
+    for more, said in (
+        ('light_groups = "gone.exr"\n', "light_groups: no such file or folder: gone.exr"),
+        (groups + 'basis = "groups.exr"\n', "light_groups stand for scene and basis: give them"),
+        ('scene = "room.xml"\npattern = "{name}"\n', "pattern is of light_groups"),
+        (groups + 'sensors = ["a"]\n', "a basis has one view only"),
+        (groups + "settings = { spp = 4 }\n", "spp"),
+        (groups + want + 'export = { to = ["mitsuba"] }\n', "'mitsuba' is of a scene, and no"),
+        (groups + want + 'export = { to = ["maya"] }\n', "to is ['maya']: expected a list of"),
+        (groups + want + 'export = { stage = "a.usda" }\n', "stage is of the form 'usd'"),
+        (groups + 'want = ["predict"]\nexport = {}\n', "want does not have 'export'"),
+    ):
+        text = f'[[look]]\npainting = "dim.exr"\n{more}'
+        (here / "looks.toml").write_text(text, encoding="utf-8")
+        line = refused(here, "batch", "looks.toml", "-o", "none")
+        assert line.startswith("lightpaint batch: looks.toml: look 'dim.exr'"), line
+        assert said in line
+        assert not (here / "none").exists()

@@ -1,0 +1,105 @@
+"""Runs in Blender: sets lights by set_scene.py, and prints what a white floor then looks like.
+
+Arguments: a folder with the script. Not a test by itself: test_scene_script.py runs it.
+"""
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(sys.argv[-1])
+#: Metres of the lamps above the floor.
+HEIGHT = 2.0
+
+
+def material(name, kind, **inputs):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.clear()
+    shader, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
+    for key, value in inputs.items():
+        shader.inputs[key].default_value = value
+    tree.links.new(shader.outputs[0], output.inputs[0])
+    return made
+
+
+def added(name, data):
+    thing = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def lamp(name, kind, **how):
+    data = bpy.data.lights.new(name, kind)
+    thing = added(name, data)
+    thing.location = (0, 0, HEIGHT)
+    # Whatever an artist may have left.
+    data.energy, data.color = 123, (0.1, 0.9, 0.4)
+    for key, value in {"exposure": 2.0, "use_temperature": True, **how}.items():
+        if hasattr(data, key):
+            setattr(data, key, value)
+    return thing
+
+
+def floor_and_camera():
+    bpy.ops.mesh.primitive_plane_add(size=1)
+    bpy.context.object.data.materials.append(
+        material("white", "ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1))
+    )
+    camera = added("camera", bpy.data.cameras.new("camera"))
+    camera.location, camera.data.type, camera.data.ortho_scale = (0, 0, 1), "ORTHO", 0.01
+    bpy.context.scene.camera = camera
+
+
+def radiance():
+    """That of the middle of the floor."""
+    path = str(FOLDER / "seen.exr")
+    bpy.context.scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(path)
+    middle = list(image.pixels)[4 * (4 * 8 + 4) :][:3]
+    bpy.data.images.remove(image)
+    return middle
+
+
+def main():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.samples, scene.cycles.max_bounces = 256, 0
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.render.threads_mode, scene.render.threads = "FIXED", 2
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    floor_and_camera()
+    shown = [
+        lamp("bulb", "POINT", shadow_soft_size=0),
+        lamp("spot", "SPOT", shadow_soft_size=0, spot_size=1.0, spot_blend=0),
+        lamp("sun", "SUN", angle=0),
+        lamp("desk", "AREA", shape="RECTANGLE", size=0.01, size_y=0.02),
+    ]
+    shown[-1].scale = (2, 1, 1)
+    bpy.ops.mesh.primitive_plane_add(
+        size=0.02, location=(0, 0, HEIGHT), rotation=(3.14159265, 0, 0)
+    )
+    panel = bpy.context.object
+    panel.name = "panel"
+    panel.data.materials.append(material("glow", "ShaderNodeEmission"))
+    world = bpy.data.worlds.new("sky")
+    scene.world, world.use_nodes = world, True
+    runpy.run_path(str(FOLDER / "set_scene.py"))
+    found = {}
+    for one in (*shown, panel, None):
+        for other in (*shown, panel):
+            other.hide_render = other is not one
+        scene.world = world if one is None else None
+        found["sky" if one is None else one.name] = radiance()
+    print("SEEN " + json.dumps(found))
+
+
+main()

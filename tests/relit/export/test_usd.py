@@ -1,0 +1,139 @@
+"""A layer of USD over a stage: read by OpenUSD itself, by what UsdLux says of its lights."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.relit.export.usd import usd_overrides
+
+pytest.importorskip("pxr.UsdLux", reason="usd-core")
+from pxr import Gf, Usd, UsdGeom, UsdLux
+
+#: Attributes of USD's colours and intensities are float32.
+FLOAT32 = 1e-6
+
+RGB = (2.0, 1.0, 0.25)
+
+
+def made_stage(path: Path) -> Any:
+    """A stage with a light of each kind, as a program may have exported it."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/hall").GetPrim())
+    for name, kind in (
+        ("panel", UsdLux.RectLight),
+        ("sun", UsdLux.DistantLight),
+        ("bulb", UsdLux.SphereLight),
+        ("spot", UsdLux.DiskLight),
+        ("tube", UsdLux.CylinderLight),
+        ("sky", UsdLux.DomeLight),
+    ):
+        light = kind.Define(stage, f"/hall/lamps/{name}")
+        api = UsdLux.LightAPI(light)
+        api.CreateExposureAttr(3.0)
+        api.CreateIntensityAttr(17.0)
+        api.CreateEnableColorTemperatureAttr(True)
+        UsdGeom.Xformable(light).AddTranslateOp().Set(Gf.Vec3d(1, 2, 3))
+    UsdLux.SphereLight.Get(stage, "/hall/lamps/bulb").CreateRadiusAttr(0.3)
+    UsdLux.CylinderLight.Get(stage, "/hall/lamps/tube").CreateLengthAttr(7.0)
+    UsdLux.DistantLight.Get(stage, "/hall/lamps/sun").CreateAngleAttr(2.0)
+    mesh = UsdGeom.Mesh.Define(stage, "/hall/_3_ring")
+    mesh.GetPrim().SetDisplayName("3 ring")
+    UsdLux.MeshLightAPI.Apply(mesh.GetPrim())
+    UsdGeom.Mesh.Define(stage, "/hall/wall")
+    stage.Save()
+    return stage
+
+
+def shine(light: Any) -> Any:
+    """Intensity, exposure and colour together: radiance, where it is not normalized."""
+    api = UsdLux.LightAPI(light)
+    assert not api.GetEnableColorTemperatureAttr().Get()
+    level = api.GetIntensityAttr().Get() * 2.0 ** api.GetExposureAttr().Get()
+    return level * np.array(api.GetColorAttr().Get(), np.float64)
+
+
+EMITTERS = [
+    ("panel", "radiance", RGB),
+    ("sun", "irradiance", RGB),
+    ("bulb", "intensity", RGB),
+    ("spot", "intensity", RGB),
+    ("tube", "intensity", (0.0, 0.0, 0.0)),
+    ("3 ring", "radiance", RGB),
+]
+
+
+def test_lights_shine_as_they_were_solved(tmp_path: Path) -> None:
+    made_stage(tmp_path / "hall.usda")
+    (tmp_path / "out").mkdir()
+    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path / "out")
+    assert made.left == ()
+    (tmp_path / "out" / "lights.usda").write_text(made.text, encoding="utf-8")
+    relit = Usd.Stage.Open(str(tmp_path / "out" / "lights.usda"))
+
+    def at(path: str) -> Any:
+        return relit.GetPrimAtPath(f"/hall/{path}")
+
+    for path in ("lamps/panel", "_3_ring"):
+        np.testing.assert_allclose(shine(at(path)), RGB, rtol=FLOAT32)
+        assert not UsdLux.LightAPI(at(path)).GetNormalizeAttr().Get()
+    # Normalized, radiance is over the surface, and intensity is radiance times what is seen of it.
+    r = UsdLux.SphereLight(at("lamps/bulb")).GetRadiusAttr().Get()
+    radiance = shine(at("lamps/bulb")) / (4 * math.pi * r**2)
+    np.testing.assert_allclose(radiance * math.pi * r**2, RGB, rtol=FLOAT32)
+    area = math.pi * UsdLux.DiskLight(at("lamps/spot")).GetRadiusAttr().Get() ** 2
+    np.testing.assert_allclose(shine(at("lamps/spot")) / area * area, RGB, rtol=FLOAT32)
+    # A normalized sun is irradiance, whatever its angle.
+    np.testing.assert_allclose(shine(at("lamps/sun")), RGB, rtol=FLOAT32)
+    for name in ("bulb", "spot", "sun"):
+        assert UsdLux.LightAPI(at(f"lamps/{name}")).GetNormalizeAttr().Get()
+    assert not shine(at("lamps/tube")).any()
+
+
+def test_nothing_else_of_the_stage_changes(tmp_path: Path) -> None:
+    before = made_stage(tmp_path / "hall.usda")
+    made = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path, about="for once")
+    (tmp_path / "lights.usda").write_text(made.text, encoding="utf-8")
+    after = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    assert UsdGeom.GetStageUpAxis(after) == "Z"
+    assert UsdGeom.GetStageMetersPerUnit(after) == 0.01
+    assert after.GetDefaultPrim().GetPath() == "/hall"
+    assert [x.GetPath() for x in after.Traverse()] == [x.GetPath() for x in before.Traverse()]
+    changed = {
+        str(prim.GetPath())
+        for prim in before.Traverse()
+        for attribute in prim.GetAttributes()
+        if attribute.Get() != after.GetAttributeAtPath(attribute.GetPath()).Get()
+    }
+    assert changed == {"/hall/lamps/panel"}
+    layer = after.GetRootLayer()
+    assert layer.comment == "for once"
+    assert all(x.specifier.name == "SpecifierOver" for x in layer.rootPrims)
+
+
+def test_what_is_no_one_light_is_told(tmp_path: Path) -> None:
+    stage = made_stage(tmp_path / "hall.usda")
+    UsdLux.RectLight.Define(stage, "/hall/other/panel")
+    stage.Save()
+    wrong = [
+        ("panel", "radiance", RGB),  # there are two
+        ("sky", "", RGB),  # a multiple of what somebody chose
+        ("gone", "radiance", RGB),
+        ("wall", "radiance", RGB),  # no light
+    ]
+    made = usd_overrides([*wrong, EMITTERS[1]], tmp_path / "hall.usda", tmp_path)
+    assert made.left == ("panel", "sky", "gone", "wall")
+    assert "sun" in made.text
+
+
+def test_without_a_stage_lights_are_in_one_place(tmp_path: Path) -> None:
+    made = usd_overrides([("key light", "intensity", RGB), EMITTERS[0]], None, tmp_path)
+    (tmp_path / "lights.usda").write_text(made.text, encoding="utf-8")
+    layer = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    found = layer.GetPrimAtPath("/lights/key_light")
+    np.testing.assert_allclose(shine(found) / 4, RGB, rtol=FLOAT32)
+    assert layer.GetPrimAtPath("/lights/panel")
