@@ -280,7 +280,7 @@ STAGES = {
 
 
 def print_starts(scene: str, times: int) -> None:
-    """From the start of a process until a stroke is answered, with an empty cache and a full one."""
+    """From the start of a process to an answered stroke, with an empty cache and a full one."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         path = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
