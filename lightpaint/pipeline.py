@@ -23,6 +23,8 @@ from lightpaint.relit.export.exports import write_exports
 from lightpaint.relit.relight import relight, settle
 from lightpaint.relit.rounds import refine_by_rendering
 from lightpaint.relit.verify import verify
+from lightpaint.report.of_basis import ahead
+from lightpaint.report.page import prepare_page
 from lightpaint.results import Look, write_predicted, write_report
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene, load_scene
@@ -61,6 +63,9 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         constraints=job.asked,
         fit=job.fit,
     )
+    if job.settings.report:
+        for basis in problem.views.bases:
+            ahead(basis, prepare_page)
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
     with job.results.filled() as folder:

@@ -8,16 +8,14 @@ import json
 import os
 from collections.abc import Collection
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import clean_planes
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
 from lightpaint.records import strict_json
-from lightpaint.report.mixer import plane_of, small_planes, told_light, told_plane
+from lightpaint.report.mixer import planes_for_page, told_light
 from lightpaint.version import __version__
 
 #: Where they are, and what their names end in.
@@ -44,19 +42,17 @@ def keep_planes(folder: Path, key: str, basis: Basis) -> None:
     if read_planes(path).get("identity") == identity:
         return
     is_noisy = bool(basis.half_differences.any())
-    clean = clean_planes(basis) if is_noisy else None
-    makes = [partial(plane_of, basis, clean, k) for k in range(len(basis.lights))]
-    pictures = small_planes(basis, makes, is_noisy=is_noisy and clean is None)
+    size, planes = planes_for_page(basis, is_clean=is_noisy)
     told = {
         "identity": identity,
         "scene": Path(basis.origin.scene).name,
         "sensor": basis.origin.sensor,
-        "size": list(pictures[0].shape[:2]),
+        "size": size,
         "totals": [float(sum(total)) for total in basis.totals],
         "lights": [
             {**told_light(x), "present": list(map(float, x.emission))} for x in basis.lights
         ],
-        "planes": list(map(told_plane, pictures)),
+        "planes": planes,
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, json.dumps(told, ensure_ascii=False, allow_nan=False) + "\n")

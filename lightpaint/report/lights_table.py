@@ -21,6 +21,7 @@ from lightpaint.report.figures import data_uri, thumbnail
 from lightpaint.report.html import SHOWN, SPARE, folded, name_of, share_cell
 from lightpaint.report.looks import MOST_THUMBNAILS
 from lightpaint.report.measures import energy_shares, largest_shares, that_do_most
+from lightpaint.report.of_basis import once
 from lightpaint.report.sentences import (
     UNTOLD,
     UNTOLD_HERE,
@@ -94,12 +95,7 @@ def _rows(
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in solution.lighting.lights}
 
-    def shown(image: Floats) -> tuple[str, tuple[int, ...], float]:
-        picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
-        return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
-
-    rows = []
-    thumbnails = side_by_side(shown, basis.images)
+    rows, thumbnails = [], thumbnails_of(basis, is_clean=is_clean)
     for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
         name, setting = escape(light.name), settings[light.name]
         error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
@@ -116,6 +112,16 @@ def _rows(
             f"{share_cell(f'{100 * shares[k]:.1f} %', shares[k])}</tr>"
         )
     return rows
+
+
+def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int, ...], float]]:
+    """What each light lights alone: data: URI, size and exposure. is_clean: whether denoised."""
+
+    def shown(image: Floats) -> tuple[str, tuple[int, ...], float]:
+        picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
+        return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
+
+    return once(basis, ("thumbnails", is_clean), lambda: side_by_side(shown, basis.images))
 
 
 def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:

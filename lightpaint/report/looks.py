@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, clean_planes
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import DENOISED_KEY, Features, denoised, how_denoised
+from lightpaint.report.of_basis import planes_of
 
 #: More lights than this have their thumbnails as they are, which hundreds of them need not wait
 #: for: a thumbnail is small, and averages much of its noise.
@@ -36,15 +36,13 @@ class Looks:
     """Current look, prediction and verification, (h, w, 3) linear.
 
     verified: None where there is none. texts: what a PNG of them says of itself; none where they
-    are as they were rendered. planes: what each light does, where that is without its grain, too.
-    encoders: what has encoded them.
+    are as they were rendered. encoders: what has encoded them.
     """
 
     current: Floats
     predicted: Floats
     verified: Floats | None
     texts: dict[str, str]
-    planes: CleanPlanes | None = field(default=None, compare=False, repr=False)
     encoders: dict[ViewTransform, Encoder] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
@@ -67,11 +65,11 @@ class Looks:
             verified = denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = how_denoised(features, raw=raw)
-        if (planes := clean_planes(basis)) is None:
+        if (planes := planes_of(basis)) is None:
             shown = denoised(basis.present_look, features), denoised(predicted, features)
         else:
             shown = planes.present, planes.mix(weights)
-        return cls(*shown, verified, texts, planes)
+        return cls(*shown, verified, texts)
 
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "Looks":

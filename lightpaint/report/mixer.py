@@ -7,16 +7,14 @@ a mixer in any browser, offline.
 
 import base64
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis, BasisLight
-from lightpaint.basis.clean import CleanPlanes
 from lightpaint.browser import bundled, styles
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display import to_8_bit
@@ -31,6 +29,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED
 from lightpaint.report.figures import ENOUGH, data_uri
 from lightpaint.report.measures import that_do_most
+from lightpaint.report.of_basis import once, planes_of
 from lightpaint.threads import side_by_side
 
 #: Pixels of a plane from left to right, and of all planes together, at most.
@@ -57,7 +56,6 @@ def mixer_html(
     *,
     transform: ViewTransform | None = None,
     is_clean: bool = False,
-    planes: CleanPlanes | None = None,
     scene: str | None = None,
     title: str = "Light mixer",
 ) -> str:
@@ -69,21 +67,20 @@ def mixer_html(
         painting: (h, w, 3) display values, to be wiped over the mix.
         transform: What the mix is seen through.
         is_clean: Whether planes are denoised.
-        planes: They, where that has been done.
         scene: For the command line; None where there is no scene to relight.
         title: Heading.
     """
     shown = that_do_most(basis, lighting)
-    pictures = _pictures(basis, lighting, shown, planes=planes, is_clean=is_clean)
+    size, planes = _told(basis, lighting, shown, is_clean=is_clean)
     transform = transform or ViewTransform()
     data = {
-        "size": list(pictures[0].shape[:2]),
-        "planes": side_by_side(told_plane, pictures),
+        "size": size,
+        "planes": planes,
         "lights": [_light(basis, lighting, k) for k in shown],
         "rest": _rest(basis, lighting, shown),
         "kelvins": kelvins(),
         "transform": told_transform(transform),
-        "painting": None if painting is None else _painting(painting, basis, len(pictures)),
+        "painting": None if painting is None else _painting(painting, basis, len(planes)),
         "lighting": told_file(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
@@ -113,45 +110,48 @@ def _factor(basis: Basis, count: int) -> int:
     return min(factor, height, width)
 
 
-def _pictures(
-    basis: Basis,
-    lighting: Lighting,
-    shown: Indices,
-    *,
-    planes: CleanPlanes | None,
-    is_clean: bool,
-) -> list[Floats]:
-    """Of each light its plane; then all others, as they are in the answer and at present."""
+def _told(
+    basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool
+) -> tuple[list[int], list[dict[str, Any]]]:
+    """Size and planes of each light; then all others, as they are in the answer and at present."""
     rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
-    looks = [lighting.weights_for(basis), basis.present_weights] if rest.size else []
-    looks = [np.where(np.isin(np.arange(len(x)), rest)[:, None], x, 0) for x in looks]
-    makes: list[Callable[[], Floats]] = [partial(plane_of, basis, planes, k) for k in shown]
-    makes += [partial((planes or basis).mix, its) for its in looks]
-    return small_planes(basis, makes, is_noisy=is_clean and planes is None)
+    if not rest.size:
+        return planes_for_page(basis, is_clean=is_clean)
+    looks = [
+        np.where(np.isin(np.arange(len(x)), rest)[:, None], x, 0)
+        for x in (lighting.weights_for(basis), basis.present_weights)
+    ]
+    return _made(basis, shown, looks, is_clean=is_clean)
 
 
-def plane_of(basis: Basis, planes: CleanPlanes | None, k: int) -> Floats:
-    """What light k does, (h, w, 3), without its grain where that is known."""
-    return planes.plane(k) if planes else np.asarray(basis.images[k])
+def planes_for_page(basis: Basis, *, is_clean: bool) -> tuple[list[int], list[dict[str, Any]]]:
+    """Height and width of what stands in a page for the plane of each light, and these.
 
-
-def small_planes(
-    basis: Basis, makes: Sequence[Callable[[], Floats]], *, is_noisy: bool
-) -> list[Floats]:
-    """Pictures of a basis as small as a page takes them.
-
-    makes: what makes each, (h, w, 3). is_noisy: whether they are to be denoised.
+    is_clean: whether they are denoised.
     """
-    factor = _factor(basis, len(makes))
+    every = np.arange(len(basis.lights))
+    return once(basis, ("mixer", is_clean), lambda: _made(basis, every, [], is_clean=is_clean))
 
-    def small(make: Callable[[], Floats]) -> Floats:
-        return np.asarray(block_mean(make(), factor), np.float32)
 
-    pictures = side_by_side(small, makes)
-    if not is_noisy or factor >= ENOUGH:
-        return pictures
-    features = basis.features and basis.features.reduced(factor)
-    return [denoised(picture, features) for picture in pictures]
+def _made(
+    basis: Basis, lights: Indices, mixes: Sequence[Doubles], *, is_clean: bool
+) -> tuple[list[int], list[dict[str, Any]]]:
+    """Planes of some lights and mixes of others, (n, 3) each, small and written."""
+    planes = planes_of(basis) if is_clean else None
+    factor = _factor(basis, len(lights) + len(mixes))
+
+    def small(k: int) -> Floats:
+        if k >= len(lights):
+            made = (planes or basis).mix(mixes[k - len(lights)])
+        else:
+            made = planes.plane(lights[k]) if planes else basis.images[lights[k]]
+        return np.asarray(block_mean(made, factor), np.float32)
+
+    pictures = side_by_side(small, range(len(lights) + len(mixes)))
+    if is_clean and planes is None and factor < ENOUGH:
+        features = basis.features and basis.features.reduced(factor)
+        pictures = [denoised(picture, features) for picture in pictures]
+    return list(pictures[0].shape[:2]), side_by_side(told_plane, pictures)
 
 
 def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:

@@ -28,10 +28,11 @@ from lightpaint.report.constraints import constraints_section
 from lightpaint.report.diagnosis import missed_section, sure_section
 from lightpaint.report.emitters import emitters_in_view
 from lightpaint.report.figures import Picture, maps, wipe
-from lightpaint.report.lights_table import lights_table
-from lightpaint.report.looks import Looks
+from lightpaint.report.html import SHOWN, SPARE
+from lightpaint.report.lights_table import lights_table, thumbnails_of
+from lightpaint.report.looks import MOST_THUMBNAILS, Looks
 from lightpaint.report.meant import spoken_meaning
-from lightpaint.report.mixer import mixer_assets, mixer_html
+from lightpaint.report.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.pictures import (
     Residual,
     brighter_than_white,
@@ -130,6 +131,13 @@ def report_page(
     )
 
 
+def prepare_page(basis: Basis) -> None:
+    """Make what a page shows of a basis whatever the answer: `report_page` then finds it there."""
+    if len(basis.lights) <= SHOWN + SPARE:
+        planes_for_page(basis, is_clean=True)
+    thumbnails_of(basis, is_clean=len(basis.lights) <= MOST_THUMBNAILS)
+
+
 def _wipe(
     target: Target, solution: Solution, looks: Looks, raw: Looks, *, transform: ViewTransform
 ) -> str:
@@ -171,7 +179,6 @@ def _mixer(
         target_picture(target, solution, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
-        planes=looks.planes,
         scene=shlex.quote(scene) if scene.endswith(".xml") else None,
     )
 
