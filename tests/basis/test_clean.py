@@ -1,0 +1,85 @@
+"""Clean planes: their sums, where they are kept, and that they are of just these pixels."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.basis import clean
+from lightpaint.basis.clean import CleanPlanes, as_halves, clean_planes, kept_planes, scale_of
+from lightpaint.images.denoise import denoised, is_there
+
+pytestmark = pytest.mark.skipif(not is_there(), reason="Open Image Denoise")
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(clean, "FEWEST", 1)
+    return tmp_path
+
+
+def test_their_sum_is_a_clean_picture_of_any_lighting(make_basis: Any):
+    """Half floats hold 11 bits of each plane, and the sum no less."""
+    basis = make_basis(3, (40, 72))
+    weights = np.array([[1.0, 2.0, 0.0], [0.5, 0.0, 3.0], [4.0, 1.0, 0.1]])
+    planes = clean_planes(basis)
+    assert planes is not None
+    each = [denoised(image, basis.features) for image in basis.images]
+    expected = sum(w * x.astype(np.float64) for w, x in zip(weights, each, strict=True))
+    bound = sum(w * np.abs(x) for w, x in zip(weights, each, strict=True)) * 2.0**-11
+    assert (np.abs(planes.mix(weights) - expected) <= bound + 1e-6 * expected.max()).all()
+    np.testing.assert_allclose(planes.plane(1), each[1], rtol=2**-11, atol=each[1].max() * 2**-24)
+    np.testing.assert_array_equal(planes.present, planes.mix(basis.present_weights))
+
+
+def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
+    basis, made = make_basis(2, (24, 32)), []
+    real = clean.denoised
+
+    def counted(*given: Any) -> Any:
+        made.append(given)
+        return real(*given)
+
+    monkeypatch.setattr(clean, "denoised", counted)
+    first, again = clean_planes(basis), clean_planes(replace(basis))
+    assert len(made) == 2
+    assert first is not None
+    assert again is not None
+    np.testing.assert_array_equal(first.halves, again.halves)
+    # Other pixels, features or present emissions have others.
+    other = replace(basis, images=basis.images * np.float32(1.5))
+    assert kept_planes(other) is None
+    brighter = tuple(replace(x, emission=(2.0, 2.0, 2.0)) for x in basis.lights)
+    assert kept_planes(replace(basis, lights=brighter)) is None
+    assert kept_planes(basis) is not None
+
+
+def test_few_pixels_and_many_are_not_worth_it(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
+    basis = make_basis(2, (24, 32))
+    monkeypatch.setattr(clean, "FEWEST", basis.images[..., 0].size + 1)
+    assert clean_planes(basis) is None
+    monkeypatch.setattr(clean, "FEWEST", 1)
+    assert clean_planes(basis, most=basis.images[..., 0].size - 1) is None
+    assert clean_planes(basis, most=basis.images[..., 0].size) is not None
+    # What is kept is taken however much it is.
+    assert clean_planes(basis, most=1) is not None
+
+
+def test_a_folder_that_takes_nothing_is_no_obstacle(make_basis: Any, cache: Path):
+    (cache / "no folder").write_text("")
+    basis = make_basis(2, (24, 32))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIGHTPAINT_CACHE", str(cache / "no folder"))
+        planes = clean_planes(basis)
+    assert isinstance(planes, CleanPlanes)
+
+
+@pytest.mark.parametrize("brightest", [0.0, 1e-30, 1.0, 1024.0, 1025.0, 3e9])
+def test_scales_keep_all_but_the_last_bits(brightest: float):
+    plane = np.array([[[brightest, brightest / 3, brightest / 1000]]], np.float32)
+    scale = scale_of(plane)
+    assert np.log2(scale) == round(np.log2(scale))
+    np.testing.assert_allclose(as_halves(plane, scale) * np.float32(scale), plane, rtol=2**-11)
