@@ -10,16 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import mix
 from lightpaint.lighting.analysis.peaks import Peaks
 from lightpaint.lighting.normal_equations import BLOCK, FEW_LIGHTS, NormalEquations
 from lightpaint.lighting.solution import Solution
-from lightpaint.threads import one_thread
+from lightpaint.threads import one_thread, side_by_side
 
 #: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
 #: the estimate of it is itself noise, and what is left of M would soon be indefinite.
 LARGEST_NOISE = 0.5
+
+#: Parts of the pixels whose sums are made side by side.
+PARTS = 4
 
 #: Rows of matrices that several threads only wait for.
 SMALL = 256
@@ -63,61 +66,117 @@ class Noise:
 
 
 def noise_sums(solution: Solution) -> Noise:
-    """One pass over the pixels that count."""
+    """One pass over the pixels that count, by parts of them side by side."""
     basis, problem, weights = solution.basis, solution.problem, solution.weights
-    n = len(weights)
-    importance = solution.importance.ravel()
     # (pixels, 1), or (pixels, 3) where channels differ.
     squares = problem.squares
     weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
     residual, mixed = residual_and_noise(solution)
-    present = mix(basis.half_differences, basis.present_weights).reshape(-1, 3)
-    images, halves = (x.reshape(n, -1, 3) for x in (basis.images, basis.half_differences))
-    # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
-    is_coupled = len(problem.full.channel_groups) < 3
-    power, drawn = np.zeros((3, n, n)), np.zeros((3, n))
-    gradient = np.zeros((3, n, 3, n))
-    peaks = [Peaks.none(n) for _ in range(3)]
     # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
     # pixel it adds Φᵢ hᵢ times this.
     pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
     unseen = ~basis.emitters_seen.ravel()
-    counted = np.flatnonzero((importance > 0) | (unseen & pulled.any()))
-    # Threads would wait for each other at small blocks, longer than they work.
-    with one_thread() if n <= FEW_LIGHTS else nullcontext():
+    counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
+    of_all = _Pixels(
+        basis.images.reshape(len(weights), -1, 3),
+        basis.half_differences.reshape(len(weights), -1, 3),
+        weight,
+        share,
+        residual,
+        mixed,
+        mix(basis.half_differences, basis.present_weights).reshape(-1, 3),
+        unseen,
+    )
+    # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
+    is_coupled = len(problem.full.channel_groups) < 3
+    # As many parts on every machine, whose sums are added in order: the bits are the same.
+    length = BLOCK * max(1, -(-counted.size // (BLOCK * PARTS)))
+    parts = [counted[k : k + length] for k in range(0, counted.size, length)]
+    sums = [_Sums.none(len(weights))] + (
+        side_by_side(lambda its: of_all.sums(its, weights, pulled, is_coupled=is_coupled), parts)
+        if len(weights) <= FEW_LIGHTS
+        else [of_all.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
+    )
+    return Noise(
+        power=np.asarray(sum(x.power for x in sums)),
+        drawn=np.asarray(sum(x.drawn for x in sums)),
+        gradient=np.asarray(sum(x.gradient for x in sums)),
+        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
+        objective_noise=(weight * np.square(mixed)).sum(axis=0),
+        hidden=np.array([Peaks.together([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
+    )
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Over some pixels. power, drawn, gradient: as in `Noise`. peaks: of each channel."""
+
+    power: Doubles
+    drawn: Doubles
+    gradient: Doubles
+    peaks: tuple[Peaks, ...]
+
+    @classmethod
+    def none(cls, n: int) -> "_Sums":
+        peaks = tuple(Peaks.none(n) for _ in range(3))
+        return cls(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros((3, n, 3, n)), peaks)
+
+
+@dataclass(frozen=True)
+class _Pixels:
+    """What is known of all pixels.
+
+    images, halves: (n, p, 3). weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), as of
+    `residual_and_noise`. present: (p, 3), noise of the current look. unseen: (p,), where no emitter
+    is.
+    """
+
+    images: Floats
+    halves: Floats
+    weight: Doubles
+    share: Doubles
+    residual: Doubles
+    mixed: Doubles
+    present: Floats
+    unseen: Bools
+
+    def sums(
+        self, counted: Indices, weights: Doubles, pulled: Doubles, *, is_coupled: bool
+    ) -> _Sums:
+        """Over some of them. pulled: (n, 3), by how much noise moves the pull."""
+        made = _Sums.none(len(weights))
         for start in range(0, counted.size, BLOCK):
             its = counted[start : start + BLOCK]
             # Pixels in one run are looked at where they are; others have to be gathered.
             in_one_run = its[-1] - its[0] + 1 == its.size
             pixels = slice(int(its[0]), int(its[-1]) + 1) if in_one_run else its
-            rows = []
+            rows = [self._rows(made, pixels, c, weights, pulled) for c in range(3)]
             for c in range(3):
-                D = weight[pixels, c % weight.shape[1]].astype(np.float64)
-                h = halves[:, pixels, c].astype(np.float64)
-                lit = images[:, pixels, c].astype(np.float64)
-                rows.append(D * (h * residual[pixels, c] - lit * mixed[pixels, c]))
-                size = np.abs(residual[pixels, c]) + weights[:, c, None] * lit
-                peaks[c].see(D * lit * size, rows[c])
-                if pulled.any():
-                    rows[c] += pulled[:, c, None] * np.where(unseen[pixels], lit, 0) * h
-                power[c] += (D * h) @ h.T
-                shared = D * share[pixels, c % share.shape[1]]
-                drawn[c] += h @ (shared * present[pixels, c])
-                gradient[c, :, c] += rows[c] @ rows[c].T
+                made.gradient[c, :, c] += rows[c] @ rows[c].T
             if is_coupled:
                 # One path carries all three channels, so their noise goes together.
                 for c, d in ((0, 1), (0, 2), (1, 2)):
                     product = rows[c] @ rows[d].T
-                    gradient[c, :, d] += product
-                    gradient[d, :, c] += product.T
-    return Noise(
-        power,
-        drawn,
-        gradient,
-        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
-        objective_noise=(weight * np.square(mixed)).sum(axis=0),
-        hidden=np.array([its.hidden() for its in peaks]),
-    )
+                    made.gradient[c, :, d] += product
+                    made.gradient[d, :, c] += product.T
+        return made
+
+    def _rows(
+        self, made: _Sums, pixels: slice | Indices, c: int, weights: Doubles, pulled: Doubles
+    ) -> Doubles:
+        """(n, pixels), what noise adds to the gradient of a channel; all else goes to `made`."""
+        D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
+        h, lit = (x[:, pixels, c].astype(np.float64) for x in (self.halves, self.images))
+        residual, mixed = self.residual[pixels, c], self.mixed[pixels, c]
+        rows = D * (h * residual - lit * mixed)
+        size = np.abs(residual) + weights[:, c, None] * lit
+        made.peaks[c].see(D * lit * size, rows)
+        if pulled.any():
+            rows += pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
+        made.power[c] += (D * h) @ h.T
+        shared = D * self.share[pixels, c % self.share.shape[1]]
+        made.drawn[c] += h @ (shared * self.present[pixels, c])
+        return np.asarray(rows)
 
 
 def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:

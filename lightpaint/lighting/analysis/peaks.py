@@ -5,6 +5,7 @@ a few pixels could push a light most they are taken to be as noisy as so few can
 (docs/method.md, "How sure").
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,6 +54,16 @@ class Peaks:
         light, pixel = np.nonzero(u2 > PEAK * self.total[:, None])
         if light.size:
             self.found.append((light, u2[light, pixel], np.square(push[light, pixel])))
+
+    @classmethod
+    def together(cls, parts: Sequence["Peaks"]) -> "Peaks":
+        """Of all blocks of several."""
+        first = cls.none(parts[0].total.size)
+        for part in parts:
+            first.total += part.total
+            first.pushed += part.pushed
+            first.found += part.found
+        return first
 
     def hidden(self) -> Doubles:
         """Variance that few pixels may have beyond what their half differences say, (n,).
