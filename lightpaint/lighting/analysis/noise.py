@@ -133,8 +133,8 @@ class _Pixels:
 
     images: Floats
     halves: Floats
-    weight: Doubles
-    share: Doubles
+    weight: Floats
+    share: Floats
     residual: Doubles
     mixed: Doubles
     present: Floats
