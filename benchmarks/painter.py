@@ -33,6 +33,7 @@ import lightpaint as lp
 from lightpaint.basis.basis import BasisLight, Origin
 from lightpaint.lighting.fit import meant_by
 from lightpaint.lighting.live import Live
+from lightpaint.paint.launch import at_hand
 from lightpaint.paint.server import Server
 from lightpaint.paint.store import MemoryStore
 from lightpaint.paint.studio import Studio
@@ -181,7 +182,8 @@ def serve(case: str, asked: str, space: str) -> None:
         server = Server(studio, port=0)
         studio.start()
         print(server.url, flush=True)
-        server.run()
+        with at_hand():
+            server.run()
 
 
 class Opened:

@@ -11,6 +11,8 @@ from typing import TypeVar
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
+from lightpaint.progress import wanted
+
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
@@ -50,8 +52,15 @@ def linear_algebra() -> tuple[str, str]:
 def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
     """work(job) of each job, several at a time with BLAS on one thread; results in order.
 
-    What comes out has the bits that one job after the other would give.
+    What comes out has the bits that one job after the other would give. Work that is wanted no
+    more ends before the next job.
     """
+    check = wanted()
+
+    def done(job: Job) -> Result:
+        check()
+        return work(job)
+
     # One thread more than processors: three channels then share two of them evenly.
     with one_thread(), ThreadPoolExecutor((os.cpu_count() or 1) + 1) as pool:
-        return list(pool.map(work, jobs))
+        return list(pool.map(done, jobs))

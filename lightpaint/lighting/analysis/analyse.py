@@ -9,6 +9,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
+from lightpaint.progress import wanted
 from lightpaint.screen import shortly
 
 
@@ -62,9 +63,12 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     looks = [what_is_seen(view) for view in solution.views]
     choices = color_choices(solution, [seen.delta_e for seen in looks])
     found = []
+    check = wanted()
     for view, seen, its in zip(solution.views, looks, choices, strict=True):
+        check()
         diagnosis = diagnose(view)
         told = view.told(bounds=diagnosis.bounds, **_numbers(seen))
+        check()
         free = without_constraints(view)
         found.append(Analysis(told, uncertainty, diagnosis, seen, alike, free, its))
     return tuple(found)
