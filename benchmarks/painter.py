@@ -282,7 +282,7 @@ STAGES = {
 
 
 def print_starts(scene: str, times: int) -> None:
-    """From the start of a process until a stroke is answered, with an empty cache and a full one."""
+    """How soon a stroke is answered after the start of a process, with and without a cache."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         path = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
@@ -291,7 +291,7 @@ def print_starts(scene: str, times: int) -> None:
         around.pop("PYTHONDONTWRITEBYTECODE", None)
         print(f"{scene}: s from the start of its process, and s of the processor that it took")
         heads = ("", "address", *STAGES, "stroke", "processor")
-        print("{:12s}".format(heads[0]) + "".join(f"{head:>10s}" for head in heads[1:]))
+        print(f"{heads[0]:12s}" + "".join(f"{head:>10s}" for head in heads[1:]))
         print_times("nothing kept", [started(browser, scene, folder, around, is_first=True)])
         every = []
         for _ in range(times):
