@@ -257,6 +257,7 @@ class Opened:
             self.stroke(number, moves=30)
             number += 1
             if number % 10 == 0:
+                time.sleep(3)  # until the exact answer has been found, and its memory is free
                 session.send("HeapProfiler.collectGarbage")
                 heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
                 held = Path(f"/proc/{self.server.pid}/statm").read_text().split()[1]
