@@ -23,6 +23,9 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import reduced_by
 from lightpaint.lighting.pull import pull_of, to_present
 
+#: Pixels along the parts of rows that importance is summed over.
+WIDE = 64
+
 
 class Live:
     """A painting that changes under a brush, and the lighting for it. Updated in place.
@@ -42,8 +45,8 @@ class Live:
         constraints: Constraints,
     ) -> None:
         self._basis, self._image, self._importance = basis, image, importance
-        self._sums = np.zeros((len(importance), 2))
-        self._count_rows(slice(0, len(importance)))
+        self._sums = np.zeros((len(importance), -(-importance.shape[1] // WIDE), 2))
+        self._count((slice(0, len(importance)), slice(0, importance.shape[1])))
         self._light: PaintedTiles | None = None
         self._display: SmallFilm | None = None
         self.asks(fit, constraints)
@@ -71,12 +74,12 @@ class Live:
     @property
     def is_painted(self) -> bool:
         """Whether anything is."""
-        return bool(self._sums[:, 0].any())
+        return bool(self._sums[..., 0].any())
 
     def painted(self, region: Region, *, with_importance: bool = True) -> None:
         """A rectangle of the painting is another now. with_importance: also what counts there."""
         if with_importance:
-            self._count_rows(region[0])
+            self._count(region)
         if self._light is not None:
             self._light.painted(region, with_importance=with_importance)
         if self._display is not None:
@@ -119,22 +122,30 @@ class Live:
     @property
     def _painted_share(self) -> float:
         """Importance of all that is painted, beside the number of pixels."""
-        return float(self._sums[:, 0].sum()) / self._importance.size
+        return float(self._sums[..., 0].sum()) / self._importance.size
 
     @property
     def _rest_weight(self) -> float:
         """What a pixel counts that is not painted."""
         fit = self._fit
-        painted, rest = self._sums.sum(axis=0)
+        painted, rest = self._sums.sum(axis=(0, 1))
         if fit.unpainted or not fit.hold:
             return fit.unpainted
         return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
 
-    def _count_rows(self, rows: slice) -> None:
-        a = self._importance[rows].astype(np.float64)
-        self._sums[rows, 0] = a.sum(axis=1)
-        left = np.where(self._basis.emitters_seen[rows], 0, np.maximum(1 - a, 0))
-        self._sums[rows, 1] = left.sum(axis=1)
+    def _count(self, region: Region) -> None:
+        """Sum importance anew, of parts of rows: a sum of sums has the same bits whatever the way
+        it came about.
+        """
+        rows, columns = region
+        first, last = columns.start // WIDE, -(-columns.stop // WIDE)
+        where = rows, slice(first * WIDE, last * WIDE)
+        a = self._importance[where].astype(np.float64)
+        left = np.where(self._basis.emitters_seen[where], 0, np.maximum(1 - a, 0))
+        starts = np.arange(0, a.shape[1], WIDE)
+        for k, values in enumerate((a, left)):
+            if a.size:
+                self._sums[rows, first:last, k] = np.add.reduceat(values, starts, axis=1)
 
     def _tiles(self) -> "PaintedTiles":
         if self._light is None:

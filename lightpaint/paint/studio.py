@@ -42,6 +42,7 @@ from lightpaint.paint.store import Store
 from lightpaint.paint.subject import PAINTING, Subject
 from lightpaint.paint.told import analysis_fields, light_fields, lights_fields
 from lightpaint.paint.wishes import Wishes
+from lightpaint.progress import while_wanted
 
 #: Seconds of rest after a stroke before the exact answer is looked for.
 REST_S = 0.2
@@ -52,6 +53,10 @@ NICE = 10
 
 class StoppedError(Exception):
     """Somebody does not want it any more."""
+
+
+class OldError(Exception):
+    """Somebody has painted on."""
 
 
 class Studio:
@@ -376,12 +381,20 @@ class Studio:
             if session is None or session.is_open:
                 return
             moment = session.moment()
-        solution = moment.solution()
-        self._tell(lambda: session.settled(moment, solution))
-        if solution is None or moment.version != session.version:
-            return
-        [analysis] = analyse(solution)
-        self._tell(lambda: session.settled(moment, solution, **analysis_fields(analysis)))
+
+        def check() -> None:
+            if moment.version != session.version or not self._is_open:
+                raise OldError
+
+        # The next stroke gets the processors at once, and rings when it is done.
+        with suppress(OldError), while_wanted(check):
+            solution = moment.solution()
+            self._tell(lambda: session.settled(moment, solution))
+            if solution is None:
+                return
+            check()
+            [analysis] = analyse(solution)
+            self._tell(lambda: session.settled(moment, solution, **analysis_fields(analysis)))
 
     def _tell(self, make: Callable[[], Message | None]) -> None:
         with self._lock:
