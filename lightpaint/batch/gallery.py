@@ -159,7 +159,7 @@ def _draw(
         sheet.paste(small, (x + (width - size[0]) // 2, y + (height - size[1]) // 2))
     else:
         draw.rectangle((x, y, x + width - 1, y + height - 1), outline=FAINT)
-        said = "failed" if row.state == "failed" else "not done yet"
+        said = {"failed": "failed", "waiting": "not done yet"}.get(row.state, "no picture")
         color = WARNING if row.state == "failed" else FAINT
         draw.text((x + width // 2, y + height // 2), said, color, font, anchor="mm")
     said = "" if row.delta_e is None else f"dE {row.delta_e:.1f}"

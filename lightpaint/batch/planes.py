@@ -6,16 +6,20 @@ A gallery's mixer is made of it, when no basis is at hand any more.
 import hashlib
 import json
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.batch.task import Task
+from lightpaint.batch.work import Held, fields_of
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
 from lightpaint.records import strict_json
 from lightpaint.report.mixer import planes_for_page, told_light
+from lightpaint.sources import content
 from lightpaint.version import __version__
 
 #: Where they are, and what their names end in.
@@ -56,6 +60,16 @@ def keep_planes(folder: Path, key: str, basis: Basis) -> None:
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, json.dumps(told, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def keep_all_planes(folder: Path, task: Task, obtained: Sequence[Basis], held: Held) -> None:
+    """The same of each basis of a task. obtained: those that are no files already."""
+    bases = list(obtained)
+    if not bases:
+        given = content(fields_of(task, held)["basis"])
+        bases = [given.basis if isinstance(given, LightGroups) else given]
+    for key, basis in zip(task.bases, bases, strict=True):
+        keep_planes(folder, key, basis)
 
 
 def read_planes(path: Path) -> dict[str, Any]:

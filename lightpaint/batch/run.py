@@ -14,6 +14,7 @@ from lightpaint.basis.file import write_basis
 from lightpaint.batch.executor import Executor, InProcess, Processes
 from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.journal import Journal, Line
+from lightpaint.batch.planes import keep_all_planes
 from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases
 from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Done, Task
@@ -143,6 +144,7 @@ class _Run:
             files = task.files
             try:
                 obtained = self._obtained(task)
+                keep_all_planes(self._plan.folder, task, obtained, self._held)
                 if executor.is_apart and obtained:
                     # Workers read what this process rendered, and is done with.
                     files = _saved(obtained, stack)

@@ -2,7 +2,7 @@
 
 import errno
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,6 @@ from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.keys import Space
 from lightpaint.batch.made import dimmed, leave_made, made_folder
-from lightpaint.batch.planes import keep_planes
 from lightpaint.batch.sequence import between
 from lightpaint.batch.task import EXPORT, Done, Task, key_of_basis, key_of_scene
 from lightpaint.batch.variations import shifted
@@ -46,8 +45,6 @@ class Held:
         self._scenes: dict[str, SceneFile] = {}
         self._saved: dict[str, BasisFile | GroupsFile] = {}
         self._bases: dict[str, Basis] = {}
-        #: Keys of bases whose planes lie beside the looks.
-        self.kept: set[str] = set()
 
     def scene(self, given: SceneFile) -> SceneFile:
         """The one that equals `given`, and is loaded by and by."""
@@ -128,10 +125,7 @@ def _answer(task: Task, held: Held, listen: Listener) -> None:
             for view, file in zip(job.views, fields["scenes"], strict=True)
             if view.scene is not None
         ]
-    run(job, listen, bases=None if bases is None else list(bases))
-    if bases is None:
-        bases = [view.basis for view in job.views if view.basis is not None]
-    _keep_planes(task, job.folder, bases, held)
+    run(job, listen, bases=bases)
 
 
 def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> None:
@@ -156,15 +150,6 @@ def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> N
     how: dict[str, Any] = {"views": views, "groups": groups}
     results = made_folder(fields["folder"], scene, task.lightings, **how, force=settings.force)
     leave_made(results, lighting, bases, **how, scene=scene, spp=settings.spp)
-    _keep_planes(task, fields["folder"], bases, held)
-
-
-def _keep_planes(task: Task, folder: Path, bases: Sequence[Basis], held: Held) -> None:
-    """What the gallery needs of the bases of a look, once in a process. folder: of the look."""
-    for key, basis in zip(task.bases, bases, strict=True):
-        if key not in held.kept:
-            keep_planes(folder.parent, key, basis)
-            held.kept.add(key)
 
 
 def made_of(files: tuple[str, ...], basis: Basis, *, share: float, space: Space) -> Lighting:

@@ -27,6 +27,9 @@ const LINKS = {
   'lighting.json': 'lighting',
 };
 
+/** What stands where there is no picture. */
+const BLANK = { failed: 'failed', waiting: 'not done yet', done: 'no picture' };
+
 /** @param {string} id */
 const find = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 /** @param {string} id */
@@ -106,7 +109,7 @@ function card(look) {
     shot.append(picture);
     shot.addEventListener('click', () => show(look));
     item.append(shot);
-  } else item.append(made('div', look.state === 'failed' ? 'failed' : 'not done yet', 'blank'));
+  } else item.append(made('div', BLANK[look.state], 'blank'));
   const says = made('div', '', 'says');
   says.append(made('div', name, 'name'), facts(look));
   if (look.why) says.append(made('div', look.why, 'why'));
