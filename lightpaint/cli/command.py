@@ -1,5 +1,6 @@
 """One command from its words to its exit code."""
 
+import gc
 import io
 import os
 import sys
@@ -39,6 +40,8 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
             from lightpaint.scene.variant import SlowBackendWarning
 
             command = _command(options.command)
+        # What was imported stays, and need not be looked through for garbage again.
+        gc.freeze()
 
         # The commands say it in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
