@@ -105,7 +105,7 @@ class _Planner:
 
     def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
         """The answer, and its render if that is wanted."""
-        how: dict[str, Any] = {"force": self._force, "command": self._command}
+        how: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
         tasks = [answer_task(entry, self._folders, **how)]
         made_of = [self._prints.answer(entry, reads)]
         if "render" in entry.want:

@@ -11,17 +11,22 @@ from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
-from lightpaint.batch.executor import Executor, InProcess, Processes
+from lightpaint.batch.bases import InParts
+from lightpaint.batch.engine import Engine, InProcess
+from lightpaint.batch.errands import Done, Film
 from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
+from lightpaint.batch.processes import Processes
 from lightpaint.batch.summary import Row
-from lightpaint.batch.task import Done, Task
+from lightpaint.batch.task import Task
 from lightpaint.batch.work import fields_of, is_full
 from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
 from lightpaint.scene.quality import on_film
 from lightpaint.settings import Settings
+from lightpaint.sources import SceneFile
 
 
 @dataclass(frozen=True)
@@ -125,16 +130,20 @@ class _Run:
         ]
         self._total = len(left)
         self._listen("steps", 0, self._total, "steps")
-        executor: Executor = InProcess(self._held, self._listen)
-        if self._how.workers > 1:
-            executor = stack.enter_context(Processes(self._how.workers))
+        self._engine = self._begun(stack)
         answers = [step for step in left if step.task.kind == "answer"]
         for keys in dict.fromkeys(step.task.bases for step in answers):
-            self._of_bases([x for x in answers if x.task.bases == keys], executor)
+            self._of_bases([x for x in answers if x.task.bases == keys])
         self._held.only(())
-        self._together([x for x in left if x.task.kind == "render"], executor)
+        self._together([x for x in left if x.task.kind == "render"])
 
-    def _of_bases(self, steps: Sequence[Step], executor: Executor) -> None:
+    def _begun(self, stack: ExitStack) -> Engine:
+        """Who does the work, until `stack` is closed."""
+        if self._how.workers > 1:
+            return stack.enter_context(Processes(self._how.workers))
+        return InProcess(self._held, self._listen)
+
+    def _of_bases(self, steps: Sequence[Step]) -> None:
         """Looks that share their bases; those that are made of others come after them."""
         task = steps[0].task
         self._held.only(task.bases)
@@ -142,7 +151,7 @@ class _Run:
             files = task.files
             try:
                 obtained = self._obtained(task)
-                if executor.is_apart and obtained:
+                if self._engine.is_apart and obtained:
                     # Workers read what this process rendered, and is done with.
                     files = _saved(obtained, stack)
                     self._held.only(())
@@ -154,7 +163,7 @@ class _Run:
                 return
             for wave in _waves(steps, self._looks):
                 given = [replace(step, task=replace(step.task, files=files)) for step in wave]
-                self._together(given, executor)
+                self._together(given)
                 if self._is_stopped():
                     return
 
@@ -167,16 +176,22 @@ class _Run:
         bases = []
         for key, scene in zip(task.bases, fields["scenes"], strict=True):
             film = on_film(scene.content, settings.quality, settings.resolution)
-            bases.append(self._held.basis(film, key, settings, self._listen))
+            basis = self._held.basis(key)
+            if basis is None:
+                its = Film(scene, settings.quality, settings.resolution, _files(scene))
+                render = InParts(self._engine, its)
+                basis = obtain(film, settings, self._listen, render=render)
+                self._held.hold(key, basis)
+            bases.append(basis)
         return bases
 
-    def _together(self, steps: Sequence[Step], executor: Executor) -> None:
+    def _together(self, steps: Sequence[Step]) -> None:
         """Steps that do not wait for each other, and again those that failed and may be tried."""
         by_look = {step.task.look: step for step in steps}
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
             again = []
-            for done in _closing(executor.run([step.task for step in waiting])):
+            for done in _closing(self._engine.run([step.task for step in waiting])):
                 step = by_look[done.look]
                 if done.is_full:
                     raise OutputError(f"{done.failure}: make room; the same command goes on")
@@ -208,7 +223,7 @@ class _Run:
         if done.failure:
             self._fail(look, step, done.failure, done)
         else:
-            self.journal.add(Line(done.look, done.kind, "done", step.made_of))
+            self.journal.add(Line(done.look, step.task.kind, "done", step.made_of))
             if step.task.kind == look.steps[-1].task.kind:
                 self.outcome.done.append(done.look)
                 self.outcome.waiting.remove(done.look)
@@ -264,6 +279,11 @@ def _alone(folder: Path, *, may_share: bool) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _files(scene: SceneFile) -> tuple[str, ...]:
+    """All that it is made of."""
+    return tuple(map(str, scene.content.read_files))
 
 
 def _saved(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:

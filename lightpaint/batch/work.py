@@ -9,16 +9,19 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
+from lightpaint.basis.render.parts import PartRenderer, lesson
+from lightpaint.batch.errands import Done, Errand, Film, Lesson, PartOfBasis
 from lightpaint.batch.keys import Space
 from lightpaint.batch.sequence import between
-from lightpaint.batch.task import Done, Task, key_of_basis, key_of_scene
+from lightpaint.batch.spool import read_lesson
+from lightpaint.batch.task import Task, key_of_basis
 from lightpaint.batch.variations import shifted
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.pipeline import obtain, run
+from lightpaint.pipeline import run
 from lightpaint.progress import Listener
 from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.renders import relight_look, relit_folder
@@ -35,6 +38,9 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 #: Characters of a reason.
 LONGEST = 600
 
+#: What is said of one that memory does not suffice for.
+TOO_LARGE = "it takes more memory than there is: use resolution=... or fewer workers"
+
 
 class Held:
     """Scenes and bases that several looks share, each loaded or rendered once in this process."""
@@ -43,6 +49,8 @@ class Held:
         self._scenes: dict[str, SceneFile] = {}
         self._saved: dict[str, BasisFile] = {}
         self._bases: dict[str, Basis] = {}
+        self._renderer: PartRenderer | None = None
+        self._rendered = ""
 
     def scene(self, given: SceneFile) -> SceneFile:
         """The one that equals `given`, and is loaded by and by."""
@@ -52,16 +60,38 @@ class Held:
         """The one of the same file, which is read by and by."""
         return self._saved.setdefault(given.path, given)
 
-    def basis(self, scene: Scene, key: str, settings: Settings, listen: Listener) -> Basis:
-        """That of `scene` on its film: held, kept or rendered. key: `key_of_scene`."""
-        if key not in self._bases:
-            self._bases[key] = obtain(scene, settings, listen)
-        return self._bases[key]
+    def basis(self, key: str) -> Basis | None:
+        """That of that key, if it is held. key: `key_of_scene`."""
+        return self._bases.get(key)
+
+    def hold(self, key: str, basis: Basis) -> None:
+        """Hold the basis of that key."""
+        self._bases[key] = basis
 
     def read(self, key: str, file: str) -> None:
         """Hold the basis of that key, which was saved for workers."""
         if file and key not in self._bases:
             self._bases[key] = read_basis(file)
+
+    def film(self, film: Film) -> Scene:
+        """The scene on it."""
+        self.rest()
+        return on_film(self.scene(film.scene).content, film.quality, film.resolution)
+
+    def renderer(self, errand: PartOfBasis) -> PartRenderer:
+        """What renders that part; it stays loaded until the next errand is another basis's."""
+        key = repr((errand.film.key, errand.seed, errand.learned))
+        if self._renderer is None or self._rendered != key:
+            scene = self.film(errand.film)
+            learned = read_lesson(errand.learned) if errand.learned else None
+            self._renderer, self._rendered = PartRenderer(scene, errand.seed, learned), key
+        return self._renderer
+
+    def rest(self) -> None:
+        """Let go of what is loaded to render parts."""
+        if self._renderer is not None:
+            self._renderer.close()
+        self._renderer = None
 
     def only(self, keys: Collection[str]) -> None:
         """Let go of all bases but those."""
@@ -69,22 +99,35 @@ class Held:
         self._saved = {k: x for k, x in self._saved.items() if key_of_basis(x) in keys}
 
 
-def do(task: Task, held: Held, listen: Listener) -> Done:
-    """Do one task; what prevents it is said in one line, and is its own failure alone."""
+def do(errand: Errand, held: Held, listen: Listener) -> Done:
+    """Do one errand; what prevents it is said in one line, and is its own failure alone."""
     begun = time.perf_counter()
-    failure, full = "", False
+    failure, full, lost, value = "", False, False, None
     try:
-        (_answer if task.kind == "answer" else _render)(task, held, listen)
+        value = _done(errand, held, listen)
     except LightpaintError as error:
         failure, full = str(error), is_full(error)
     except MemoryError:
-        failure = "it takes more memory than there is: use resolution=... or fewer workers"
+        failure, lost = TOO_LARGE, True
     except OSError as error:
         failure, full = first_line(error), error.errno in FULL
     except Exception as error:  # a mistake of ours, or of a library's: the others go on
         failure = f"{type(error).__name__}: {first_line(error)}"
     spent_s = time.perf_counter() - begun
-    return Done(task.look, task.kind, one_line(failure, limit=LONGEST), full, spent_s=spent_s)
+    said = one_line(failure, limit=LONGEST)
+    return Done(errand.name, errand.kind, said, full, lost, spent_s, value=value)
+
+
+def _done(errand: Errand, held: Held, listen: Listener) -> Any:
+    """What an errand comes to, if that is not a folder that was filled."""
+    if isinstance(errand, Lesson):
+        return lesson(held.film(errand.film), errand.spp, errand.seed)
+    if isinstance(errand, PartOfBasis):
+        return held.renderer(errand).render(errand.part)
+    held.rest()
+    assert isinstance(errand, Task)
+    held.only(errand.bases)
+    return (_answer if errand.kind == "answer" else _render)(errand, held, listen)
 
 
 def is_full(error: BaseException) -> bool:
@@ -117,11 +160,7 @@ def _answer(task: Task, held: Held, listen: Listener) -> None:
     job = Job(**fields)
     bases = None
     if job.basis is None:
-        bases = [
-            held.basis(view.scene, key_of_scene(file, job.settings), job.settings, listen)
-            for view, file in zip(job.views, fields["scenes"], strict=True)
-            if view.scene is not None
-        ]
+        bases = [basis for key in task.bases if (basis := held.basis(key)) is not None]
     run(job, listen, bases=bases)
 
 
@@ -135,9 +174,8 @@ def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> N
     if fields["basis"] is not None:
         basis = fields["basis"].content
     else:
-        assert scene is not None
-        film = on_film(scene, settings.quality, settings.resolution)
-        basis = held.basis(film, task.bases[0], settings, listen)
+        basis = held.basis(task.bases[0])
+        assert basis is not None
     lighting = made_of(task.lightings, basis, share=task.share, space=task.space)
     if task.mireds:
         dimmed = {light.name for light in basis.lights if light.is_scalar}

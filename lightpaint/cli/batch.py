@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from lightpaint.batch.errands import Done
 from lightpaint.batch.estimate import estimate
 from lightpaint.batch.first import write_first
 from lightpaint.batch.gallery import FILES, spoken_counts
@@ -15,7 +16,6 @@ from lightpaint.batch.planned import Plan, PlannedLook
 from lightpaint.batch.run import How, run_batch
 from lightpaint.batch.run import Outcome as BatchOutcome
 from lightpaint.batch.summary import Row, summary_document
-from lightpaint.batch.task import Done
 from lightpaint.cli import documents, terminal
 from lightpaint.cli.manner import Outcome
 from lightpaint.errors import BatchError, OutputError

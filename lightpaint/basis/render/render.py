@@ -136,13 +136,18 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     return of == replace(mine, each_light=of.each_light) and basis.size == scene.size
 
 
-def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
+def is_on_the_way(
+    scene: Scene, basis: Basis, spp: int | None, *, is_in_parts: bool = False
+) -> bool:
     """Whether a render from nothing to `spp` samples per pixel comes by just those of `basis`.
 
     So does one that an interrupt ended, and not one that was made for fewer samples: its passes
-    end elsewhere. spp: the scene's own number if None.
+    end elsewhere. spp: the scene's own number if None. is_in_parts: whether it is rendered by
+    parts.py, which comes by nothing but its end.
     """
     origin = basis.origin
+    if is_in_parts and method_of(scene) == ONE_PASS:
+        return origin.method == IN_PARTS and origin.spp == samples_for(scene, spp)
     if origin.method != method_of(scene):
         return False
     plan = _plan(scene, spp)
