@@ -33,6 +33,10 @@ class Errand(Protocol):
         """Files that it reads."""
 
     @property
+    def carried(self) -> tuple[str, ...]:
+        """Files that it reads, too, which are made for it and only here."""
+
+    @property
     def writes(self) -> str:
         """The folder that it fills; "" if what it comes to is returned."""
 
@@ -97,6 +101,7 @@ class Lesson:
     expected_s: float
     kind: Literal["lesson"] = "lesson"
     writes: str = ""
+    carried: tuple[str, ...] = ()
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -124,7 +129,12 @@ class PartOfBasis:
     @property
     def needs(self) -> tuple[str, ...]:
         """As of `Errand`."""
-        return (*self.film.files, *([self.learned] if self.learned else []))
+        return self.film.files
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """As of `Errand`."""
+        return (self.learned,) if self.learned else ()
 
     def moved(self, move: Move) -> "PartOfBasis":
         """As of `Errand`."""
@@ -148,6 +158,7 @@ class Passes:
     expected_s: float
     kind: Literal["passes"] = "passes"
     writes: str = ""
+    carried: tuple[str, ...] = ()
 
     @property
     def needs(self) -> tuple[str, ...]:

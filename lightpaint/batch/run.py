@@ -12,6 +12,7 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.batch.bases import InParts
+from lightpaint.batch.cluster import Cluster
 from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.errands import Done, Film
 from lightpaint.batch.gallery import write_gallery
@@ -36,12 +37,17 @@ class How:
     workers: processes; 1 for none beside this. keep_going: whether what fails stops nothing else.
     retry: how often a step that failed is tried again. apart: whether others do the other looks of
     the plan at the same time, in the same folder; the gallery is left to who comes last.
+    cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
+    same files under the same paths. task_limit_s: seconds after which one of them counts as hung.
     """
 
     workers: int = 1
     keep_going: bool = True
     retry: int = 0
     apart: bool = False
+    cluster: str | None = None
+    shared_fs: bool = False
+    task_limit_s: float | None = None
 
 
 @dataclass
@@ -139,8 +145,14 @@ class _Run:
 
     def _begun(self, stack: ExitStack) -> Engine:
         """Who does the work, until `stack` is closed."""
-        if self._how.workers > 1:
-            return stack.enter_context(Processes(self._how.workers))
+        how = self._how
+        if how.cluster is not None:
+            cluster = Cluster(
+                how.cluster, self._listen, is_shared=how.shared_fs, limit_s=how.task_limit_s
+            )
+            return stack.enter_context(cluster)
+        if how.workers > 1:
+            return stack.enter_context(Processes(how.workers))
         return InProcess(self._held, self._listen)
 
     def _of_bases(self, steps: Sequence[Step]) -> None:

@@ -57,13 +57,22 @@ class Task:
         return str(json.loads(self.job)["folder"])
 
     @property
+    def force(self) -> bool:
+        """Whether results of something else, or changed by hand, are replaced."""
+        return bool(json.loads(self.job)["settings"]["force"])
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """As of `Errand`: of a final render also what lies beside the lighting."""
         beside: list[str] = []
         if self.kind == "render":
             beside = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
-        files = (file for file in self.files if file)
-        return tuple(dict.fromkeys([*self.reads, *self.lightings, *files, *beside]))
+        return tuple(dict.fromkeys([*self.reads, *self.lightings, *beside]))
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """As of `Errand`."""
+        return tuple(file for file in self.files if file)
 
     def moved(self, move: Move) -> "Task":
         """As of `Errand`."""
