@@ -17,7 +17,7 @@ from typing import Any
 from lightpaint.batch import cluster_worker
 from lightpaint.batch.cluster_worker import versions as own_versions
 from lightpaint.batch.engine import LOST, TRIES
-from lightpaint.batch.errands import Done, Errand
+from lightpaint.batch.errands import Done, Errand, spoken
 from lightpaint.batch.parcels import Contents, Parcel, packed, pieces, sent_files, unpack
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import first_line
@@ -253,7 +253,7 @@ class Cluster:
             event = self._events.popleft()
             self.begun.append((event["errand"], event["worker"]))
             for sent in self._sent:
-                if (sent.errand.name, sent.worker) == self.begun[-1]:
+                if (spoken(sent.errand), sent.worker) == self.begun[-1]:
                     sent.since_s = time.monotonic()
             self._listen.note(f"{event['errand']} begun by {event['worker']}")
 
@@ -271,7 +271,7 @@ class Cluster:
                 continue
             self._sent.remove(sent)
             self._note_turns()
-            self._returned[sent.errand.name, sent.worker] += not isinstance(came, list)
+            self._returned[spoken(sent.errand), sent.worker] += not isinstance(came, list)
             if isinstance(came, list):  # a worker that was begun anew at the same address
                 self._has.get(sent.worker, set()).difference_update(came)
                 waiting.appendleft(sent.errand)
@@ -312,9 +312,9 @@ class Cluster:
             with suppress(Exception):
                 sent.future.cancel(force=True)
             self._sent.remove(sent)
-            name = sent.errand.name
             if sent.since_s is not None:  # it was at work on that
-                tries[name] += 1
+                tries[sent.errand.name] += 1
+                name = spoken(sent.errand)
                 self._listen.say(f"{name}: worker {sent.worker} is lost; trying elsewhere")
             waiting.appendleft(sent.errand)
         self._note_turns()
@@ -331,7 +331,8 @@ class Cluster:
             limit_s = self._limit_s or max(LEAST_S, PATIENCE * sent.errand.expected_s)
             if sent.since_s is None or time.monotonic() - sent.since_s < limit_s:
                 continue
-            self._listen.say(f"{sent.errand.name}: worker {sent.worker} takes over {limit_s:.0f} s")
+            name = spoken(sent.errand)
+            self._listen.say(f"{name}: worker {sent.worker} takes over {limit_s:.0f} s")
             self._left_out[sent.worker] = "it took too long"
             self._workers.remove(sent.worker)
             self._lose([x for x in self._sent if x.worker == sent.worker], waiting, tries)

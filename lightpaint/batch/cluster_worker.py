@@ -9,7 +9,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from lightpaint.batch.errands import Done
+from lightpaint.batch.errands import Done, spoken
 from lightpaint.batch.parcels import Parcel, Store
 from lightpaint.batch.work import Held, do
 from lightpaint.progress import silent
@@ -64,5 +64,5 @@ def _do(parcel: Parcel, worker: Any) -> Done | list[str]:
         _HERE.held, _HERE.run = Held(), parcel.run
         threadpool_limits(worker.state.nthreads, "blas")
         limit_threads(worker.state.nthreads)
-    worker.log_event(parcel.run, {"errand": parcel.errand.name, "worker": worker.address})
+    worker.log_event(parcel.run, {"errand": spoken(parcel.errand), "worker": worker.address})
     return store.done(parcel, lambda errand: do(errand, _HERE.held, silent))

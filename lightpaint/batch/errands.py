@@ -48,6 +48,12 @@ class Errand(Protocol):
         """The same by other paths."""
 
 
+def spoken(errand: Errand) -> str:
+    """What an errand is called: `evening: answer`, `part 3`."""
+    is_step = errand.kind in ("answer", "render")
+    return f"{errand.name}: {errand.kind}" if is_step else errand.name
+
+
 @dataclass(frozen=True)
 class Done:
     """What came of an errand. failure: why it came to nothing; "" where it is done.

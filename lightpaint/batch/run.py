@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
@@ -19,9 +20,10 @@ from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
 from lightpaint.batch.processes import Processes
+from lightpaint.batch.spread import rendered_by
 from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Task
-from lightpaint.batch.work import fields_of, is_full
+from lightpaint.batch.work import attempted, fields_of, final_render, is_full
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
@@ -203,7 +205,7 @@ class _Run:
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
             again = []
-            for done in _closing(self._engine.run([step.task for step in waiting])):
+            for done in _closing(self._done([step.task for step in waiting])):
                 step = by_look[done.look]
                 if done.is_full:
                     raise OutputError(f"{done.failure}: make room; the same command goes on")
@@ -215,6 +217,17 @@ class _Run:
                 if self._is_stopped():
                     return
             waiting = again
+
+    def _done(self, tasks: Sequence[Task]) -> Iterator[Done]:
+        """What comes of each; of few final renders each is done by all workers."""
+        are_few = len(tasks) < self._engine.workers and self._engine.is_apart
+        if not (are_few and tasks[0].kind == "render"):
+            yield from self._engine.run(tasks)
+            return
+        for task in tasks:
+            variant = fields_of(task, self._held)["scenes"][0].variant
+            by_all = rendered_by(self._engine, task, variant, self._listen)
+            yield attempted(task, partial(final_render, task, self._held, self._listen, by_all))
 
     def _can_begin(self, step: Step) -> bool:
         """Whether the look has not failed by now, nor what it is made of."""

@@ -2,7 +2,7 @@
 
 import errno
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,8 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.parts import PartRenderer, lesson
-from lightpaint.batch.errands import Done, Errand, Film, Lesson, PartOfBasis
+from lightpaint.batch.errands import Done, Errand, Film, Lesson, PartOfBasis, Passes
+from lightpaint.batch.frames import Frame
 from lightpaint.batch.keys import Space
 from lightpaint.batch.sequence import between
 from lightpaint.batch.spool import read_lesson
@@ -18,6 +19,7 @@ from lightpaint.batch.task import Task, key_of_basis
 from lightpaint.batch.variations import shifted
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
+from lightpaint.images.estimate import Estimate
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
@@ -49,7 +51,7 @@ class Held:
         self._scenes: dict[str, SceneFile] = {}
         self._saved: dict[str, BasisFile] = {}
         self._bases: dict[str, Basis] = {}
-        self._renderer: PartRenderer | None = None
+        self._renderer: PartRenderer | Frame | None = None
         self._rendered = ""
 
     def scene(self, given: SceneFile) -> SceneFile:
@@ -81,10 +83,18 @@ class Held:
     def renderer(self, errand: PartOfBasis) -> PartRenderer:
         """What renders that part; it stays loaded until the next errand is another basis's."""
         key = repr((errand.film.key, errand.seed, errand.learned))
-        if self._renderer is None or self._rendered != key:
+        if not isinstance(self._renderer, PartRenderer) or self._rendered != key:
             scene = self.film(errand.film)
             learned = read_lesson(errand.learned) if errand.learned else None
             self._renderer, self._rendered = PartRenderer(scene, errand.seed, learned), key
+        return self._renderer
+
+    def frame(self, errand: Passes) -> Frame:
+        """What renders those passes; it stays loaded as well."""
+        key = repr((errand.relit, errand.final))
+        if not isinstance(self._renderer, Frame) or self._rendered != key:
+            scene = self.film(Film(errand.relit, None, errand.final.resolution))
+            self._renderer, self._rendered = Frame(scene, errand.final), key
         return self._renderer
 
     def rest(self) -> None:
@@ -101,10 +111,15 @@ class Held:
 
 def do(errand: Errand, held: Held, listen: Listener) -> Done:
     """Do one errand; what prevents it is said in one line, and is its own failure alone."""
+    return attempted(errand, lambda: _done(errand, held, listen))
+
+
+def attempted(errand: Errand, work: Callable[[], Any]) -> Done:
+    """What comes of `work`, which is that errand."""
     begun = time.perf_counter()
     failure, full, lost, value = "", False, False, None
     try:
-        value = _done(errand, held, listen)
+        value = work()
     except LightpaintError as error:
         failure, full = str(error), is_full(error)
     except MemoryError:
@@ -124,10 +139,12 @@ def _done(errand: Errand, held: Held, listen: Listener) -> Any:
         return lesson(held.film(errand.film), errand.spp, errand.seed)
     if isinstance(errand, PartOfBasis):
         return held.renderer(errand).render(errand.part)
+    if isinstance(errand, Passes):
+        return held.frame(errand).sum(range(errand.first, errand.last))
     held.rest()
     assert isinstance(errand, Task)
     held.only(errand.bases)
-    return (_answer if errand.kind == "answer" else _render)(errand, held, listen)
+    return (_answer if errand.kind == "answer" else final_render)(errand, held, listen)
 
 
 def is_full(error: BaseException) -> bool:
@@ -214,8 +231,13 @@ def made_folder(
     return ResultFolder(folder, tuple(files), reads, answers, force=force)
 
 
-def _render(task: Task, held: Held, listen: Listener) -> None:
-    """The final render of a look that is answered."""
+def final_render(
+    task: Task,
+    held: Held,
+    listen: Listener,
+    rendered: Callable[[Scene], Estimate] | None = None,
+) -> None:
+    """The final render of a look that is answered. rendered: who renders, if others do."""
     fields = fields_of(task, held)
     [lighting] = map(Path, task.lightings)
     results = relit_folder(
@@ -224,5 +246,10 @@ def _render(task: Task, held: Held, listen: Listener) -> None:
     how: dict[str, Any] = {"spp": task.final.spp, "seed": task.final.seed}
     how["resolution"] = task.final.resolution
     relight_look(
-        fields["scenes"][0].content, read_lighting(lighting), results, progress=listen, **how
+        fields["scenes"][0].content,
+        read_lighting(lighting),
+        results,
+        progress=listen,
+        rendered=rendered,
+        **how,
     )

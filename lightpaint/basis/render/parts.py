@@ -180,10 +180,9 @@ class PartRenderer:
                 {x.name: white if x.name == its else black for x in self._scene.lights}
             )
             self._light = light
-        with kernels():
-            image = light_pass(
-                self._loaded, self._scene, light, part.half, part.number, part.spp, self._seed
-            )
+        image = light_pass(
+            self._loaded, self._scene, light, part.half, part.number, part.spp, self._seed
+        )
         return image[None], np.zeros(self._scene.size, np.float32)
 
     def close(self) -> None:

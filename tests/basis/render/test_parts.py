@@ -23,7 +23,7 @@ from lightpaint.basis.render.parts import (
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.scene.threads import kernels, limit_threads
+from lightpaint.scene.threads import limit_threads
 
 SPP = 32
 
@@ -142,7 +142,6 @@ def test_lights_that_are_rendered_one_by_one(tmp_path: Path) -> None:
     plan = plan_parts(scene, 8)
     assert len(plan) == 4
     parts = made(scene, lesson(scene, 8, 0), plan[::-1], plan)
-    with kernels():
-        whole = render_basis(scene, spp=8)
+    whole = render_basis(scene, spp=8)
     assert same(parts, whole)
     assert parts.origin == whole.origin
