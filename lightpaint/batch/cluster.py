@@ -6,7 +6,6 @@ a worker is known for every errand: one that dies, or takes too long over it, lo
 
 import os
 import secrets
-import socket
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
@@ -14,18 +13,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from lightpaint.batch import cluster_worker
-from lightpaint.batch.cluster_worker import versions as own_versions
+from lightpaint.batch.cluster_workers import ANSWER_S, ClusterWorkers
 from lightpaint.batch.engine import LOST, TRIES
 from lightpaint.batch.errands import Done, Errand, spoken
-from lightpaint.batch.parcels import Contents, Parcel, packed, pieces, sent_files, unpack
-from lightpaint.errors import BatchError, LightpaintError
+from lightpaint.batch.parcels import Contents, Parcel, packed, unpack
+from lightpaint.batch.work import is_full
+from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line
 from lightpaint.progress import Listener
 
-#: Seconds for the scheduler to answer; between looks at who is there; and between looks at what has
-#: come.
-ANSWER_S, LOOK_S, POLL_S = 15.0, 1.0, 0.02
+#: Seconds between looks at what has come.
+POLL_S = 0.02
 
 #: Seconds that workers have to say what they did, at the end.
 LAST_WORDS_S = 2.0
@@ -35,8 +33,6 @@ DEPTH = 2
 
 #: An errand may take so many times what it is expected to take on one thread, and so long at least.
 PATIENCE, LEAST_S = 20.0, 300.0
-
-INSTALL = "pip install 'lightpaint[cluster]'"
 
 
 @dataclass
@@ -70,15 +66,9 @@ class Cluster:
         self._address, self._listen = address, listen
         self._is_shared, self._limit_s = is_shared, limit_s
         self._run, self._contents = f"lightpaint-{secrets.token_hex(6)}", Contents()
-        self._client: Any = None
-        self._workers: list[str] = []
-        self._left_out: dict[str, str] = {}
-        self._has: dict[str, set[str]] = {}
+        self._at: ClusterWorkers
         self._sent: list[_Sent] = []
         self._failed_at: dict[str, set[str]] = {}
-        self._events: deque[dict[str, str]] = deque()
-        self._looked_s = 0.0
-        self._is_told = False
         #: Which worker has begun what, in turn; an errand that stands there twice was lost once.
         self.begun: list[tuple[str, str]] = []
         self._returned = Counter[tuple[str, str]]()
@@ -86,26 +76,10 @@ class Cluster:
     @property
     def workers(self) -> int:
         """How many there are now."""
-        return max(1, len(self._workers))
+        return max(1, len(self._at.there))
 
     def __enter__(self) -> "Cluster":
-        try:
-            from distributed import Client
-            from distributed.comm import get_address_host_port
-        except ImportError as error:
-            raise BatchError(f"a cluster needs Dask's distributed: {INSTALL}") from error
-        try:
-            # A client that finds nobody takes its time, and has last words.
-            place = get_address_host_port(self._address, strict=True)
-            socket.create_connection(place, timeout=ANSWER_S).close()
-            self._client = Client(self._address, timeout=ANSWER_S, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
-            raise BatchError(
-                f"no scheduler answers at {self._address}: {first_line(error) or 'none is there'}; "
-                "give its address, like tcp://host:8786 (dask scheduler tells it)"
-            ) from error
-        self._client.subscribe_topic(self._run, lambda event: self._events.append(event[1]))
-        self._look_around()
+        self._at = ClusterWorkers(self._address, self._listen, self._run)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -115,8 +89,7 @@ class Cluster:
         while self._returned - Counter(self.begun) and time.monotonic() < deadline_s:
             time.sleep(POLL_S)
             self._hear()
-        with suppress(Exception):
-            self._client.close(timeout=2)
+        self._at.close()
 
     def run(self, errands: Sequence[Errand]) -> Iterator[Done]:
         """As of `Engine`."""
@@ -127,7 +100,7 @@ class Cluster:
         common = {file for file, count in readers.items() if count > 1}
         try:
             while waiting or self._sent:
-                self._look_around()
+                self._at.look_around()
                 self._lose_the_dead(waiting, tries)
                 yield from self._given_up(waiting, tries)
                 yield from self._hand_out(waiting, common)
@@ -144,57 +117,12 @@ class Cluster:
                 sent.future.cancel(force=True)
         self._sent = []
 
-    def _look_around(self) -> None:
-        """Who is there; each is asked once whether it has what is here."""
-        if time.monotonic() - self._looked_s < LOOK_S:
-            return
-        there = [x for x in self._there() if x not in self._left_out]
-        for worker in set(there) - set(self._workers):
-            if why := self._why_not(worker):
-                self._left_out[worker] = why
-                self._listen.say(f"worker {worker} is left out: {why}")
-        self._workers = [worker for worker in there if worker not in self._left_out]
-        self._has = {worker: self._has.get(worker, set()) for worker in self._workers}
-        if not self._workers and not self._is_told:
-            self._listen.say(f"waiting for workers at {self._address}")
-        self._is_told = not self._workers
-        self._looked_s = time.monotonic()
-
-    def _there(self) -> list[str]:
-        """Addresses of all workers. Raises BatchError where the scheduler is gone."""
-        try:
-            if self._client.status == "running":
-                return list(self._client.nthreads())
-        except Exception as error:
-            said = first_line(error)
-        else:
-            said = self._client.status
-        raise BatchError(
-            f"the scheduler at {self._address} is gone ({said}); the same command goes on once it "
-            "is back"
-        )
-
-    def _why_not(self, worker: str) -> str:
-        """Why a worker is of no use; "" where it is."""
-        try:
-            found = self._client.run(cluster_worker.versions, workers=[worker])
-        except Exception as error:
-            return f"lightpaint does not run there ({first_line(error)})"
-        if worker not in found:
-            return "it is gone"
-        mine, its = own_versions(), found[worker]
-        return ", ".join(
-            f"it has {name} {its.get(name)}, and here is {mine[name]}"
-            for name in mine
-            if its.get(name) != mine[name]
-        )
-
     def _hand_out(self, waiting: deque[Errand], common: set[str]) -> Iterator[Done]:
         """Give every worker something to do, and the next thing where there is enough for all."""
         for depth in range(1, DEPTH + 1):
-            for worker in self._workers:
+            for worker in self._at.there:
                 loaded = sum(sent.worker == worker for sent in self._sent)
-                enough = depth == 1 or len(waiting) >= len(self._workers)
+                enough = depth == 1 or len(waiting) >= len(self._at.there)
                 errand = self._for(worker, waiting) if loaded < depth and enough else None
                 if errand is not None:
                     waiting.remove(errand)
@@ -207,37 +135,17 @@ class Cluster:
         """The next errand that the worker has not failed at, unless all have."""
         for errand in waiting:
             failed_at = self._failed_at.get(errand.name, set())
-            if worker not in failed_at or failed_at >= set(self._workers):
+            if worker not in failed_at or failed_at >= set(self._at.there):
                 return errand
         return None
 
     def _give(self, errand: Errand, worker: str, common: set[str]) -> None:
         parcel = packed(errand, self._contents, run=self._run, is_shared=self._is_shared)
-        self._ship(parcel, worker, common)
-        future = self._client.submit(
-            cluster_worker.do_parcel,
-            parcel,
-            key=f"{self._run}-{errand.kind}-{errand.name}-{secrets.token_hex(4)}",
-            workers=[worker],
-            pure=False,
-        )
+        self._at.ship(parcel, worker, common)
+        key = f"{self._run}-{errand.kind}-{errand.name}-{secrets.token_hex(4)}"
+        future = self._at.submit(parcel, worker, key)
         self._sent.append(_Sent(errand, parcel, worker, future))
         self._note_turns()
-
-    def _ship(self, parcel: Parcel, worker: str, common: set[str]) -> None:
-        """Send what the worker lacks; what others will need goes to all at once."""
-        for file, its in sent_files(parcel):
-            if its in self._has.get(worker, set()):
-                continue
-            to = [worker]
-            if file in common:
-                to += [x for x in self._workers if x != worker and its not in self._has[x]]
-            with open(file, "rb") as opened:
-                data = opened.read()
-            for piece in pieces(data):
-                self._client.run(cluster_worker.put, its, *piece, workers=to, on_error="ignore")
-            for one in to:
-                self._has.setdefault(one, set()).add(its)
 
     def _note_turns(self) -> None:
         """Since when the first errand of each worker is."""
@@ -249,8 +157,8 @@ class Cluster:
 
     def _hear(self) -> None:
         """What workers say that they have begun."""
-        while self._events:
-            event = self._events.popleft()
+        while self._at.events:
+            event = self._at.events.popleft()
             self.begun.append((event["errand"], event["worker"]))
             for sent in self._sent:
                 if (spoken(sent.errand), sent.worker) == self.begun[-1]:
@@ -273,7 +181,7 @@ class Cluster:
             self._note_turns()
             self._returned[spoken(sent.errand), sent.worker] += not isinstance(came, list)
             if isinstance(came, list):  # a worker that was begun anew at the same address
-                self._has.get(sent.worker, set()).difference_update(came)
+                self._at.lacks(sent.worker, came)
                 waiting.appendleft(sent.errand)
                 continue
             if came.is_lost and tries[came.look] + 1 < TRIES:  # memory, which others may have
@@ -281,12 +189,7 @@ class Cluster:
                 self._failed_at.setdefault(came.look, set()).add(sent.worker)
                 waiting.append(sent.errand)
                 continue
-            if came.files is not None:
-                try:
-                    unpack(sent.errand, came.files)
-                except LightpaintError as error:
-                    came = Done(came.look, came.kind, str(error))
-            yield came
+            yield came if came.files is None else _unpacked(sent.errand, came)
 
     def _came(self, sent: _Sent) -> Done | list[str] | None:
         """What came of it; None if it was lost on the way."""
@@ -295,7 +198,7 @@ class Cluster:
             came: Done | list[str] = sent.future.result(timeout=ANSWER_S)
             return came
         except Exception as error:
-            if isinstance(error, OSError) or sent.worker not in self._there():
+            if isinstance(error, OSError) or not self._at.is_there(sent.worker):
                 return None
             if sent.future.status != "error" or type(error).__name__ == "KilledWorker":
                 return None
@@ -304,7 +207,7 @@ class Cluster:
     def _lose_the_dead(self, waiting: deque[Errand], tries: Counter[str]) -> None:
         """What workers had that are gone is to be done again."""
         self._hear()
-        self._lose([x for x in self._sent if x.worker not in self._workers], waiting, tries)
+        self._lose([x for x in self._sent if x.worker not in self._at.there], waiting, tries)
 
     def _lose(self, some: Sequence[_Sent], waiting: deque[Errand], tries: Counter[str]) -> None:
         """Take back what workers had."""
@@ -333,16 +236,15 @@ class Cluster:
                 continue
             name = spoken(sent.errand)
             self._listen.say(f"{name}: worker {sent.worker} takes over {limit_s:.0f} s")
-            self._left_out[sent.worker] = "it took too long"
-            self._workers.remove(sent.worker)
             self._lose([x for x in self._sent if x.worker == sent.worker], waiting, tries)
-            self._end(sent.worker)
+            self._at.end(sent.worker, "it took too long")
             return
 
-    def _end(self, worker: str) -> None:
-        """End a worker's process; its nanny begins another."""
-        try:
-            self._client.restart_workers([worker], timeout=ANSWER_S, raise_for_error=False)
-        except Exception:  # it has no nanny
-            with suppress(Exception):
-                self._client.run(os._exit, 1, workers=[worker], wait=False, on_error="ignore")
+
+def _unpacked(errand: Errand, came: Done) -> Done:
+    """What came of an errand, with what was written brought to its place."""
+    try:
+        unpack(errand, came.files or {})
+    except LightpaintError as error:
+        return Done(came.look, came.kind, str(error), is_full(error))
+    return came

@@ -10,8 +10,9 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.errands import Done, spoken
+from lightpaint.batch.held import Held
 from lightpaint.batch.parcels import Parcel, Store
-from lightpaint.batch.work import Held, do
+from lightpaint.batch.work import do
 from lightpaint.progress import silent
 from lightpaint.scene.threads import limit_threads
 from lightpaint.version import __version__

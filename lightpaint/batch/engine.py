@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from lightpaint.batch.errands import Done, Errand
-from lightpaint.batch.work import Held, do
+from lightpaint.batch.held import Held
+from lightpaint.batch.work import do
 from lightpaint.progress import Listener
 
 #: How often an errand is given to a worker, where workers die over it.

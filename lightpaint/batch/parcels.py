@@ -143,7 +143,9 @@ class Store:
         os.chdir(there)
         done = do(errand.moved(self._mover(parcel, root)))
         if filled is None or done.failure:
-            return replace(done, failure=done.failure.replace(str(root), ""))
+            # A disk that is full is this worker's, and others have others.
+            said, is_lost = done.failure.replace(str(root), ""), done.is_lost or done.is_full
+            return replace(done, failure=said, is_full=False, is_lost=is_lost)
         written = (x for x in sorted(filled.rglob("*")) if x.is_file())
         return replace(
             done,

@@ -9,13 +9,14 @@ from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry, entries_of
 from lightpaint.batch.fingerprint import Fingerprints
 from lightpaint.batch.gallery import check_gallery
+from lightpaint.batch.held import Held
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.manifest import Manifest, read_manifest
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
 from lightpaint.batch.task import answer_task, bases_of, render_task
 from lightpaint.batch.variations import varied
-from lightpaint.batch.work import Held, made_folder
+from lightpaint.batch.work import made_folder
 from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.job import Job

@@ -6,8 +6,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.batch.entries import Entry
+from lightpaint.batch.held import Held
 from lightpaint.batch.task import Kind, Task
-from lightpaint.batch.work import Held
 from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 

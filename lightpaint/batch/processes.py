@@ -12,7 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.engine import LOST, TRIES
 from lightpaint.batch.errands import Done, Errand
-from lightpaint.batch.work import Held, do
+from lightpaint.batch.held import Held
+from lightpaint.batch.work import do
 from lightpaint.progress import silent
 from lightpaint.scene.threads import limit_threads
 

@@ -1,27 +1,26 @@
 """Doing a plan: bases first, then the looks that share each, then final renders."""
 
-import fcntl
-import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
+from lightpaint.batch.alone import alone
 from lightpaint.batch.bases import InParts
 from lightpaint.batch.cluster import Cluster
 from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.errands import Done, Film
 from lightpaint.batch.gallery import write_gallery
+from lightpaint.batch.how import How, Outcome
 from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
 from lightpaint.batch.processes import Processes
 from lightpaint.batch.spread import rendered_by
-from lightpaint.batch.summary import Row
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of, final_render, is_full
 from lightpaint.errors import LightpaintError, OutputError
@@ -30,40 +29,6 @@ from lightpaint.progress import Interrupted, Listener, Progress, listener, silen
 from lightpaint.scene.quality import on_film
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile
-
-
-@dataclass(frozen=True)
-class How:
-    """How a plan is done.
-
-    workers: processes; 1 for none beside this. keep_going: whether what fails stops nothing else.
-    retry: how often a step that failed is tried again. apart: whether others do the other looks of
-    the plan at the same time, in the same folder; the gallery is left to who comes last.
-    cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
-    same files under the same paths. task_limit_s: seconds after which one of them counts as hung.
-    """
-
-    workers: int = 1
-    keep_going: bool = True
-    retry: int = 0
-    apart: bool = False
-    cluster: str | None = None
-    shared_fs: bool = False
-    task_limit_s: float | None = None
-
-
-@dataclass
-class Outcome:
-    """What a run came to. done, failed: names of looks, and why. skipped: done earlier.
-
-    waiting: what was not come to. rows: of all looks, as the summary has them.
-    """
-
-    done: list[str] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)
-    skipped: list[str] = field(default_factory=list)
-    waiting: list[str] = field(default_factory=list)
-    rows: list[Row] = field(default_factory=list)
 
 
 def run_batch(
@@ -86,7 +51,7 @@ def run_batch(
         Interrupted: For Ctrl-C; the same call goes on from there.
     """
     how = how or How()
-    with _alone(plan.folder, may_share=how.apart), ExitStack() as stack:
+    with alone(plan.folder, may_share=how.apart), ExitStack() as stack:
         run = _Run(plan, how, listener(progress), told or (lambda look, done: None))
         try:
             run.all(stack)
@@ -276,34 +241,6 @@ class _Run:
             return None
         spent_s = time.monotonic() - self._begun_s
         return spent_s / self._finished * (self._total - self._finished)
-
-
-@contextmanager
-def _alone(folder: Path, *, may_share: bool) -> Iterator[None]:
-    """Raise OutputError where another batch is at work in `folder`.
-
-    may_share: whether others that may, too, are let work there.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
-    try:
-        with suppress(PermissionError):
-            try:
-                kind = fcntl.LOCK_SH if may_share else fcntl.LOCK_EX
-                fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise OutputError(
-                    f"another batch is at work in {folder}: wait for it, or name another folder "
-                    "(folder=...)"
-                ) from None
-            except OSError:
-                pass  # a disk that knows no locks
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _files(scene: SceneFile) -> tuple[str, ...]:

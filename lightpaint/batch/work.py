@@ -2,20 +2,18 @@
 
 import errno
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis
-from lightpaint.basis.render.parts import PartRenderer, lesson
-from lightpaint.batch.errands import Done, Errand, Film, Lesson, PartOfBasis, Passes
-from lightpaint.batch.frames import Frame
+from lightpaint.basis.render.parts import lesson
+from lightpaint.batch.errands import Done, Errand, Lesson, PartOfBasis, Passes
+from lightpaint.batch.held import Held
 from lightpaint.batch.keys import Space
 from lightpaint.batch.sequence import between
-from lightpaint.batch.spool import read_lesson
-from lightpaint.batch.task import Task, key_of_basis
+from lightpaint.batch.task import Task
 from lightpaint.batch.variations import shifted
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
@@ -29,10 +27,9 @@ from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.renders import relight_look, relit_folder
 from lightpaint.result_folder import ResultFolder
 from lightpaint.results import write_predicted
-from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, SceneFile, from_json
+from lightpaint.sources import BasisFile, from_json
 
 #: What the system says of a disk that takes no more.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -42,71 +39,6 @@ LONGEST = 600
 
 #: What is said of one that memory does not suffice for.
 TOO_LARGE = "it takes more memory than there is: use resolution=... or fewer workers"
-
-
-class Held:
-    """Scenes and bases that several looks share, each loaded or rendered once in this process."""
-
-    def __init__(self) -> None:
-        self._scenes: dict[str, SceneFile] = {}
-        self._saved: dict[str, BasisFile] = {}
-        self._bases: dict[str, Basis] = {}
-        self._renderer: PartRenderer | Frame | None = None
-        self._rendered = ""
-
-    def scene(self, given: SceneFile) -> SceneFile:
-        """The one that equals `given`, and is loaded by and by."""
-        return self._scenes.setdefault(repr(given), given)
-
-    def saved(self, given: BasisFile) -> BasisFile:
-        """The one of the same file, which is read by and by."""
-        return self._saved.setdefault(given.path, given)
-
-    def basis(self, key: str) -> Basis | None:
-        """That of that key, if it is held. key: `key_of_scene`."""
-        return self._bases.get(key)
-
-    def hold(self, key: str, basis: Basis) -> None:
-        """Hold the basis of that key."""
-        self._bases[key] = basis
-
-    def read(self, key: str, file: str) -> None:
-        """Hold the basis of that key, which was saved for workers."""
-        if file and key not in self._bases:
-            self._bases[key] = read_basis(file)
-
-    def film(self, film: Film) -> Scene:
-        """The scene on it."""
-        self.rest()
-        return on_film(self.scene(film.scene).content, film.quality, film.resolution)
-
-    def renderer(self, errand: PartOfBasis) -> PartRenderer:
-        """What renders that part; it stays loaded until the next errand is another basis's."""
-        key = repr((errand.film.key, errand.seed, errand.learned))
-        if not isinstance(self._renderer, PartRenderer) or self._rendered != key:
-            scene = self.film(errand.film)
-            learned = read_lesson(errand.learned) if errand.learned else None
-            self._renderer, self._rendered = PartRenderer(scene, errand.seed, learned), key
-        return self._renderer
-
-    def frame(self, errand: Passes) -> Frame:
-        """What renders those passes; it stays loaded as well."""
-        key = repr((errand.relit, errand.final))
-        if not isinstance(self._renderer, Frame) or self._rendered != key:
-            scene = self.film(Film(errand.relit, None, errand.final.resolution))
-            self._renderer, self._rendered = Frame(scene, errand.final), key
-        return self._renderer
-
-    def rest(self) -> None:
-        """Let go of what is loaded to render parts."""
-        if self._renderer is not None:
-            self._renderer.close()
-        self._renderer = None
-
-    def only(self, keys: Collection[str]) -> None:
-        """Let go of all bases but those."""
-        self._bases = {key: basis for key, basis in self._bases.items() if key in keys}
-        self._saved = {k: x for k, x in self._saved.items() if key_of_basis(x) in keys}
 
 
 def do(errand: Errand, held: Held, listen: Listener) -> Done:

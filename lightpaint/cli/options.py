@@ -15,8 +15,8 @@ from typing import Any
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
 from lightpaint.batch.gallery import check_gallery
+from lightpaint.batch.how import How
 from lightpaint.batch.plan import ALONE
-from lightpaint.batch.run import How
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice

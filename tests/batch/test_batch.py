@@ -21,9 +21,10 @@ from lightpaint.batch import engine as engines
 from lightpaint.batch import work
 from lightpaint.batch.errands import Done
 from lightpaint.batch.gallery import FILES, contact_sheet, gallery_page
+from lightpaint.batch.how import How
 from lightpaint.batch.plan import plan
 from lightpaint.batch.processes import Processes
-from lightpaint.batch.run import How, run_batch
+from lightpaint.batch.run import run_batch
 from lightpaint.batch.summary import LightRow, Row
 from lightpaint.batch.task import Task
 from lightpaint.errors import BatchError, OutputError

@@ -23,8 +23,9 @@ from renderer import write_room
 
 from lightpaint.basis.render import parts as parts_module
 from lightpaint.batch.cluster import Cluster
+from lightpaint.batch.how import How, Outcome
 from lightpaint.batch.plan import plan
-from lightpaint.batch.run import How, Outcome, run_batch
+from lightpaint.batch.run import run_batch
 from lightpaint.images.exr import write_rgb
 from lightpaint.scene import render as render_module
 from lightpaint.scene.threads import limit_threads
@@ -350,7 +351,7 @@ def test_workers_of_another_version_are_left_out(
     workers.await_two()
     mine = {**cluster_worker.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
-    monkeypatch.setattr("lightpaint.batch.cluster.own_versions", lambda: mine)
+    monkeypatch.setattr("lightpaint.batch.cluster_workers.own_versions", lambda: mine)
     hears = Hears()
     with Cluster(workers.address, hears):  # type: ignore[arg-type]
         assert sum("is left out: it has lightpaint" in text for text in hears.said) == 2

@@ -8,11 +8,12 @@ import pytest
 from batches import contents, write_batch
 
 from lightpaint.batch.errands import Done, Errand
+from lightpaint.batch.held import Held
 from lightpaint.batch.parcels import Contents, Parcel, Store, packed, pieces, unpack
 from lightpaint.batch.plan import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.task import Task
-from lightpaint.batch.work import Held, do
+from lightpaint.batch.work import do
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.progress import silent
 
