@@ -5,7 +5,7 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.parts import Part, PartSums, plan_parts
+from lightpaint.basis.render.parts import LESSON, LESSONS, Part, PartSums, plan_parts
 from lightpaint.basis.render.render import (
     ONE_PASS,
     check_memory,
@@ -53,30 +53,12 @@ class InParts:
         check_memory(scene)
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
-        learned = self._learned(scene, spp, seed, start, spool)
+        learned = lesson_by(self._engine, self._film, scene, spp, seed, start, spool)
         sums = PartSums(scene, parts, seed=seed, start=start)
         self._add_all(scene, parts, sums, seed, spool, progress)
         basis = sums.basis(learned)
         spool.drop()
         return basis
-
-    def _learned(
-        self, scene: Scene, spp: int, seed: int, start: Basis | None, spool: Spool
-    ) -> Floats | None:
-        """What all parts choose by, in the spool; None where nothing is chosen."""
-        if method_of(scene) != ONE_PASS:
-            return None
-        learned = spool.lesson() if start is None else start.learned
-        if learned is None:
-            expected_s = rendered_s(2**20, len(scene.lights))
-            [done] = self._engine.run([Lesson("lesson", self._film, spp, seed, expected_s)])
-            if done.failure:
-                raise BasisError(done.failure)
-            learned = done.value
-            assert learned is not None
-        if not spool.learned.is_file():
-            spool.keep_lesson(learned)
-        return learned
 
     def _add_all(
         self,
@@ -108,3 +90,28 @@ class InParts:
             spool.keep_part(part, planes, seen)
             sums.add(part, planes, seen)
             progress("basis", len(parts) - len(left) + count + 1, len(parts), "parts")
+
+
+def lesson_by(
+    engine: Engine,
+    film: Film,
+    scene: Scene,
+    spp: int,
+    seed: int,
+    start: Basis | None,
+    spool: Spool,
+) -> Floats | None:
+    """What all parts choose by, which is put into the spool; None where nothing is chosen."""
+    if method_of(scene) != ONE_PASS:
+        return None
+    learned = spool.lesson() if start is None else start.learned
+    if learned is None:
+        expected_s = rendered_s(LESSON * LESSONS, len(scene.lights))
+        [done] = engine.run([Lesson("lesson", film, spp, seed, expected_s)])
+        if done.failure:
+            raise BasisError(done.failure)
+        learned = done.value
+        assert learned is not None
+    if not spool.learned.is_file():
+        spool.keep_lesson(learned)
+    return learned

@@ -60,6 +60,11 @@ class Entry:
         """Whether its lighting is found, and not made of others."""
         return bool(self.paintings)
 
+    @property
+    def is_by_sums(self) -> bool:
+        """Whether nothing but its lighting is wanted, for which nobody needs its pictures."""
+        return self.want == ("lights",)
+
 
 def entries_of(manifest: Manifest) -> tuple[Entry, ...]:
     """All looks in the order of the manifest; what is wrong is added to its mistakes."""

@@ -10,8 +10,9 @@ from typing import Any, Literal, Protocol
 
 from lightpaint.basis.render.parts import Part
 from lightpaint.batch.keys import Final
+from lightpaint.lighting.fit import Emitters
 from lightpaint.scene.quality import Quality
-from lightpaint.sources import SceneFile, vars_of
+from lightpaint.sources import Painting, SceneFile, vars_of
 
 #: What becomes of a path where an errand is done elsewhere.
 Move = Callable[[str], str]
@@ -26,7 +27,7 @@ class Errand(Protocol):
 
     @property
     def kind(self) -> str:
-        """What it is: `answer` or `render` of a look, `lesson`, `part`, `passes`."""
+        """What it is: `answer` or `render` of a look, `lesson`, `part`, `rows`, `passes`."""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -146,6 +147,63 @@ class PartOfBasis:
         """As of `Errand`."""
         learned = move(self.learned) if self.learned else ""
         return replace(self, film=self.film.moved(move), learned=learned)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A painting that sums are wanted with. emitters: as of `Fit`; resize: as of `Settings`."""
+
+    painting: Painting
+    emitters: Emitters
+    resize: bool
+
+    def moved(self, move: Move) -> "Wanted":
+        """The same by other paths, not read yet."""
+        its = self.painting
+        paths: dict[str, Any] = {
+            name: value if (value := getattr(its, name)) is None else move(value)
+            for name in ("path", "mask", "template")
+        }
+        return replace(self, painting=replace(its, **paths))
+
+
+@dataclass(frozen=True)
+class SumsOfRows:
+    """Some rows of a basis are rendered, and nothing is kept but their sums with paintings.
+
+    parts: all of these rows, in their order. learned: as of `PartOfBasis`. files: of the paintings.
+    """
+
+    name: str
+    film: Film
+    parts: tuple[Part, ...]
+    seed: int
+    learned: str
+    paintings: tuple[Wanted, ...]
+    files: tuple[str, ...]
+    expected_s: float
+    kind: Literal["rows"] = "rows"
+    writes: str = ""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """As of `Errand`."""
+        return (*self.film.files, *self.files)
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """As of `Errand`."""
+        return (self.learned,)
+
+    def moved(self, move: Move) -> "SumsOfRows":
+        """As of `Errand`."""
+        return replace(
+            self,
+            film=self.film.moved(move),
+            learned=move(self.learned),
+            paintings=tuple(one.moved(move) for one in self.paintings),
+            files=tuple(map(move, self.files)),
+        )
 
 
 @dataclass(frozen=True)

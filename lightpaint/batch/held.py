@@ -1,17 +1,19 @@
 """What a process has at hand while it works on a batch."""
 
 from collections.abc import Collection
+from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.parts import PartRenderer
-from lightpaint.batch.errands import Film, PartOfBasis, Passes
+from lightpaint.batch.errands import Film, PartOfBasis, Passes, SumsOfRows, Wanted
 from lightpaint.batch.frames import Frame
 from lightpaint.batch.spool import read_lesson
 from lightpaint.batch.task import key_of_basis
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.sources import BasisFile, SceneFile
+from lightpaint.target.target import Target
 
 
 class Held:
@@ -23,6 +25,7 @@ class Held:
         self._bases: dict[str, Basis] = {}
         self._renderer: PartRenderer | Frame | None = None
         self._rendered = ""
+        self._targets: dict[str, Target] = {}
 
     def scene(self, given: SceneFile) -> SceneFile:
         """The one that equals `given`, and is loaded by and by."""
@@ -47,13 +50,13 @@ class Held:
 
     def film(self, film: Film) -> Scene:
         """The scene on it."""
-        self.rest()
         return on_film(self.scene(film.scene).content, film.quality, film.resolution)
 
-    def renderer(self, errand: PartOfBasis) -> PartRenderer:
+    def renderer(self, errand: PartOfBasis | SumsOfRows) -> PartRenderer:
         """What renders that part; it stays loaded until the next errand is another basis's."""
         key = repr((errand.film.key, errand.seed, errand.learned))
         if not isinstance(self._renderer, PartRenderer) or self._rendered != key:
+            self.rest()
             scene = self.film(errand.film)
             learned = read_lesson(errand.learned) if errand.learned else None
             self._renderer, self._rendered = PartRenderer(scene, errand.seed, learned), key
@@ -63,15 +66,25 @@ class Held:
         """What renders those passes; it stays loaded as well."""
         key = repr((errand.relit, errand.final))
         if not isinstance(self._renderer, Frame) or self._rendered != key:
+            self.rest()
             scene = self.film(Film(errand.relit, None, errand.final.resolution))
             self._renderer, self._rendered = Frame(scene, errand.final), key
         return self._renderer
+
+    def target(self, wanted: Wanted, size: tuple[int, int]) -> Target:
+        """A painting at the size of its basis, read once."""
+        key = repr((wanted, size))
+        if key not in self._targets:
+            read = replace(wanted.painting).content
+            self._targets[key] = read.fitted_to(size, resize=wanted.resize)
+        return self._targets[key]
 
     def rest(self) -> None:
         """Let go of what is loaded to render parts."""
         if self._renderer is not None:
             self._renderer.close()
         self._renderer = None
+        self._targets = {}
 
     def only(self, keys: Collection[str]) -> None:
         """Let go of all bases but those."""

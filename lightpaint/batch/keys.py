@@ -13,8 +13,8 @@ from lightpaint.scene.film import check_resolution
 from lightpaint.settings import Settings
 from lightpaint.target.read import Paint
 
-#: What can be wanted of a look.
-Step = Literal["solve", "predict", "verify", "report", "render"]
+#: What can be wanted of a look; `lights` is the lighting and nothing else.
+Step = Literal["solve", "predict", "verify", "report", "render", "lights"]
 
 #: What a sequence is even in: stops of each channel, or lightness and hue as people see them.
 Space = Literal["log", "oklab"]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry, entries_of
 from lightpaint.batch.fingerprint import Fingerprints
@@ -22,6 +23,7 @@ from lightpaint.files import check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.sums import why_not_by_sums
 from lightpaint.relit.relight import scene_of
 from lightpaint.result_folder import is_as_written
 from lightpaint.scene.quality import on_film, samples
@@ -138,6 +140,8 @@ class _Planner:
                 entry.variation, replace(settings, hold=job.fit.hold), asked, lights
             )
             job = self._job(entry, scenes, basis, settings, asked)
+        if entry.is_by_sums:
+            _check_by_sums(job)
         self._note_costs(entry, [view.scene for view in job.views], job.settings)
         if entry.final.resolution is not None and "render" in entry.want:
             on_film(scenes[0].content, None, entry.final.resolution)
@@ -202,6 +206,15 @@ class _Planner:
                 film.spp if asked is None else asked,
                 memory_needed(film),
             )
+
+
+def _check_by_sums(job: Job) -> None:
+    """Raise BatchError for a lighting that does not follow from sums."""
+    [view] = job.views
+    assert view.scene is not None
+    why = why_not_by_sums(view.target, job.fit) or why_not_one_pass(view.scene)
+    if why:
+        raise BatchError(f"want = ['lights'] takes sums alone, and {why}: want 'solve' instead")
 
 
 def _adjusted(job: Job) -> int:

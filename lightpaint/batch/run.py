@@ -21,6 +21,7 @@ from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planned import Plan, PlannedLook, Step
 from lightpaint.batch.processes import Processes
 from lightpaint.batch.spread import rendered_by
+from lightpaint.batch.sums import solved_by_sums
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of, final_render, is_full
 from lightpaint.errors import LightpaintError, OutputError
@@ -105,6 +106,10 @@ class _Run:
         self._listen("steps", 0, self._total, "steps")
         self._engine = self._begun(stack)
         answers = [step for step in left if step.task.kind == "answer"]
+        by_sums = [step for step in answers if self._looks[step.task.look].entry.is_by_sums]
+        answers = [step for step in answers if step not in by_sums]
+        for keys in dict.fromkeys(step.task.bases for step in by_sums):
+            self._by_sums([step for step in by_sums if step.task.bases == keys])
         for keys in dict.fromkeys(step.task.bases for step in answers):
             self._of_bases([x for x in answers if x.task.bases == keys])
         self._held.only(())
@@ -121,6 +126,17 @@ class _Run:
         if how.workers > 1:
             return stack.enter_context(Processes(how.workers))
         return InProcess(self._held, self._listen)
+
+    def _by_sums(self, steps: Sequence[Step]) -> None:
+        """Looks that share a basis which nobody is to have."""
+        by_look = {step.task.look: step for step in steps if self._can_begin(step)}
+        tasks = [step.task for step in by_look.values()]
+        if self._is_stopped():
+            return
+        for done in solved_by_sums(tasks, self._engine, self._held, self._listen):
+            if done.is_full:
+                raise OutputError(f"{done.failure}: make room; the same command goes on")
+            self._record(by_look[done.look], done)
 
     def _of_bases(self, steps: Sequence[Step]) -> None:
         """Looks that share their bases; those that are made of others come after them."""

@@ -9,9 +9,10 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.parts import lesson
-from lightpaint.batch.errands import Done, Errand, Lesson, PartOfBasis, Passes
+from lightpaint.batch.errands import Done, Errand, Lesson, PartOfBasis, Passes, SumsOfRows
 from lightpaint.batch.held import Held
 from lightpaint.batch.keys import Space
+from lightpaint.batch.rows import sums_of_rows
 from lightpaint.batch.sequence import between
 from lightpaint.batch.task import Task
 from lightpaint.batch.variations import shifted
@@ -68,9 +69,12 @@ def attempted(errand: Errand, work: Callable[[], Any]) -> Done:
 def _done(errand: Errand, held: Held, listen: Listener) -> Any:
     """What an errand comes to, if that is not a folder that was filled."""
     if isinstance(errand, Lesson):
+        held.rest()
         return lesson(held.film(errand.film), errand.spp, errand.seed)
     if isinstance(errand, PartOfBasis):
         return held.renderer(errand).render(errand.part)
+    if isinstance(errand, SumsOfRows):
+        return sums_of_rows(errand, held)
     if isinstance(errand, Passes):
         return held.frame(errand).sum(range(errand.first, errand.last))
     held.rest()
