@@ -15,8 +15,9 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.basis.file import write_basis
+from lightpaint.batch.how import How
 from lightpaint.batch.plan import plan
-from lightpaint.batch.run import How, run_batch
+from lightpaint.batch.run import run_batch
 from lightpaint.images.exr import write_rgb
 
 
