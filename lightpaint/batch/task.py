@@ -30,6 +30,7 @@ class Task:
     share, space: between two lightings;
     mireds: how much warmer. final: how it is rendered. bases: keys of what it is solved with, and
     files where that is kept, "" where it is to be obtained. expected_s: roughly how long it takes.
+    is_by_sums: whether nothing but the lighting is wanted.
     """
 
     look: str
@@ -44,6 +45,7 @@ class Task:
     bases: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     expected_s: float = 0.0
+    is_by_sums: bool = False
     format: Literal["lightpaint-task 1"] = FORMAT
 
     @property
@@ -133,6 +135,7 @@ def answer_task(
         entry.final,
         bases_of(entry),
         ("",) * len(bases_of(entry)),
+        is_by_sums=entry.is_by_sums,
     )
 
 
