@@ -65,8 +65,6 @@ def check_by_sums(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> No
     """What goes with a lighting and nothing else."""
     if len(look["want"]) > 1:
         mistakes.add(where, "want has 'lights', which is the lighting alone: leave the rest out")
-    if "scene" not in look or "basis" in look:
-        mistakes.add(where, "want has 'lights', whose sums are rendered: give the scene alone")
     if "views" in look or "variations" in look:
         mistakes.add(where, "want has 'lights', which is of one view, without variations")
     settings = look.get("settings", {})

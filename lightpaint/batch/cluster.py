@@ -119,13 +119,14 @@ class Cluster:
 
     def _hand_out(self, waiting: deque[Errand], common: set[str]) -> Iterator[Done]:
         """Give every worker something to do, and the next thing where there is enough for all."""
+        loads = Counter(sent.worker for sent in self._sent)
         for depth in range(1, DEPTH + 1):
             for worker in self._at.there:
-                loaded = sum(sent.worker == worker for sent in self._sent)
                 enough = depth == 1 or len(waiting) >= len(self._at.there)
-                errand = self._for(worker, waiting) if loaded < depth and enough else None
+                errand = self._for(worker, waiting) if loads[worker] < depth and enough else None
                 if errand is not None:
                     waiting.remove(errand)
+                    loads[worker] += 1
                     try:
                         self._give(errand, worker, common)
                     except LightpaintError as error:

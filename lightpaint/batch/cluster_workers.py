@@ -61,10 +61,9 @@ class ClusterWorkers:
         if time.monotonic() - self._looked_s < LOOK_S:
             return
         there = [x for x in self._known() if x not in self._left_out]
-        for worker in set(there) - set(self.there):
-            if why := self._why_not(worker):
-                self._left_out[worker] = why
-                self._listen.say(f"worker {worker} is left out: {why}")
+        for worker, why in self._unfit(sorted(set(there) - set(self.there))).items():
+            self._left_out[worker] = why
+            self._listen.say(f"worker {worker} is left out: {why}")
         self.there = [worker for worker in there if worker not in self._left_out]
         self._has = {worker: self._has.get(worker, set()) for worker in self.there}
         if not self.there and not self._is_told:
@@ -86,20 +85,20 @@ class ClusterWorkers:
             "is back"
         )
 
-    def _why_not(self, worker: str) -> str:
-        """Why a worker is of no use; "" where it is."""
-        try:
-            found = self._client.run(cluster_worker.versions, workers=[worker])
-        except Exception as error:
-            return f"lightpaint does not run there ({first_line(error)})"
-        if worker not in found:
-            return "it is gone"
-        mine, its = own_versions(), found[worker]
-        return ", ".join(
-            f"it has {name} {its.get(name)}, and here is {mine[name]}"
-            for name in mine
-            if its.get(name) != mine[name]
-        )
+    def _unfit(self, workers: list[str]) -> dict[str, str]:
+        """Which of those that have come are of no use, and why."""
+        if not workers:
+            return {}
+        found = self._client.run(cluster_worker.versions, workers=workers, on_error="return")
+        mine, unfit = own_versions(), {}
+        for worker, its in found.items():
+            if isinstance(its, Exception):
+                unfit[worker] = f"lightpaint does not run there ({first_line(its)})"
+            elif others := [name for name in mine if its.get(name) != mine[name]]:
+                unfit[worker] = ", ".join(
+                    f"it has {name} {its.get(name)}, and here is {mine[name]}" for name in others
+                )
+        return unfit
 
     def ship(self, parcel: Parcel, worker: str, common: set[str]) -> None:
         """Send what the worker lacks; what others will need goes to all at once."""

@@ -228,7 +228,8 @@ class _Planner:
 def _check_by_sums(job: Job) -> None:
     """Raise BatchError for a lighting that does not follow from sums."""
     [view] = job.views
-    assert view.scene is not None
-    why = why_not_by_sums(view.target, job.fit) or why_not_one_pass(view.scene)
+    why = why_not_by_sums(view.target, job.fit)
+    if not why and view.basis is None and view.scene is not None:
+        why = why_not_one_pass(view.scene) or ""
     if why:
         raise BatchError(f"want = ['lights'] takes sums alone, and {why}: want 'solve' instead")

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import LightGroups
@@ -29,7 +30,7 @@ from lightpaint.batch.work import attempted, fields_of, final_render, is_full
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
-from lightpaint.scene.quality import on_film
+from lightpaint.scene.quality import on_film, samples
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile, content
 
@@ -108,7 +109,7 @@ class _Run:
         self._listen("steps", 0, self._total, "steps")
         self._engine = self._begun(stack)
         answers = [step for step in left if step.task.kind == "answer"]
-        by_sums = [step for step in answers if self._looks[step.task.look].entry.is_by_sums]
+        by_sums = [x for x in answers if x.task.is_by_sums and not self._has_basis(x.task)]
         answers = [step for step in answers if step not in by_sums]
         for keys in dict.fromkeys(step.task.bases for step in by_sums):
             self._by_sums([step for step in by_sums if step.task.bases == keys])
@@ -130,6 +131,20 @@ class _Run:
             return stack.enter_context(Processes(how.workers))
         return InProcess(self._held, self._listen)
 
+    def _has_basis(self, task: Task) -> bool:
+        """Whether the basis of a task is saved or kept, so that nothing is to be rendered."""
+        fields = fields_of(task, self._held)
+        if fields["basis"] is not None:
+            return True
+        settings: Settings = fields["settings"]
+        [scene] = fields["scenes"]
+        film = on_film(scene.content, settings.quality, settings.resolution)
+        asked = samples(settings.quality, spp=settings.spp, time_s=None)
+        sensor = film.sensor_names[film.sensor]
+        kept = cache.spp_of(film.identity, sensor, settings.seed, film.size)
+        exact = settings.exact_spp or not settings.use_cache
+        return not exact and kept >= (film.spp if asked is None else asked)
+
     def _by_sums(self, steps: Sequence[Step]) -> None:
         """Looks that share a basis which nobody is to have."""
         by_look = {step.task.look: step for step in steps if self._can_begin(step)}
@@ -149,7 +164,8 @@ class _Run:
             files = task.files
             try:
                 obtained = self._obtained(task)
-                self._keep_planes(task, obtained)
+                if not all(step.task.is_by_sums for step in steps):
+                    self._keep_planes(task, obtained)
                 if self._engine.is_apart:
                     # Workers read what this process rendered, and is done with.
                     files = _saved(obtained, stack) if obtained else files

@@ -12,17 +12,15 @@ from lightpaint.batch.engine import Engine
 from lightpaint.batch.errands import Done, Film, SumsOfRows, Wanted
 from lightpaint.batch.estimate import rendered_s
 from lightpaint.batch.held import Held
+from lightpaint.batch.lights import write_lights
 from lightpaint.batch.rows import about_lights
 from lightpaint.batch.spool import Spool
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of
 from lightpaint.errors import BasisError
 from lightpaint.job import Job
-from lightpaint.lighting.file import write_lighting
-from lightpaint.lighting.solve import solution_of
-from lightpaint.lighting.sums import Sums, problem_of_sums
+from lightpaint.lighting.sums import Sums
 from lightpaint.progress import Listener
-from lightpaint.relit.relight import relight, settle
 from lightpaint.scene.quality import samples
 from lightpaint.sources import Painting
 
@@ -102,15 +100,7 @@ def _write(job: Job, sums: Sums) -> None:
     half = -(-(scene.spp if asked is None else asked) // 2)
     nothing = np.zeros((len(scene.lights), 1, 1, 3), np.float32)
     seed, seen = job.settings.seed, np.zeros((1, 1), bool)
-    about = about_lights(scene, seed, (half, half), nothing, nothing, seen)
-    target = job.views[0].target
-    problem = problem_of_sums(about, target.name, sums, constraints=job.asked, fit=job.fit)
-    lighting = solution_of(problem).lighting
-    lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
-    with job.results.filled() as folder:
-        write_lighting(folder / "lighting.json", lighting)
-        relight(scene, lighting, folder / "relit.xml")
-        settle(scene, lighting, folder / "relit.xml", job.folder / "relit.xml")
+    write_lights(job, about_lights(scene, seed, (half, half), nothing, nothing, seen), sums)
 
 
 def _file_of(job: Job) -> Painting:

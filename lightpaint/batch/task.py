@@ -32,7 +32,8 @@ class Task:
     without a target. lightings: files that it is made of; reads: all others but those of bases;
     share, space: between two lightings; mireds: how much warmer. final: how it is rendered.
     handover: what other programs get. bases: keys of what it is solved with, and files where that
-    is kept, "" where it is to be obtained. expected_s: roughly how long it takes.
+    is kept, "" where it is to be obtained. expected_s: roughly how long it takes. is_by_sums:
+    whether nothing but the lighting is wanted.
     """
 
     look: str
@@ -48,6 +49,7 @@ class Task:
     bases: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     expected_s: float = 0.0
+    is_by_sums: bool = False
     format: Literal["lightpaint-task 1"] = FORMAT
 
     @property
@@ -138,6 +140,7 @@ def answer_task(
         entry.handover,
         bases_of(entry),
         ("",) * len(bases_of(entry)),
+        is_by_sums=entry.is_by_sums,
     )
 
 

@@ -13,6 +13,7 @@ from lightpaint.basis.render.parts import lesson
 from lightpaint.batch.errands import Done, Errand, Lesson, PartOfBasis, Passes, SumsOfRows
 from lightpaint.batch.held import Held
 from lightpaint.batch.keys import Space
+from lightpaint.batch.lights import answer_by_sums
 from lightpaint.batch.made import dimmed, leave_made, made_folder
 from lightpaint.batch.rows import sums_of_rows
 from lightpaint.batch.sequence import between
@@ -117,6 +118,9 @@ def _answer(task: Task, held: Held, listen: Listener) -> None:
     bases = None
     if job.basis is None:
         bases = [basis for key in task.bases if (basis := held.basis(key)) is not None]
+    if task.is_by_sums:
+        answer_by_sums(job, job.views[0].basis or (bases or [])[0])
+        return
     run(job, listen, bases=bases)
 
 

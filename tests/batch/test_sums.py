@@ -111,6 +111,10 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def hearing(labels: list[str]) -> Any:
+    return lambda label, *_: labels.append(label)
+
+
 @pytest.fixture
 def _one_thread() -> Iterator[None]:
     limit_threads(1)
@@ -139,7 +143,17 @@ def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
     for name, lights in found["lights"].items():
         # Sums of float64 in another order.
         np.testing.assert_allclose(lights, found["solve"][name], rtol=1e-9)
-    # Of a basis that nobody has, nothing is kept.
+    # Of a basis that is kept by now the same comes without rendering.
+    text = LOOKS.replace("WANT", "lights")
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    heard: list[str] = []
+    outcome = run_batch(plan(here / "looks.toml", here / "kept"), None, hearing(heard))
+    assert outcome.done == ["bright", "dark"]
+    assert "basis" not in heard
+    for name in ("bright", "dark"):
+        kept = read_lighting(here / "kept" / name / "lighting.json").emission
+        np.testing.assert_allclose(np.array(list(kept.values())), found["lights"][name], rtol=1e-9)
+    # Of one that nobody has, nothing is kept.
     cache = [file for file in (here / "cache").rglob("*") if file.is_file()]
     assert len(cache) == 1
 

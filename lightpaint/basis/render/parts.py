@@ -35,8 +35,8 @@ from lightpaint.scene.threads import kernels
 #: Camera samples of a part: some seconds of one processor, which is what an accident costs.
 SAMPLES = SAMPLES_PER_PASS // 2
 
-#: Bytes of a part's images, at most, and rows that it has at least where these are no more.
-BYTES, FEWEST_ROWS = 2**27, 8
+#: Bytes of a part's images, at most.
+BYTES = 2**27
 
 #: Samples of a pass of a lesson, which chooses by what those before have learned; how many there
 #: are at most, and samples of the basis for each.
@@ -96,8 +96,7 @@ def _tiles(lights: int, height: int, width: int, spp: int) -> list[tuple[int, in
 
     A part whose samples are split sends its images as often.
     """
-    by_work = max(SAMPLES // (width * spp), FEWEST_ROWS)
-    by_memory = BYTES // (lights * width * 12)
+    by_work, by_memory = SAMPLES // (width * spp), BYTES // (lights * width * 12)
     count = -(-height // max(1, min(by_work, by_memory)))
     edges = [height * k // count for k in range(count + 1)]
     return list(pairwise(edges))

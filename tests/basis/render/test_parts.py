@@ -38,8 +38,7 @@ def _one_thread() -> Iterator[None]:
 
 @pytest.fixture
 def _small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts_module, "SAMPLES", 2**10)
-    monkeypatch.setattr(parts_module, "FEWEST_ROWS", 4)
+    monkeypatch.setattr(parts_module, "SAMPLES", 2**8)
 
 
 @pytest.fixture(scope="module")
