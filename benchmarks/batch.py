@@ -1,23 +1,131 @@
-"""How many looks a second come from one basis, by one process and by two.
+"""How many looks a second come from one basis, and what workers of a cluster add.
 
-    python benchmarks/batch.py [--looks 20] [--lights 12] [--size 640x360]
+    python benchmarks/batch.py [--looks 20] [--lights 12] [--size 640x360] [--spp 64]
 
-makes a basis of random images, and that many paintings of it; nothing is rendered. The second
-number of each is of looks with a report.
+First looks: from a basis of random images, of which nothing is rendered, by one process, two, and
+two workers of a cluster; then errands that are nothing; then a basis: of the gallery, in parts, by
+this process alone and by one and two workers of a cluster, one thread each. Seconds are on the
+clock and, in brackets, of the processor: of the busiest process, which is what the clock would show
+were nothing else at work.
 """
 
 import argparse
+import contextlib
+import os
+import subprocess
+import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.basis.file import write_basis
+from lightpaint.batch.bases import InParts
+from lightpaint.batch.cluster import Cluster
+from lightpaint.batch.engine import Engine, InProcess
+from lightpaint.batch.errands import Film
+from lightpaint.batch.held import Held
+from lightpaint.batch.how import How
 from lightpaint.batch.plan import plan
-from lightpaint.batch.run import How, run_batch
+from lightpaint.batch.run import run_batch
+from lightpaint.batch.task import Task
 from lightpaint.images.exr import write_rgb
+from lightpaint.progress import silent
+from lightpaint.scene.threads import limit_threads
+from lightpaint.sources import SceneFile
+
+GALLERY = Path(__file__).parent.parent / "scenes" / "gallery" / "scene.xml"
+
+#: Samples per pixel of the run before those that count, in which kernels are compiled.
+WARM = 4
+
+
+@dataclass
+class Took:
+    """Seconds on the clock; of the processor, of the busiest process and of all together."""
+
+    clock_s: float
+    busiest_s: float
+    all_s: float
+
+    def __str__(self) -> str:
+        return f"{self.clock_s:7.1f} ({self.busiest_s:.1f})"
+
+
+@contextlib.contextmanager
+def cluster(workers: int, folder: Path) -> Iterator[str]:
+    """The address of a scheduler with so many workers of one thread each."""
+    file = folder / f"scheduler-{workers}.json"
+    dask = [sys.executable, "-m", "dask"]
+    known = ["--no-dashboard", "--scheduler-file", str(file)]
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    quiet["env"] = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    many = ["--nworkers", str(workers), "--nthreads", "1", "--local-directory", str(folder)]
+    with contextlib.ExitStack() as stack:
+        for command in (
+            [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", *known],
+            [*dask, "worker", *many, *known],
+        ):
+            process = stack.enter_context(subprocess.Popen(command, **quiet))
+            stack.callback(process.terminate)
+            while not file.exists() or not file.stat().st_size:
+                time.sleep(0.1)
+        from distributed import Client
+
+        with Client(scheduler_file=str(file), set_as_default=False) as client:
+            client.wait_for_workers(workers)
+            address = client.scheduler.address
+        yield str(address)
+
+
+def took(work: Callable[[], object], address: str | None = None) -> Took:
+    """What `work` takes here and, at `address`, workers."""
+    before, here_s, begun = _workers_s(address), time.process_time(), time.perf_counter()
+    work()
+    clock_s = time.perf_counter() - begun
+    spent = [time.process_time() - here_s]
+    spent += [now - before.get(worker, 0.0) for worker, now in _workers_s(address).items()]
+    return Took(clock_s, max(spent), sum(spent))
+
+
+def _workers_s(address: str | None) -> dict[str, float]:
+    """Seconds of the processor that each worker has had."""
+    if address is None:
+        return {}
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        spent: dict[str, float] = client.run(time.process_time)
+        return spent
+
+
+def _peak_mb(address: str) -> float:
+    """What the largest worker has had."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        return max(client.run(_own_peak_kb).values()) / 1024
+
+
+def _own_peak_kb() -> int:
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def errands(folder: Path, count: int) -> None:
+    """What the engine itself takes for errands that are nothing."""
+    job = '{"folder": "", "settings": {"force": false}}'
+    some = [Task(f"nothing {k}", "answer", job) for k in range(count)]
+    with cluster(2, folder) as address, Cluster(address, silent) as engine:
+        spent = took(lambda: list(engine.run(some)))
+    print(f"{count} errands that are nothing: {1000 * spent.all_s / count:.1f} ms each, here")
 
 
 def write_looks(folder: Path, *, looks: int, lights: int, size: tuple[int, int]) -> None:
@@ -37,17 +145,72 @@ def write_looks(folder: Path, *, looks: int, lights: int, size: tuple[int, int])
         write_rgb(folder / f"p{k:04}.exr", np.tensordot(weights, images, 1))
 
 
-def seconds(folder: Path, want: str, workers: int) -> tuple[float, float]:
-    """To check all looks, and to do them; and once more where all are done."""
+def looks(folder: Path, count: int, want: str, **how: Any) -> None:
+    """Do all looks, of which none is done."""
     text = f'[[look]]\nbasis = "b.basis.exr"\npaintings = ["p*.exr"]\nwant = [{want}]\n'
     (folder / "looks.toml").write_text(text, encoding="utf-8")
-    place = folder / f"out-{workers}-{len(want)}"
-    begun = time.perf_counter()
-    planned = plan(folder / "looks.toml", place)
-    checked = time.perf_counter()
-    outcome = run_batch(planned, How(workers))
-    assert not outcome.failed, outcome.failed
-    return checked - begun, time.perf_counter() - checked
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        address = how.get("cluster")
+        begun = time.perf_counter()
+        planned = plan(folder / "looks.toml", Path(place) / "out")
+        checked_s = time.perf_counter() - begun
+
+        if address:  # workers begin with the first
+            assert not run_batch(planned.only("p000[01]"), How(**how)).failed
+            planned, count = plan(folder / "looks.toml", Path(place) / "out"), count - 2
+
+        def work() -> None:
+            assert not run_batch(planned, How(**how)).failed
+
+        spent = took(work, address)
+        name = "a cluster of two" if address else f"{how.get('workers', 1)} processes"
+        print(
+            f"{count} looks, want {want}, {name}: checked in {checked_s:.1f} s, done in {spent} s, "
+            f"{count / spent.clock_s:.1f} looks a second",
+            flush=True,
+        )
+
+
+def basis(engine: Engine, spp: int, cache: Path) -> Basis:
+    """That of the gallery, rendered by `engine`."""
+    os.environ["LIGHTPAINT_CACHE"] = str(cache)
+    file = SceneFile(str(GALLERY))
+    scene = file.content
+    film = Film(file, files=tuple(map(str, scene.read_files)))
+    return InParts(engine, film)(scene, spp=spp, time_s=None, seed=0, progress=silent)
+
+
+def _kept(made: list[Basis], by: Callable[[], Basis]) -> None:
+    made.append(by())
+
+
+def bases(folder: Path, spp: int) -> None:
+    """The table of who renders it."""
+    limit_threads(1)
+    held = Held()
+    basis(InProcess(held, silent), WARM, folder / "warm")
+    made: list[Basis] = []
+    by = partial(basis, InProcess(held, silent), spp, folder / "alone")
+    alone = took(partial(_kept, made, by))
+    found = [("this process", alone)]
+    for workers in (1, 2):
+        with cluster(workers, folder) as address, Cluster(address, silent) as engine:
+            basis(engine, WARM, folder / f"warm-{workers}")
+            by = partial(basis, engine, spp, folder / f"by-{workers}")
+            found.append((f"{workers} workers", took(partial(_kept, made, by), address)))
+            peak_mb = _peak_mb(address)
+    (height, width), n = made[0].size, len(made[0].lights)
+    print(f"basis of the gallery, {n} lights, {width}x{height}, {spp} samples per pixel:")
+    for name, spent in found:
+        print(f"    {name:<14} {spent} s, {spent.all_s:.1f} s of the processor in all")
+    one, two = found[1][1], found[2][1]
+    over = one.busiest_s / alone.busiest_s - 1, one.clock_s / alone.clock_s - 1
+    print(f"    two workers take {two.busiest_s / one.busiest_s:.2f} of one, by the processor, ")
+    print(f"    {two.clock_s / one.clock_s:.2f} on the clock; one takes {100 * over[0]:.1f} % more")
+    print(f"    than this process, {100 * over[1]:.1f} % on the clock")
+    print(f"    a worker has {peak_mb:.0f} MB at its peak")
+    same = all(np.array_equal(made[0].images, other.images) for other in made[1:])
+    print(f"    the same to the last bit: {'yes' if same else 'no'}")
 
 
 def _main() -> None:
@@ -57,20 +220,21 @@ def _main() -> None:
     parser.add_argument("--looks", type=int, default=20)
     parser.add_argument("--lights", type=int, default=12)
     parser.add_argument("--size", default="640x360")
+    parser.add_argument("--spp", type=int, default=64)
     given = parser.parse_args()
     width, height = map(int, given.size.split("x"))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_looks(folder, looks=given.looks, lights=given.lights, size=(width, height))
-        for want in ('"solve", "predict"', '"solve", "predict", "report"'):
-            for workers in (1, 2):
-                checked, done = seconds(folder, want, workers)
-                print(
-                    f"{given.looks} looks, want {want}, {workers} workers: checked in "
-                    f"{checked:.1f} s, done in {done:.1f} s, {done / given.looks:.2f} s each"
-                )
-        again = seconds(folder, '"solve", "predict"', 1)
-        print(f"where all is done: {again[0]:.1f} s and {again[1]:.1f} s")
+        if given.looks:
+            write_looks(folder, looks=given.looks, lights=given.lights, size=(width, height))
+            for want in ('"solve", "predict"', '"solve", "predict", "report"'):
+                for workers in (1, 2):
+                    looks(folder, given.looks, want, workers=workers)
+                with cluster(2, folder) as address:
+                    looks(folder, given.looks, want, cluster=address)
+        if given.spp:
+            errands(folder, 500)
+            bases(folder, given.spp)
 
 
 if __name__ == "__main__":

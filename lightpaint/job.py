@@ -248,7 +248,7 @@ class Job:
             files += [self.folder / name for name in EXPORTS]
         reads = [file for target in targets for file in target.files]
         reads += [file for scene in scenes for file in scene.read_files]
-        if isinstance(self.basis, BasisFile | GroupsFile):
+        if isinstance(self.basis, BasisFile):
             reads.append(Path(self.basis.path))
         if self.groups is not None:
             reads += self.groups.files

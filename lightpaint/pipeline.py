@@ -6,8 +6,8 @@ from pathlib import Path
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import MOST, clean_planes
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import samples_for
+from lightpaint.basis.render.obtain import Render, obtain_basis
+from lightpaint.basis.render.render import render_basis, samples_for
 from lightpaint.images.estimate import write_estimate
 from lightpaint.job import Job, PaintedView
 from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_findings
@@ -84,8 +84,18 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     return [_loaded_anew(look) for look in looks] if other else looks
 
 
-def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int = 1) -> Basis:
-    """The basis of `scene` on its film, kept or rendered. views: that share the time there is."""
+def obtain(
+    scene: Scene,
+    settings: Settings,
+    progress: Progress,
+    *,
+    views: int = 1,
+    render: Render = render_basis,
+) -> Basis:
+    """The basis of `scene` on its film, kept or rendered.
+
+    views: that share the time there is. render: who renders what is missing.
+    """
     listen = listener(progress)
     is_rendered = False
 
@@ -103,6 +113,7 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
         use_cache=settings.use_cache,
         exact_spp=settings.exact_spp,
         progress=report,
+        render=render,
     )
     if settings.use_cache and not cache.is_kept(basis):
         listen.say(

@@ -1,6 +1,8 @@
 """What is rendered to be painted on or looked at: templates, and scenes as they were relit."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis import cache
@@ -14,7 +16,7 @@ from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.denoise import Features, denoised, how_denoised
-from lightpaint.images.estimate import write_estimate
+from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.png import png_bytes, png_says, write_png
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline import obtain
@@ -249,19 +251,20 @@ def relight_look(
     seed: int = 0,
     resolution: str | None = None,
     progress: Progress = silent,
+    rendered: Callable[[Scene], Estimate] | None = None,
 ) -> None:
     """Write relit.xml, and its render as relit.exr and, denoised, as relit.png.
 
-    resolution: part of the film that is rendered, as of `Settings`.
+    resolution: part of the film that is rendered, as of `Settings`. rendered: who renders the relit
+    scene, instead of this process.
     """
     for remark in remarks_of_pictures():
         listener(progress).say(remark)
     results.check()
     with results.filled() as folder:
         relit = on_film(relight(scene, lighting, folder / "relit.xml"), None, resolution)
-        image = render(
-            relit, spp=spp, seed=seed, stream=Stream.VERIFICATION, label="relit", progress=progress
-        )
+        how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
+        image = rendered(relit) if rendered else render(relit, spp=spp, label="relit", **how)
         write_estimate(folder / "relit.exr", image, {})
         features = render_features(relit, seed=seed)
         clean = denoised(image.image, features, quality="high")

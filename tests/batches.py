@@ -77,8 +77,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def run_all(manifest: str, folder: str, workers: int = 1) -> None:
     """Do what is left of a batch, as a process of its own may."""
+    from lightpaint.batch.how import How
     from lightpaint.batch.plan import plan
-    from lightpaint.batch.run import How, run_batch
+    from lightpaint.batch.run import run_batch
 
     run_batch(plan(manifest, folder), How(workers))
 

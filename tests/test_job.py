@@ -212,7 +212,7 @@ def test_what_cannot_be_done_is_said_at_birth(how: Any, error: type[Exception], 
 def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("lightpaint.basis.render.obtain.render_basis", None)
+    monkeypatch.setattr("lightpaint.pipeline.obtain_basis", None)
     scene = load_scene(room)
     side = load_scene(room, sensor="side")
     (height, width) = scene.size
@@ -313,12 +313,12 @@ def test_one_listener_hears_work_and_remarks(here: Path):
 def test_a_basis_that_was_obtained_serves_the_next_painting(
     room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    from lightpaint.basis.render import obtain
+    from lightpaint import pipeline
 
     rendered: list[Any] = []
-    once = obtain.render_basis
+    once = pipeline.obtain_basis
     monkeypatch.setattr(
-        obtain, "render_basis", lambda *a, **k: (rendered.append(a), once(*a, **k))[1]
+        pipeline, "obtain_basis", lambda *a, **k: (rendered.append(a), once(*a, **k))[1]
     )
     scene = SceneFile(str(room))
     image = np.ones((20, 24, 3), np.float32)

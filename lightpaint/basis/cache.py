@@ -74,6 +74,13 @@ def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> 
     return basis
 
 
+def spp_of(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
+    """Samples per pixel of the basis kept for that; 0 if there is none."""
+    path = _path(scene_identity, sensor, seed, size)
+    kept = _entry(path).origin if path.is_file() else None
+    return 0 if kept is None else kept.spp
+
+
 def any_of(scene_identity: str, sensor: str, *, samples: int, largest: int) -> Basis | None:
     """A basis of any size and seed that is kept for that, the one with most samples; or None.
 

@@ -54,9 +54,25 @@ def check_together(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> N
         _check_of_basis(mistakes, where, look)
     want = look.get("want", ())
     if ("lighting" in look or "lightings" in look) and (
-        idle := [x for x in ("solve", "verify", "report") if x in want]
+        idle := [x for x in ("solve", "verify", "report", "lights") if x in want]
     ):
         mistakes.add(where, f"want has {idle[0]!r}, and its lighting is given: leave it out")
+    elif "lights" in want:
+        check_by_sums(mistakes, where, look)
+
+
+def check_by_sums(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """What goes with a lighting and nothing else."""
+    if len(look["want"]) > 1:
+        mistakes.add(where, "want has 'lights', which is the lighting alone: leave the rest out")
+    if "views" in look or "variations" in look:
+        mistakes.add(where, "want has 'lights', which is of one view, without variations")
+    settings = look.get("settings", {})
+    if settings.get("literal") is not True:
+        mistakes.add(where, "want has 'lights': settings need literal = true, or images are needed")
+    for key in ("time_s", "noise_correction", "refine", "suggest"):
+        if settings.get(key):
+            mistakes.add(where, f"want has 'lights', and {key} needs images: leave it out")
 
 
 def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:

@@ -60,6 +60,11 @@ class Entry:
         """Whether its lighting is found, and not made of others."""
         return bool(self.paintings)
 
+    @property
+    def is_by_sums(self) -> bool:
+        """Whether nothing but its lighting is wanted, for which nobody needs its pictures."""
+        return self.want == ("lights",)
+
 
 def looks_of(manifest: Manifest) -> list[Entry]:
     """All looks that tables ask for, in their order; what is wrong is added to the mistakes."""

@@ -42,14 +42,15 @@ def estimate(plan: Plan) -> Estimate:
     )
     costs = [plan.costs[key] for key in needed]
     return Estimate(
-        sum(map(_rendered_s, costs)),
+        sum(rendered_s(cost.samples, cost.lights) for cost in costs),
         sum(_look_s(look, plan) for look in left),
         max((cost.memory for cost in costs), default=0),
     )
 
 
-def _rendered_s(cost: Cost) -> float:
-    return cost.samples * (SAMPLE_S + LIGHT_SAMPLE_S * cost.lights)
+def rendered_s(samples: int, lights: int) -> float:
+    """Of so many samples of a basis."""
+    return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)
 
 
 def _look_s(look: PlannedLook, plan: Plan) -> float:

@@ -33,6 +33,7 @@ class Fingerprints:
             _relative(told, self._base),
             sorted(self._content(file) for file in reads),
             [self._answers[name] for name in entry.of],
+            *(["lights"] if entry.is_by_sums else []),
         ]
         self._answers[entry.name] = _sum(json.dumps(made_of, default=str))
         return self._answers[entry.name]

@@ -15,8 +15,8 @@ from lightpaint.scene.film import check_resolution
 from lightpaint.settings import Settings
 from lightpaint.target.read import Paint
 
-#: What can be wanted of a look.
-Step = Literal["solve", "predict", "verify", "report", "render", "export"]
+#: What can be wanted of a look; `lights` is the lighting and nothing else.
+Step = Literal["solve", "predict", "verify", "report", "render", "export", "lights"]
 
 #: What can be wanted of a lighting that is there already.
 GIVEN: tuple[Step, ...] = ("predict", "render", "export")

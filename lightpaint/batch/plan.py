@@ -7,10 +7,12 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.fingerprint import Fingerprints
 from lightpaint.batch.gallery import check_gallery
+from lightpaint.batch.held import Held
 from lightpaint.batch.journal import Journal
 from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.looks import entries_of
@@ -19,12 +21,12 @@ from lightpaint.batch.manifest import Manifest, read_manifest
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
 from lightpaint.batch.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.variations import varied
-from lightpaint.batch.work import Held
 from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.sums import why_not_by_sums
 from lightpaint.relit.relight import scene_of
 from lightpaint.result_folder import is_as_written
 from lightpaint.results import view_names
@@ -110,7 +112,7 @@ class _Planner:
 
     def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
         """The answer, and its render and what other programs get, if that is wanted."""
-        how: dict[str, Any] = {"force": self._force, "command": self._command}
+        how: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
         tasks = [answer_task(entry, self._folders, **how)]
         made_of = [self._prints.answer(entry, reads)]
         if "render" in entry.want:
@@ -146,6 +148,8 @@ class _Planner:
             how = replace(settings, hold=job.fit.hold)
             settings, asked = varied(entry.variation, how, asked, adjusted(job))
             job = self._job(entry, scenes, basis, settings, asked)
+        if entry.is_by_sums:
+            _check_by_sums(job)
         self._note_costs(entry, [view.scene for view in job.views], job.settings)
         if entry.final.resolution is not None and "render" in entry.want:
             on_film(scenes[0].content, None, entry.final.resolution)
@@ -219,3 +223,13 @@ class _Planner:
                 film.spp if asked is None else asked,
                 memory_needed(film),
             )
+
+
+def _check_by_sums(job: Job) -> None:
+    """Raise BatchError for a lighting that does not follow from sums."""
+    [view] = job.views
+    why = why_not_by_sums(view.target, job.fit)
+    if not why and view.basis is None and view.scene is not None:
+        why = why_not_one_pass(view.scene) or ""
+    if why:
+        raise BatchError(f"want = ['lights'] takes sums alone, and {why}: want 'solve' instead")

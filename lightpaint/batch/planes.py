@@ -13,8 +13,9 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.batch.held import Held
 from lightpaint.batch.task import Task
-from lightpaint.batch.work import Held, fields_of
+from lightpaint.batch.work import fields_of
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
 from lightpaint.records import strict_json

@@ -6,8 +6,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.batch.entries import Entry
+from lightpaint.batch.held import Held
 from lightpaint.batch.task import Kind, Task
-from lightpaint.batch.work import Held
 from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 
@@ -111,3 +111,14 @@ def by_bases(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[li
             groups.append([step for step in left if ready.get(step.task.look) == keys])
         left = [step for step in left if step.task.look not in ready]
     return groups
+
+
+def waves(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[list[Step]]:
+    """Steps that wait for none of the others; those that wait for these; and so on."""
+    left, found = list(steps), []
+    while left:
+        names = {step.task.look for step in left}
+        wave = [step for step in left if not names & set(looks[step.task.look].entry.of)]
+        found.append(wave)
+        left = [step for step in left if step not in wave]
+    return found

@@ -1,57 +1,37 @@
 """Doing a plan: bases first, then the looks that share each, then final renders."""
 
-import fcntl
-import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
-from lightpaint.batch.executor import Executor, InProcess, Processes
+from lightpaint.batch.alone import alone
+from lightpaint.batch.bases import InParts
+from lightpaint.batch.cluster import Cluster
+from lightpaint.batch.engine import Engine, InProcess
+from lightpaint.batch.errands import Done, Film
 from lightpaint.batch.gallery import write_gallery
+from lightpaint.batch.how import How, Outcome
 from lightpaint.batch.journal import Journal, Line
 from lightpaint.batch.planes import keep_all_planes
-from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases
-from lightpaint.batch.summary import Row
-from lightpaint.batch.task import Done, Task
-from lightpaint.batch.work import fields_of, is_full
+from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases, waves
+from lightpaint.batch.processes import Processes
+from lightpaint.batch.spread import rendered_by
+from lightpaint.batch.sums import solved_by_sums
+from lightpaint.batch.task import Task
+from lightpaint.batch.work import attempted, fields_of, final_render, is_full
 from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
-from lightpaint.scene.quality import on_film
+from lightpaint.scene.quality import on_film, samples
 from lightpaint.settings import Settings
-
-
-@dataclass(frozen=True)
-class How:
-    """How a plan is done.
-
-    workers: processes; 1 for none beside this. keep_going: whether what fails stops nothing else.
-    retry: how often a step that failed is tried again. apart: whether others do the other looks of
-    the plan at the same time, in the same folder; the gallery is left to who comes last.
-    """
-
-    workers: int = 1
-    keep_going: bool = True
-    retry: int = 0
-    apart: bool = False
-
-
-@dataclass
-class Outcome:
-    """What a run came to. done, failed: names of looks, and why. skipped: done earlier.
-
-    waiting: what was not come to. rows: of all looks, as the summary has them.
-    """
-
-    done: list[str] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)
-    skipped: list[str] = field(default_factory=list)
-    waiting: list[str] = field(default_factory=list)
-    rows: list[Row] = field(default_factory=list)
+from lightpaint.sources import SceneFile
 
 
 def run_batch(
@@ -74,7 +54,7 @@ def run_batch(
         Interrupted: For Ctrl-C; the same call goes on from there.
     """
     how = how or How()
-    with _alone(plan.folder, may_share=how.apart), ExitStack() as stack:
+    with alone(plan.folder, may_share=how.apart), ExitStack() as stack:
         run = _Run(plan, how, listener(progress), told or (lambda look, done: None))
         try:
             run.all(stack)
@@ -126,17 +106,56 @@ class _Run:
         ]
         self._total = len(left)
         self._listen("steps", 0, self._total, "steps")
-        executor: Executor = InProcess(self._held, self._listen)
-        if self._how.workers > 1:
-            executor = stack.enter_context(Processes(self._how.workers))
+        self._engine = self._begun(stack)
         answers = [step for step in left if step.task.kind == "answer"]
+        by_sums = [x for x in answers if x.task.is_by_sums and not self._has_basis(x.task)]
+        answers = [step for step in answers if step not in by_sums]
+        for keys in dict.fromkeys(step.task.bases for step in by_sums):
+            self._by_sums([step for step in by_sums if step.task.bases == keys])
         for together in by_bases(answers, self._looks):
-            self._of_bases(together, executor)
+            self._of_bases(together)
         self._held.only(())
         for kind in ("render", "export"):
-            self._together([x for x in left if x.task.kind == kind], executor)
+            self._together([x for x in left if x.task.kind == kind])
 
-    def _of_bases(self, steps: Sequence[Step], executor: Executor) -> None:
+    def _begun(self, stack: ExitStack) -> Engine:
+        """Who does the work, until `stack` is closed."""
+        how = self._how
+        if how.cluster is not None:
+            cluster = Cluster(
+                how.cluster, self._listen, is_shared=how.shared_fs, limit_s=how.task_limit_s
+            )
+            return stack.enter_context(cluster)
+        if how.workers > 1:
+            return stack.enter_context(Processes(how.workers))
+        return InProcess(self._held, self._listen)
+
+    def _has_basis(self, task: Task) -> bool:
+        """Whether the basis of a task is saved or kept, so that nothing is to be rendered."""
+        fields = fields_of(task, self._held)
+        if fields["basis"] is not None:
+            return True
+        settings: Settings = fields["settings"]
+        [scene] = fields["scenes"]
+        film = on_film(scene.content, settings.quality, settings.resolution)
+        asked = samples(settings.quality, spp=settings.spp, time_s=None)
+        sensor = film.sensor_names[film.sensor]
+        kept = cache.spp_of(film.identity, sensor, settings.seed, film.size)
+        exact = settings.exact_spp or not settings.use_cache
+        return not exact and kept >= (film.spp if asked is None else asked)
+
+    def _by_sums(self, steps: Sequence[Step]) -> None:
+        """Looks that share a basis which nobody is to have."""
+        by_look = {step.task.look: step for step in steps if self._can_begin(step)}
+        tasks = [step.task for step in by_look.values()]
+        if self._is_stopped():
+            return
+        for done in solved_by_sums(tasks, self._engine, self._held, self._listen):
+            if done.is_full:
+                raise OutputError(f"{done.failure}: make room; the same command goes on")
+            self._record(by_look[done.look], done)
+
+    def _of_bases(self, steps: Sequence[Step]) -> None:
         """Looks that share their bases; those that are made of others come after them."""
         task = steps[0].task
         self._held.only(task.bases)
@@ -144,10 +163,11 @@ class _Run:
             files = task.files
             try:
                 obtained = self._obtained(task)
-                keep_all_planes(self._plan.folder, task, obtained, self._held)
-                if executor.is_apart and obtained:
+                if not all(step.task.is_by_sums for step in steps):
+                    keep_all_planes(self._plan.folder, task, obtained, self._held)
+                if self._engine.is_apart:
                     # Workers read what this process rendered, and is done with.
-                    files = _saved(obtained, stack)
+                    files = _saved(obtained, stack) if obtained else files
                     self._held.only(())
             except LightpaintError as error:
                 if is_full(error):
@@ -155,9 +175,9 @@ class _Run:
                 for step in steps:
                     self._fail(self._looks[step.task.look], step, str(error))
                 return
-            for wave in _waves(steps, self._looks):
+            for wave in waves(steps, self._looks):
                 given = [replace(step, task=replace(step.task, files=files)) for step in wave]
-                self._together(given, executor)
+                self._together(given)
                 if self._is_stopped():
                     return
 
@@ -170,16 +190,22 @@ class _Run:
         bases = []
         for key, scene in zip(task.bases, fields["scenes"], strict=True):
             film = on_film(scene.content, settings.quality, settings.resolution)
-            bases.append(self._held.basis(film, key, settings, self._listen))
+            basis = self._held.basis(key)
+            if basis is None:
+                its = Film(scene, settings.quality, settings.resolution, _files(scene))
+                render = InParts(self._engine, its)
+                basis = obtain(film, settings, self._listen, render=render)
+                self._held.hold(key, basis)
+            bases.append(basis)
         return bases
 
-    def _together(self, steps: Sequence[Step], executor: Executor) -> None:
+    def _together(self, steps: Sequence[Step]) -> None:
         """Steps that do not wait for each other, and again those that failed and may be tried."""
         by_look = {step.task.look: step for step in steps}
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
             again = []
-            for done in _closing(executor.run([step.task for step in waiting])):
+            for done in _closing(self._done([step.task for step in waiting])):
                 step = by_look[done.look]
                 if done.is_full:
                     raise OutputError(f"{done.failure}: make room; the same command goes on")
@@ -191,6 +217,20 @@ class _Run:
                 if self._is_stopped():
                     return
             waiting = again
+
+    def _done(self, tasks: Sequence[Task]) -> Iterator[Done]:
+        """What comes of each; of few final renders each is done by all workers."""
+        if tasks[0].kind == "export":  # texts, of files that are here: none is worth sending
+            yield from InProcess(self._held, self._listen).run(tasks)
+            return
+        are_few = len(tasks) < self._engine.workers and self._engine.is_apart
+        if not (are_few and tasks[0].kind == "render"):
+            yield from self._engine.run(tasks)
+            return
+        for task in tasks:
+            variant = fields_of(task, self._held)["scenes"][0].variant
+            by_all = rendered_by(self._engine, task, variant, self._listen)
+            yield attempted(task, partial(final_render, task, self._held, self._listen, by_all))
 
     def _can_begin(self, step: Step) -> bool:
         """Whether the look has not failed by now, nor what it is made of."""
@@ -211,7 +251,7 @@ class _Run:
         if done.failure:
             self._fail(look, step, done.failure, done)
         else:
-            self.journal.add(Line(done.look, done.kind, "done", step.made_of))
+            self.journal.add(Line(done.look, step.task.kind, "done", step.made_of))
             if step.task.kind == look.steps[-1].task.kind:
                 self.outcome.done.append(done.look)
                 self.outcome.waiting.remove(done.look)
@@ -241,32 +281,9 @@ class _Run:
         return spent_s / self._finished * (self._total - self._finished)
 
 
-@contextmanager
-def _alone(folder: Path, *, may_share: bool) -> Iterator[None]:
-    """Raise OutputError where another batch is at work in `folder`.
-
-    may_share: whether others that may, too, are let work there.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
-    try:
-        with suppress(PermissionError):
-            try:
-                kind = fcntl.LOCK_SH if may_share else fcntl.LOCK_EX
-                fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise OutputError(
-                    f"another batch is at work in {folder}: wait for it, or name another folder "
-                    "(folder=...)"
-                ) from None
-            except OSError:
-                pass  # a disk that knows no locks
-        yield
-    finally:
-        os.close(descriptor)
+def _files(scene: SceneFile) -> tuple[str, ...]:
+    """All that it is made of."""
+    return tuple(map(str, scene.content.read_files))
 
 
 def _saved(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
@@ -285,14 +302,3 @@ def _closing(done: Iterator[Done]) -> Iterator[Done]:
     finally:
         if hasattr(done, "close"):
             done.close()
-
-
-def _waves(steps: Sequence[Step], looks: dict[str, PlannedLook]) -> list[list[Step]]:
-    """Steps that wait for none of the others; those that wait for these; and so on."""
-    left, waves = list(steps), []
-    while left:
-        names = {step.task.look for step in left}
-        wave = [step for step in left if not names & set(looks[step.task.look].entry.of)]
-        waves.append(wave)
-        left = [step for step in left if step not in wave]
-    return waves

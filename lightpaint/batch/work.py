@@ -2,34 +2,38 @@
 
 import errno
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.parts import lesson
+from lightpaint.batch.errands import Done, Errand, Lesson, PartOfBasis, Passes, SumsOfRows
+from lightpaint.batch.held import Held
 from lightpaint.batch.keys import Space
+from lightpaint.batch.lights import answer_by_sums
 from lightpaint.batch.made import dimmed, leave_made, made_folder
+from lightpaint.batch.rows import sums_of_rows
 from lightpaint.batch.sequence import between
-from lightpaint.batch.task import EXPORT, Done, Task, key_of_basis, key_of_scene
+from lightpaint.batch.task import EXPORT, Task
 from lightpaint.batch.variations import shifted
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line, write_text
+from lightpaint.images.estimate import Estimate
 from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.pipeline import obtain, run
+from lightpaint.pipeline import run
 from lightpaint.progress import Listener
 from lightpaint.relit.forms import Source, names_of_forms, writer_of
 from lightpaint.renders import relight_look, relit_folder
 from lightpaint.result_folder import ResultFolder
 from lightpaint.results import view_names
-from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, GroupsFile, SceneFile, content, from_json
+from lightpaint.sources import BasisFile, GroupsFile, content, from_json
 
 #: What the system says of a disk that takes no more.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -37,57 +41,50 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 #: Characters of a reason.
 LONGEST = 600
 
-
-class Held:
-    """Scenes and bases that several looks share, each loaded or rendered once in this process."""
-
-    def __init__(self) -> None:
-        self._scenes: dict[str, SceneFile] = {}
-        self._saved: dict[str, BasisFile | GroupsFile] = {}
-        self._bases: dict[str, Basis] = {}
-
-    def scene(self, given: SceneFile) -> SceneFile:
-        """The one that equals `given`, and is loaded by and by."""
-        return self._scenes.setdefault(repr(given), given)
-
-    def saved(self, given: BasisFile | GroupsFile) -> BasisFile | GroupsFile:
-        """The one of the same file, which is read by and by."""
-        return self._saved.setdefault(repr(given), given)
-
-    def basis(self, scene: Scene, key: str, settings: Settings, listen: Listener) -> Basis:
-        """That of `scene` on its film: held, kept or rendered. key: `key_of_scene`."""
-        if key not in self._bases:
-            self._bases[key] = obtain(scene, settings, listen)
-        return self._bases[key]
-
-    def read(self, key: str, file: str) -> None:
-        """Hold the basis of that key, which was saved for workers."""
-        if file and key not in self._bases:
-            self._bases[key] = read_basis(file)
-
-    def only(self, keys: Collection[str]) -> None:
-        """Let go of all bases but those."""
-        self._bases = {key: basis for key, basis in self._bases.items() if key in keys}
-        self._saved = {k: x for k, x in self._saved.items() if key_of_basis(x) in keys}
+#: What is said of one that memory does not suffice for.
+TOO_LARGE = "it takes more memory than there is: use resolution=... or fewer workers"
 
 
-def do(task: Task, held: Held, listen: Listener) -> Done:
-    """Do one task; what prevents it is said in one line, and is its own failure alone."""
+def do(errand: Errand, held: Held, listen: Listener) -> Done:
+    """Do one errand; what prevents it is said in one line, and is its own failure alone."""
+    return attempted(errand, lambda: _done(errand, held, listen))
+
+
+def attempted(errand: Errand, work: Callable[[], Any]) -> Done:
+    """What comes of `work`, which is that errand."""
     begun = time.perf_counter()
-    failure, full = "", False
+    failure, full, lost, value = "", False, False, None
     try:
-        does = {"answer": _answer, "render": _render, "export": _export}
-        does[task.kind](task, held, listen)
+        value = work()
     except LightpaintError as error:
         failure, full = str(error), is_full(error)
     except MemoryError:
-        failure = "it takes more memory than there is: use resolution=... or fewer workers"
+        failure, lost = TOO_LARGE, True
     except OSError as error:
         failure, full = first_line(error), error.errno in FULL
     except Exception as error:  # a mistake of ours, or of a library's: the others go on
         failure = f"{type(error).__name__}: {first_line(error)}"
     spent_s = time.perf_counter() - begun
-    return Done(task.look, task.kind, one_line(failure, limit=LONGEST), full, spent_s=spent_s)
+    said = one_line(failure, limit=LONGEST)
+    return Done(errand.name, errand.kind, said, full, lost, spent_s, value=value)
+
+
+def _done(errand: Errand, held: Held, listen: Listener) -> Any:
+    """What an errand comes to, if that is not a folder that was filled."""
+    if isinstance(errand, Lesson):
+        held.rest()
+        return lesson(held.film(errand.film), errand.spp, errand.seed)
+    if isinstance(errand, PartOfBasis):
+        return held.renderer(errand).render(errand.part)
+    if isinstance(errand, SumsOfRows):
+        return sums_of_rows(errand, held)
+    if isinstance(errand, Passes):
+        return held.frame(errand).sum(range(errand.first, errand.last))
+    held.rest()
+    assert isinstance(errand, Task)
+    held.only(errand.bases)
+    does = {"answer": _answer, "render": final_render, "export": _export}
+    return does[errand.kind](errand, held, listen)
 
 
 def is_full(error: BaseException) -> bool:
@@ -120,11 +117,10 @@ def _answer(task: Task, held: Held, listen: Listener) -> None:
     job = Job(**fields)
     bases = None
     if job.basis is None:
-        bases = [
-            held.basis(view.scene, key_of_scene(file, job.settings), job.settings, listen)
-            for view, file in zip(job.views, fields["scenes"], strict=True)
-            if view.scene is not None
-        ]
+        bases = [basis for key in task.bases if (basis := held.basis(key)) is not None]
+    if task.is_by_sums:
+        answer_by_sums(job, job.views[0].basis or (bases or [])[0])
+        return
     run(job, listen, bases=bases)
 
 
@@ -136,11 +132,7 @@ def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> N
     groups = given if isinstance(given, LightGroups) else None
     bases: list[Basis] = [given if groups is None else groups.basis]
     if given is None:
-        films = [on_film(scene, settings.quality, settings.resolution) for scene in scenes]
-        bases = [
-            held.basis(film, key, settings, listen)
-            for film, key in zip(films, task.bases, strict=True)
-        ]
+        bases = [basis for key in task.bases if (basis := held.basis(key)) is not None]
     lighting = made_of(task.lightings, bases[0], share=task.share, space=task.space)
     if task.mireds:
         lighting = shifted(lighting, task.mireds, dimmed(bases[0]))
@@ -160,8 +152,13 @@ def made_of(files: tuple[str, ...], basis: Basis, *, share: float, space: Space)
     return lighting
 
 
-def _render(task: Task, held: Held, listen: Listener) -> None:
-    """The final render of a look that is answered."""
+def final_render(
+    task: Task,
+    held: Held,
+    listen: Listener,
+    rendered: Callable[[Scene], Estimate] | None = None,
+) -> None:
+    """The final render of a look that is answered. rendered: who renders, if others do."""
     fields = fields_of(task, held)
     [lighting] = map(Path, task.lightings)
     results = relit_folder(
@@ -170,7 +167,12 @@ def _render(task: Task, held: Held, listen: Listener) -> None:
     how: dict[str, Any] = {"spp": task.final.spp, "seed": task.final.seed}
     how["resolution"] = task.final.resolution
     relight_look(
-        fields["scenes"][0].content, read_lighting(lighting), results, progress=listen, **how
+        fields["scenes"][0].content,
+        read_lighting(lighting),
+        results,
+        progress=listen,
+        rendered=rendered,
+        **how,
     )
 
 
@@ -178,10 +180,10 @@ def _export(task: Task, held: Held, listen: Listener) -> None:
     """What other programs get of a look that is answered."""
     fields = fields_of(task, held)
     lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT
-    given = content(fields["basis"])
+    given = fields["basis"]
     source = Source(
         fields["scenes"][0].content if fields["scenes"] else None,
-        given if isinstance(given, LightGroups) else None,
+        given.content if isinstance(given, GroupsFile) else None,
         Path(task.handover.stage) if task.handover.stage else None,
     )
     names = names_of_forms(task.handover.to, source)

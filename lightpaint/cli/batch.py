@@ -6,16 +6,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from lightpaint.batch.errands import Done
 from lightpaint.batch.estimate import estimate
 from lightpaint.batch.first import write_first
 from lightpaint.batch.gallery import FILES, spoken_counts
+from lightpaint.batch.how import How
+from lightpaint.batch.how import Outcome as BatchOutcome
 from lightpaint.batch.openjd import LOOK, write_openjd
 from lightpaint.batch.plan import plan
 from lightpaint.batch.planned import Plan, PlannedLook
-from lightpaint.batch.run import How, run_batch
-from lightpaint.batch.run import Outcome as BatchOutcome
+from lightpaint.batch.run import run_batch
 from lightpaint.batch.summary import Row, summary_document
-from lightpaint.batch.task import Done
 from lightpaint.cli import documents, terminal
 from lightpaint.cli.manner import Outcome
 from lightpaint.errors import BatchError, OutputError

@@ -45,6 +45,7 @@ def examine(variant: str | None = None) -> list[Finding]:
     findings.append(_extra("USD", "usd-core", "usd"))
     findings.append(_extra("painter", "uvicorn", "paint"))
     findings.append(_extra("painter in notebooks", "anywidget", "notebook"))
+    findings.append(_extra("batches on a cluster", "distributed", "cluster"))
     findings.append(_extra("shell completion", "argcomplete", "completion"))
     findings += _llvm()
     findings.append(_gpu())

@@ -17,7 +17,7 @@ from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
-from lightpaint.errors import BasisError, OutputError, TargetError
+from lightpaint.errors import BasisError, BatchError, OutputError, TargetError
 from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -26,6 +26,7 @@ from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 
 if TYPE_CHECKING:
+    from lightpaint.batch.how import How
     from lightpaint.job import Job
 
 #: Options that say how a scene is loaded, by the names that Python has for them.
@@ -213,8 +214,6 @@ def _scene_to_export(options: Namespace) -> SceneFile | None:
 
 def _to_do(options: Namespace) -> dict[str, Any]:
     """What `batch` is asked for."""
-    from lightpaint.batch.run import How
-
     return {
         "paths": options.paths,
         "output": Path(options.output) if options.output else None,
@@ -222,10 +221,32 @@ def _to_do(options: Namespace) -> dict[str, Any]:
         "is_dry": options.dry_run,
         "only": options.only,
         "form": options.export,
-        "how": How(options.workers, options.keep_going, options.retry, options.apart),
+        "how": _how(options),
         "force": options.force,
         "log": Path(options.log) if options.log else None,
     }
+
+
+def _how(options: Namespace) -> "How":
+    """How a batch is done. Raises BatchError for what does not go together."""
+    from lightpaint.batch.how import How
+
+    if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
+        idle = "--shared-fs" if options.shared_fs else "--task-limit"
+        raise BatchError(f"{idle} is about workers of a cluster: give --cluster ADDRESS, too")
+    if options.cluster is not None and options.workers > 1:
+        raise BatchError(
+            f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
+        )
+    return How(
+        options.workers,
+        options.keep_going,
+        options.retry,
+        options.apart,
+        options.cluster,
+        options.shared_fs,
+        options.task_limit_s,
+    )
 
 
 def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:

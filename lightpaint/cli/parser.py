@@ -207,6 +207,26 @@ def _batch(parser: argparse.ArgumentParser) -> None:
         help="processes that share the looks; 1 for this one alone (default: %(default)s)",
     )
     parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="have workers of a Dask cluster do the work, bases in parts among it, by the address "
+        "of its scheduler, like tcp://scheduler:8786",
+    )
+    parser.add_argument(
+        "--shared-fs",
+        dest="shared_fs",
+        action="store_true",
+        help="with --cluster: workers see all files under the same paths, so that none is sent",
+    )
+    parser.add_argument(
+        "--task-limit",
+        dest="task_limit_s",
+        type=arguments.number(" of seconds"),
+        metavar="SECONDS",
+        help="with --cluster: a worker that takes longer over something counts as hung, and "
+        "another does it (default: 20 times what it is expected to take, at least 300)",
+    )
+    parser.add_argument(
         "--apart",
         action="store_true",
         help="with --only: share the folder with others that do other looks at the same time; the "

@@ -1,23 +1,27 @@
 """Ordinary Mitsuba renders of a scene, in passes, as an `Estimate` with its noise."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.estimate import Estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.threads import kernels
 from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
 #: memory is taken for, so passes are short.
 SAMPLES_PER_PASS = 2**21
+
+#: Camera samples of the passes that are added up by themselves.
+SAMPLES_PER_RANGE = 2**22
 
 
 class Stream(IntEnum):
@@ -104,19 +108,48 @@ def render_loaded(
     progress: Progress = silent,
 ) -> Estimate:
     """As `render`, for a scene that is already loaded."""
-    height, width = scene.size
-    step = scene.film.block_pixels
-    passes = plan_passes(height * width, scene.spp if spp is None else spp, step=step)
-    halves = np.zeros((2, height, width, 3), np.float64)
+    passes = passes_of(scene, spp)
+    sums = np.zeros((2, *scene.size, 3), np.float64)
     progress(label, 0, len(passes))
     with interruptible_between_pieces() as let_interrupts_through:
-        for k, (half, pass_spp) in enumerate(passes):
-            image = render_pass(loaded, scene, seed=pass_seed(seed, stream, k), spp=pass_spp)
-            halves[half] += pass_spp * image.astype(np.float64)
-            progress(label, k + 1, len(passes))
-            let_interrupts_through()
-    halves /= sum(size for _, size in passes) / 2
-    return Estimate.of_halves(as_float32(halves[0]), as_float32(halves[1]))
+        for some in ranges_of(scene, passes):
+            its = np.zeros_like(sums)
+            for k in some:
+                half, pass_spp = passes[k]
+                its[half] += pass_sum(loaded, scene, k, pass_spp, seed=seed, stream=stream)
+                progress(label, k + 1, len(passes))
+                let_interrupts_through()
+            sums += its
+    return estimate_of(sums, passes)
+
+
+def passes_of(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
+    """(half, samples per pixel) of all passes of an ordinary render, which go by their numbers."""
+    height, width = scene.size
+    step = scene.film.block_pixels
+    return plan_passes(height * width, scene.spp if spp is None else spp, step=step)
+
+
+def ranges_of(scene: Scene, passes: Sequence[tuple[int, int]]) -> list[range]:
+    """Ranges of passes that are added up by themselves, so that others may render some of them."""
+    height, width = scene.size
+    largest = max((spp for _, spp in passes), default=1)
+    size = max(1, SAMPLES_PER_RANGE // (height * width * largest))
+    return [range(k, min(k + size, len(passes))) for k in range(0, len(passes), size)]
+
+
+def pass_sum(
+    loaded: Any, scene: Scene, number: int, spp: int, *, seed: int, stream: Stream
+) -> Doubles:
+    """The undivided sum of a pass, (h, w, 3) float64."""
+    image = render_pass(loaded, scene, seed=pass_seed(seed, stream, number), spp=spp)
+    return spp * image.astype(np.float64)
+
+
+def estimate_of(sums: Doubles, passes: Sequence[tuple[int, int]]) -> Estimate:
+    """The picture of undivided sums of both halves, (2, h, w, 3), which are overwritten."""
+    sums /= sum(size for _, size in passes) / 2
+    return Estimate.of_halves(as_float32(sums[0]), as_float32(sums[1]))
 
 
 def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
@@ -128,9 +161,10 @@ def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
 
     film = scene.film
     spp //= film.block_pixels
-    image = mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp)
+    with kernels():
+        image = np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
     # Integrators that wrap another add channels of their own behind R, G and B.
-    return block_mean(np.array(image)[..., :3], film.block)
+    return block_mean(image[..., :3], film.block)
 
 
 def as_float32(image: Floats) -> Floats:

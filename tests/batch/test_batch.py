@@ -17,14 +17,16 @@ import pytest
 from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_batch
 from command import run, succeed
 
-from lightpaint.batch import executor as executors
+from lightpaint.batch import engine as engines
 from lightpaint.batch import work
-from lightpaint.batch.executor import Processes
+from lightpaint.batch.errands import Done
 from lightpaint.batch.gallery import FILES, contact_sheet, gallery_page
+from lightpaint.batch.how import How
 from lightpaint.batch.plan import plan
-from lightpaint.batch.run import How, run_batch
+from lightpaint.batch.processes import Processes
+from lightpaint.batch.run import run_batch
 from lightpaint.batch.summary import LightRow, Row
-from lightpaint.batch.task import Done, Task
+from lightpaint.batch.task import Task
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
@@ -244,7 +246,7 @@ def test_an_interrupt_says_how_to_go_on(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(executors, "do", interrupted)
+        patch.setattr(engines, "do", interrupted)
         with pytest.raises(Interrupted, match="10 looks are left; the same command goes on"):
             do(here)
     do(here)

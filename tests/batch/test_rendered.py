@@ -9,7 +9,7 @@ import pytest
 from command import run, succeed
 from renderer import LIGHTS, write_room
 
-from lightpaint.batch import work
+from lightpaint.batch import run as run_module
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
@@ -71,14 +71,14 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def done(here: Path) -> dict[str, Any]:
     """What the batch says of itself; and how often a basis was asked for."""
     asked: list[str] = []
-    obtain = work.obtain
+    obtain = run_module.obtain
 
     def counting(scene: Any, *others: Any, **how: Any) -> Any:
         asked.append(scene.sensor_names[scene.sensor])
         return obtain(scene, *others, **how)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work, "obtain", counting)
+        patch.setattr(run_module, "obtain", counting)
         told = json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q"))
     return {**told, "asked": asked}
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import lightpaint
+from lightpaint.batch.how import How
 from lightpaint.cli.options import LOADING
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import _SAID, OPTIONS, SPELLINGS, spoken
@@ -112,7 +113,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     known |= {*inspect.signature(lightpaint.read_light_groups).parameters}
     known |= {*inspect.signature(lightpaint.paint_with_light).parameters}
     known |= {*inspect.signature(paint_in_browser).parameters}
-    known |= {*inspect.signature(Source).parameters}
+    known |= {*inspect.signature(Source).parameters, *inspect.signature(How).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
     assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= known
 

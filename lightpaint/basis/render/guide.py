@@ -71,6 +71,11 @@ class Guide:
             [np.array(x).reshape(self.cells, self.count) for x in (self.received, self.asked)]
         ).astype(np.float32)
 
+    def freeze(self) -> None:
+        """Learn nothing more: what is drawn then does not depend on what was rendered before."""
+        self._learning = False
+        self._learns = dr.opaque(mi.Bool, False)
+
     def update(self) -> None:
         """Take what the passes since the last call have learned into the probabilities."""
         if not self._learning:

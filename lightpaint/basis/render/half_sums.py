@@ -9,6 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.sums import halves_of, mean_and_half_difference
 
 
 class HalfSums:
@@ -29,12 +30,8 @@ class HalfSums:
     def of(cls, basis: Basis) -> "HalfSums":
         """The sums that made `basis`, up to round-off."""
         sums = cls(len(basis.lights), basis.size)
-        a, b = sums.spp = list(basis.origin.halves)
-        sums.passes = list(basis.origin.passes)
-        # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
-        half_a = basis.images + basis.half_differences * (2 * b / (a + b))
-        half_b = basis.images - basis.half_differences * (2 * a / (a + b))
-        sums.planes = [mi.Float((half_a * a).ravel()), mi.Float((half_b * b).ravel())]
+        sums.spp, sums.passes = list(basis.origin.halves), list(basis.origin.passes)
+        sums.planes = [mi.Float(half.ravel()) for half in halves_of(basis)]
         sums.seen = mi.Float(basis.emitters_seen.ravel().astype(np.float32))
         return sums
 
@@ -48,16 +45,7 @@ class HalfSums:
             halves.append(np.array(self.planes[half]).reshape(self.shape))
             if is_last:
                 self.planes[half] = None
-        (a, b), (mean, half_difference) = self.spp, halves
-        # In place, one light at a time: these are the largest arrays there are.
-        for plane_a, plane_b in zip(mean, half_difference, strict=True):
-            plane_a /= a
-            plane_b /= -b
-            plane_b += plane_a
-            plane_b /= 2
-            # A is the mean of all plus the share of B in them times the difference.
-            plane_a -= plane_b * np.float32(2 * b / (a + b))
-        return mean, half_difference
+        return mean_and_half_difference(halves, self.spp)
 
     def emitters_seen(self) -> Bools:
         """(h, w), pixels in which any camera ray saw an emitter."""

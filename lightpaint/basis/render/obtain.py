@@ -1,5 +1,6 @@
 """The basis to solve with: an earlier one where it fits, with what it lacks rendered."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from lightpaint.basis import cache
@@ -11,6 +12,9 @@ from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
+#: `render_basis`, or another that takes and gives the same.
+Render = Callable[..., Basis]
+
 
 def obtain_basis(
     scene: Scene,
@@ -21,6 +25,7 @@ def obtain_basis(
     use_cache: bool = True,
     exact_spp: bool = False,
     progress: Progress = silent,
+    render: Render = render_basis,
 ) -> Basis:
     """The basis of `scene`: what an earlier run kept, with the samples that are missing.
 
@@ -28,18 +33,23 @@ def obtain_basis(
     use_cache: False neither looks for one nor keeps it.
     exact_spp: whether it has just as many samples as are asked for, and the same ones, whatever
     was kept. One with more samples stays kept.
+    render: who renders what is missing.
 
     Raises SceneError for exact_spp with a time, which asks for no number.
     """
     if exact_spp and time_s is not None:
         raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
     if not use_cache:
-        return render_basis(scene, spp=spp, time_s=time_s, seed=seed, progress=progress)
+        return render(scene, spp=spp, time_s=time_s, seed=seed, progress=progress)
     kept = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if kept is not None and not is_of(scene, kept, seed):
         kept = None
     start = kept
-    if start is not None and exact_spp and not is_on_the_way(scene, start, spp):
+    if (
+        start is not None
+        and exact_spp
+        and not is_on_the_way(scene, start, spp, is_in_parts=render is not render_basis)
+    ):
         start = None
 
     def keep(basis: Basis) -> bool:
@@ -48,7 +58,7 @@ def obtain_basis(
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
         start = replace(start, lights=basis_lights(scene), asked=scene.asked)
-    basis = render_basis(
+    basis = render(
         scene,
         spp=spp,
         time_s=time_s,

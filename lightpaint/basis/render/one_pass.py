@@ -49,10 +49,14 @@ class Tracer:
         # One stream of numbers for each half and for the rehearsal, far from all others.
         self.streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
 
-    def rehearse(self, spp: int) -> None:
-        """A pass that counts for what it learns alone: it is the noisiest, knowing nothing."""
+    def rehearse(self, spp: int, *, first: int = 0) -> None:
+        """A pass that counts for what it learns alone: it is the noisiest, knowing nothing.
+
+        first: samples per pixel of rehearsals before it.
+        """
         nowhere = HalfSums(len(self.scene.lights), self.scene.size)
-        self._trace(nowhere.planes[0], nowhere.seen, spp, Guided(self.streams[2], 0, self.guide))
+        numbers = Guided(self.streams[2], first, self.guide)
+        self._trace(nowhere.planes[0], nowhere.seen, spp, numbers)
 
     def add_pass(self, sums: HalfSums, half: int, spp: int) -> None:
         """Add `spp` samples per pixel to one of the halves of `sums`."""
@@ -61,11 +65,26 @@ class Tracer:
         sums.spp[half] += spp
         sums.passes[half] += 1
 
+    def part(self, half: int, rows: range, first: int, spp: int) -> tuple[Floats, Floats]:
+        """The sums of some samples of some rows, (n, rows, w, 3), and rays that saw an emitter.
+
+        first: samples of a pixel of that half that come before.
+        """
+        n, width = len(self.scene.lights), self.scene.size[1]
+        planes = dr.zeros(mi.Float, n * len(rows) * width * 3)
+        seen = dr.zeros(mi.Float, len(rows) * width)
+        numbers = Guided(self.streams[half], first, self.guide)
+        self._trace(planes, seen, spp, numbers, rows)
+        shape = len(rows), width
+        return np.array(planes).reshape(n, *shape, 3), np.array(seen).reshape(shape)
+
     def close(self) -> None:
         """Let go of the scene and all that refers to it."""
         del self.loaded, self.light_of, self.guide
 
-    def _trace(self, planes: Any, seen: Any, spp: int, numbers: "Guided") -> None:
+    def _trace(
+        self, planes: Any, seen: Any, spp: int, numbers: "Guided", rows: range | None = None
+    ) -> None:
         accumulate(
             self.loaded,
             self.scene.integrator,
@@ -77,6 +96,7 @@ class Tracer:
             guided=numbers,
             block=self.scene.film.block,
             must_bounce=needs_a_bounce(self.scene),
+            rows=rows,
         )
         # A running kernel cannot be interrupted, and what is not waited for is still running.
         dr.sync_thread()
@@ -121,6 +141,7 @@ def accumulate(
     guided: Guided | None = None,
     block: int = 1,
     must_bounce: bool = False,
+    rows: range | None = None,
 ) -> int:
     """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.
 
@@ -131,6 +152,8 @@ def accumulate(
     guided: None draws all numbers at random, from `seed`, in Mitsuba's order.
     block: side of the blocks of the film's pixels that are pixels here.
     must_bounce: whether paths that only pass surfaces carry nothing (see integrators.py).
+    rows: those of the picture that are rendered, which are then all that `planes` and `seen` have;
+    guided alone. Their samples are the same as of the whole picture.
     Returns the number of paths per pixel, which some samplers round up.
     """
     width, height = (int(v) // block for v in camera.film().crop_size())
@@ -142,11 +165,13 @@ def accumulate(
         sampler.set_samples_per_wavefront(spp)
         sampler.seed(seed, width * height * spp)
 
-    sample = dr.arange(mi.UInt32, width * height * spp)
-    pixel = sample // dr.opaque(mi.UInt32, spp)
+    rows = range(height) if rows is None else rows
+    sample = dr.arange(mi.UInt32, width * len(rows) * spp)
+    its = sample // dr.opaque(mi.UInt32, spp)
+    pixel = its + dr.opaque(mi.UInt32, width * rows.start)
     numbers = None
     if guided is not None:
-        term = sample - pixel * dr.opaque(mi.UInt32, spp) + dr.opaque(mi.UInt32, guided.first)
+        term = sample - its * dr.opaque(mi.UInt32, spp) + dr.opaque(mi.UInt32, guided.first)
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, guided.stream), term)
     ray, weight = camera_rays(camera, sampler, numbers, pixel, width, height)
     guide = guided.guide if guided is not None else None
@@ -157,7 +182,7 @@ def accumulate(
         guide,
         ray,
         weight,
-        Planes(planes, seen, light_of, pixel, dr.opaque(mi.UInt32, width * height)),
+        Planes(planes, seen, light_of, its, dr.opaque(mi.UInt32, width * len(rows))),
         hide_emitters=integrator.hide_emitters,
         must_bounce=must_bounce,
         max_depth=mi.UInt32(depth_limit(integrator)),

@@ -25,6 +25,8 @@ REHEARSAL = 2**18
 
 ONE_PASS = "one pass"
 SEPARATE = "separate renders"
+#: The first of these, by parts.py: the same samples, but for which emitters they ask.
+IN_PARTS = "one pass, in parts"
 
 
 def render_basis(
@@ -71,19 +73,25 @@ def render_basis(
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
-        return _with_first_hits(start.asking(scene.asked), scene, seed)
-    method = _method(scene)
-    if start is not None and start.origin.method != method:
+        return with_first_hits(start.asking(scene.asked), scene, seed)
+    method = method_of(scene)
+    if start is not None and not goes_on(start, method):
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
     made = render_all(scene, budget, seed, start, Keeper(keep), progress)
     if start is not None:
         made = replace(made, features=start.features, objects=start.objects)
-    return _with_first_hits(made, scene, seed)
+    return with_first_hits(made, scene, seed)
 
 
-def _with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
+def goes_on(basis: Basis, method: str) -> bool:
+    """Whether samples by that method can be added to those of `basis`."""
+    its = basis.origin.method
+    return (ONE_PASS if its == IN_PARTS else its) == method
+
+
+def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
     """`basis`, which knows what is seen: one kept by an earlier version may not."""
     if basis.features is not None and basis.objects is not None:
         return basis
@@ -124,18 +132,23 @@ def _free_memory() -> int | None:
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     """Whether `basis` was made of `scene` as it is, through its sensor and film, under `seed`."""
     of = basis.origin
-    mine = _origin(scene, seed, of.method, of.halves, of.passes)
+    mine = origin_of(scene, seed, of.method, of.halves, of.passes)
     return of == replace(mine, each_light=of.each_light) and basis.size == scene.size
 
 
-def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
+def is_on_the_way(
+    scene: Scene, basis: Basis, spp: int | None, *, is_in_parts: bool = False
+) -> bool:
     """Whether a render from nothing to `spp` samples per pixel comes by just those of `basis`.
 
     So does one that an interrupt ended, and not one that was made for fewer samples: its passes
-    end elsewhere. spp: the scene's own number if None.
+    end elsewhere. spp: the scene's own number if None. is_in_parts: whether it is rendered by
+    parts.py, which comes by nothing but its end.
     """
     origin = basis.origin
-    if origin.method != _method(scene):
+    if is_in_parts and method_of(scene) == ONE_PASS:
+        return origin.method == IN_PARTS and origin.spp == samples_for(scene, spp)
+    if origin.method != method_of(scene):
         return False
     plan = _plan(scene, spp)
     sizes = [[size for half, size in plan if half == h] for h in range(2)]
@@ -158,18 +171,20 @@ def samples_for(scene: Scene, spp: int | None) -> int:
 def _plan(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
     """The passes of all lights, or of each, up to `spp`, the scene's own number if None."""
     (height, width), spp = scene.size, scene.spp if spp is None else spp
-    if _method(scene) == ONE_PASS:
+    if method_of(scene) == ONE_PASS:
         return plan_passes(height * width, spp)
     return plan_of_light(scene, spp)
 
 
-def _method(scene: Scene) -> str:
+def method_of(scene: Scene) -> str:
+    """How a basis of `scene` is rendered: `ONE_PASS` or `SEPARATE`."""
     return ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
 
 
-def _origin(
+def origin_of(
     scene: Scene, seed: int, method: str, halves: tuple[int, int], passes: tuple[int, int]
 ) -> Origin:
+    """What a basis of `scene` says of where it comes from."""
     return Origin(
         scene=scene.path.name,
         scene_identity=scene.identity,
@@ -226,7 +241,7 @@ def _render_together(
             images,
             half_differences,
             sums.emitters_seen(),
-            _origin(scene, seed, ONE_PASS, halves, passes),
+            origin_of(scene, seed, ONE_PASS, halves, passes),
             tracer.guide.learned(),
             scene.asked,
         )
@@ -268,7 +283,7 @@ def _render_one_by_one(
     """One light after the other, by the scene's own integrator (see separate.py)."""
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
-    nothing = _origin(scene, seed, SEPARATE, (0, 0), (0, 0))
+    nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))
 
     def basis() -> Basis:
         images, half_differences = sums.mean_and_half_difference()

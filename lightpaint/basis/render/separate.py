@@ -41,15 +41,21 @@ class LightSums:
     @classmethod
     def of(cls, basis: Basis) -> "LightSums":
         """The sums that made `basis`, up to round-off."""
-        origin = basis.origin
-        sums = cls(len(basis.lights), basis.size)
-        each = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
-        sums.spp[:], sums.passes[:] = np.array(each)[:, :2], np.array(each)[:, 2:]
+        sums = cls.counted(basis)
+        sums.planes = np.zeros((2, *basis.images.shape), np.float32)
         for k, (a, b) in enumerate(sums.spp.tolist()):
             image, half_difference = basis.images[k], basis.half_differences[k]
             # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
             sums.planes[0, k] = a * (image + half_difference * (2 * b / max(a + b, 1)))
             sums.planes[1, k] = b * (image - half_difference * (2 * a / max(a + b, 1)))
+        return sums
+
+    @classmethod
+    def counted(cls, basis: Basis) -> "LightSums":
+        """How many samples and passes made `basis`, without their sums."""
+        origin, sums = basis.origin, cls(len(basis.lights), (0, 0))
+        each = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
+        sums.spp[:], sums.passes[:] = np.array(each)[:, :2], np.array(each)[:, 2:]
         return sums
 
     def done(self, light: int) -> tuple[int, int]:
@@ -173,13 +179,20 @@ def _alone(scene: Scene, light: int) -> Any:
 def _add_pass(
     loaded: Any, scene: Scene, sums: LightSums, light: int, half: int, spp: int, seed: int
 ) -> None:
-    # Each light has samples of its own.
-    of_light = pass_seed(seed, Stream.BASIS, light)
-    number = 2 * int(sums.passes[light, half]) + half
-    image = render_pass(loaded, scene, seed=pass_seed(of_light, Stream.BASIS, number), spp=spp)
-    sums.planes[half, light] += spp * as_float32(image)
+    number = int(sums.passes[light, half])
+    sums.planes[half, light] += light_pass(loaded, scene, light, half, number, spp, seed)
     sums.spp[light, half] += spp
     sums.passes[light, half] += 1
+
+
+def light_pass(
+    loaded: Any, scene: Scene, light: int, half: int, number: int, spp: int, seed: int
+) -> Floats:
+    """The undivided sum of a pass, (h, w, 3). number: of those of that light and half."""
+    # Each light has samples of its own.
+    of_light = pass_seed(seed, Stream.BASIS, light)
+    its = pass_seed(of_light, Stream.BASIS, 2 * number + half)
+    return spp * as_float32(render_pass(loaded, scene, seed=its, spp=spp))
 
 
 def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:

@@ -1,6 +1,5 @@
-"""Who does the tasks: this process, or several beside it. Another engine would be a third."""
+"""Worker processes on this machine."""
 
-import json
 import multiprocessing
 import os
 import signal
@@ -8,42 +7,15 @@ import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict
-from typing import Protocol
 
 from threadpoolctl import threadpool_limits
 
-from lightpaint.batch.task import Done, Task
-from lightpaint.batch.work import Held, do
-from lightpaint.progress import Listener, silent
-
-#: How often a task is given to a worker, where workers die over it.
-TRIES = 2
-
-
-class Executor(Protocol):
-    """Does tasks that do not wait for each other."""
-
-    @property
-    def is_apart(self) -> bool:
-        """Whether it works in other processes, which have no basis at hand."""
-
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        """What came of each, as it is done, in any order. Ending it early ends the work."""
-
-
-class InProcess:
-    """One after the other, here."""
-
-    is_apart = False
-
-    def __init__(self, held: Held, listen: Listener) -> None:
-        self._held, self._listen = held, listen
-
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        """As of `Executor`, in the order of the tasks."""
-        for task in tasks:
-            yield do(task, self._held, self._listen)
+from lightpaint.batch.engine import LOST, TRIES
+from lightpaint.batch.errands import Done, Errand
+from lightpaint.batch.held import Held
+from lightpaint.batch.work import do
+from lightpaint.progress import silent
+from lightpaint.scene.threads import limit_threads
 
 
 class Processes:
@@ -52,7 +24,7 @@ class Processes:
     is_apart = True
 
     def __init__(self, workers: int) -> None:
-        self._workers = workers
+        self.workers = workers
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> "Processes":
@@ -61,41 +33,40 @@ class Processes:
     def __exit__(self, *_: object) -> None:
         self._end()
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        """As of `Executor`."""
-        waiting, tries = list(tasks), dict.fromkeys((task.look for task in tasks), 0)
+    def run(self, errands: Sequence[Errand]) -> Iterator[Done]:
+        """As of `Engine`."""
+        waiting, tries = list(errands), dict.fromkeys((errand.name for errand in errands), 0)
         # Of several that were at work when one died nobody knows which did: each goes alone.
-        suspects: list[Task] = []
+        suspects: list[Errand] = []
         try:
             while waiting or suspects:
                 if waiting:
                     yield from self._together(waiting, suspects)
                 while suspects:
-                    task = suspects.pop(0)
-                    tries[task.look] += 1
-                    alone: list[Task] = []
-                    yield from self._together([task], alone)
-                    if alone and tries[task.look] < TRIES:
-                        suspects.append(task)
+                    errand = suspects.pop(0)
+                    tries[errand.name] += 1
+                    alone: list[Errand] = []
+                    yield from self._together([errand], alone)
+                    if alone and tries[errand.name] < TRIES:
+                        suspects.append(errand)
                     elif alone:
-                        said = "its worker was killed, or ran out of memory"
-                        yield Done(task.look, task.kind, said, is_lost=True)
+                        yield Done(errand.name, errand.kind, LOST, is_lost=True)
         except BaseException:
             self._end()
             raise
 
-    def _together(self, waiting: list[Task], lost: list[Task]) -> Iterator[Done]:
+    def _together(self, waiting: list[Errand], lost: list[Errand]) -> Iterator[Done]:
         """Empty `waiting`, as many at a time as there are workers, until one of them dies."""
-        running: dict[Future[str], Task] = {}
+        running: dict[Future[Done], Errand] = {}
         pool = self._started()
         while waiting or running:
             try:
-                while waiting and len(running) < self._workers:
-                    running[pool.submit(_work, waiting[0].to_json())] = waiting[0]
+                while waiting and len(running) < self.workers:
+                    running[pool.submit(_work, waiting[0])] = waiting[0]
                     del waiting[0]
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
-                    done = _read(future.result())
+                    done = future.result()
                     del running[future]
                     yield done
             except BrokenProcessPool:
@@ -105,9 +76,9 @@ class Processes:
 
     def _started(self) -> ProcessPoolExecutor:
         if self._pool is None:
-            threads = max(1, (os.cpu_count() or 1) // self._workers)
+            threads = max(1, (os.cpu_count() or 1) // self.workers)
             self._pool = ProcessPoolExecutor(
-                self._workers,
+                self.workers,
                 # A fork would have half of the renderer's threads.
                 mp_context=multiprocessing.get_context("spawn"),
                 initializer=_begin,
@@ -137,6 +108,7 @@ def _begin(threads: int) -> None:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, str(threads))
     threadpool_limits(threads, "blas")
+    limit_threads(threads)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -148,12 +120,6 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _work(text: str) -> str:
-    """In a worker: do what the text says, and say what came of it."""
-    task = Task.from_json(text)
-    _HELD.only(task.bases)
-    return json.dumps(asdict(do(task, _HELD, silent)))
-
-
-def _read(text: str) -> Done:
-    return Done(**json.loads(text))
+def _work(errand: Errand) -> Done:
+    """In a worker: do it, and say what came of it."""
+    return do(errand, _HELD, silent)

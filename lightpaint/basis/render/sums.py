@@ -1,0 +1,34 @@
+"""Sums of two halves of the samples, and the means and half differences made of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+
+
+def halves_of(basis: Basis) -> list[Floats]:
+    """The undivided sums of both halves that made `basis`, up to round-off, (n, h, w, 3) each."""
+    a, b = basis.origin.halves
+    # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
+    half_a = basis.images + basis.half_differences * (2 * b / (a + b))
+    half_b = basis.images - basis.half_differences * (2 * a / (a + b))
+    return [half_a * a, half_b * b]
+
+
+def mean_and_half_difference(halves: Sequence[Floats], spp: Sequence[int]) -> tuple[Floats, Floats]:
+    """Of all samples, and between the halves; what is given is overwritten.
+
+    halves: two undivided sums, (n, h, w, 3). spp: samples per pixel of each.
+    """
+    (a, b), (mean, half_difference) = spp, halves
+    # In place, one light at a time: these are the largest arrays there are.
+    for plane_a, plane_b in zip(mean, half_difference, strict=True):
+        plane_a /= a
+        plane_b /= -b
+        plane_b += plane_a
+        plane_b /= 2
+        # A is the mean of all plus the share of B in them times the difference.
+        plane_a -= plane_b * np.float32(2 * b / (a + b))
+    return mean, half_difference

@@ -1,0 +1,146 @@
+"""The workers of a Dask cluster: who is there, what each has, and what it says."""
+
+import os
+import socket
+import time
+from collections import deque
+from collections.abc import Collection
+from contextlib import suppress
+from typing import Any
+
+from lightpaint.batch import cluster_worker
+from lightpaint.batch.cluster_worker import versions as own_versions
+from lightpaint.batch.parcels import Parcel, pieces, sent_files
+from lightpaint.errors import BatchError
+from lightpaint.files import first_line
+from lightpaint.progress import Listener
+
+#: Seconds for the scheduler to answer, and between looks at who is there.
+ANSWER_S, LOOK_S = 15.0, 1.0
+
+INSTALL = "pip install 'lightpaint[cluster]'"
+
+
+class ClusterWorkers:
+    """Those that the scheduler at `address` knows. topic: under which they tell what they begin."""
+
+    def __init__(self, address: str, listen: Listener, topic: str) -> None:
+        self._address, self._listen = address, listen
+        self._client: Any = _connected(address)
+        #: Addresses of those that can be given work.
+        self.there: list[str] = []
+        #: What they tell.
+        self.events: deque[dict[str, str]] = deque()
+        self._left_out: dict[str, str] = {}
+        self._has: dict[str, set[str]] = {}
+        self._looked_s = 0.0
+        self._is_told = False
+        self._client.subscribe_topic(topic, lambda event: self.events.append(event[1]))
+        self.look_around()
+
+    def close(self) -> None:
+        """Leave them alone."""
+        with suppress(Exception):
+            self._client.close(timeout=2)
+
+    def is_there(self, worker: str) -> bool:
+        """Whether the scheduler knows it now."""
+        return worker in self._known()
+
+    def submit(self, parcel: Parcel, worker: str, key: str) -> Any:
+        """Give a worker an errand, whose files it has; a future of what comes of it."""
+        how: dict[str, Any] = {"key": key, "workers": [worker], "pure": False}
+        return self._client.submit(cluster_worker.do_parcel, parcel, **how)
+
+    def lacks(self, worker: str, sums: Collection[str]) -> None:
+        """It says that it does not have those files any more."""
+        self._has.get(worker, set()).difference_update(sums)
+
+    def look_around(self) -> None:
+        """Who is there; each is asked once whether it has what is here."""
+        if time.monotonic() - self._looked_s < LOOK_S:
+            return
+        there = [x for x in self._known() if x not in self._left_out]
+        for worker, why in self._unfit(sorted(set(there) - set(self.there))).items():
+            self._left_out[worker] = why
+            self._listen.say(f"worker {worker} is left out: {why}")
+        self.there = [worker for worker in there if worker not in self._left_out]
+        self._has = {worker: self._has.get(worker, set()) for worker in self.there}
+        if not self.there and not self._is_told:
+            self._listen.say(f"waiting for workers at {self._address}")
+        self._is_told = not self.there
+        self._looked_s = time.monotonic()
+
+    def _known(self) -> list[str]:
+        """Addresses of all workers. Raises BatchError where the scheduler is gone."""
+        try:
+            if self._client.status == "running":
+                return list(self._client.nthreads())
+        except Exception as error:
+            said = first_line(error)
+        else:
+            said = self._client.status
+        raise BatchError(
+            f"the scheduler at {self._address} is gone ({said}); the same command goes on once it "
+            "is back"
+        )
+
+    def _unfit(self, workers: list[str]) -> dict[str, str]:
+        """Which of those that have come are of no use, and why."""
+        if not workers:
+            return {}
+        found = self._client.run(cluster_worker.versions, workers=workers, on_error="return")
+        mine, unfit = own_versions(), {}
+        for worker, its in found.items():
+            if isinstance(its, Exception):
+                unfit[worker] = f"lightpaint does not run there ({first_line(its)})"
+            elif others := [name for name in mine if its.get(name) != mine[name]]:
+                unfit[worker] = ", ".join(
+                    f"it has {name} {its.get(name)}, and here is {mine[name]}" for name in others
+                )
+        return unfit
+
+    def ship(self, parcel: Parcel, worker: str, common: set[str]) -> None:
+        """Send what the worker lacks; what others will need goes to all at once."""
+        for file, its in sent_files(parcel):
+            if its in self._has.get(worker, set()):
+                continue
+            to = [worker]
+            if file in common:
+                to += [x for x in self.there if x != worker and its not in self._has[x]]
+            with open(file, "rb") as opened:
+                data = opened.read()
+            for piece in pieces(data):
+                self._client.run(cluster_worker.put, its, *piece, workers=to, on_error="ignore")
+            for one in to:
+                self._has.setdefault(one, set()).add(its)
+
+    def end(self, worker: str, why: str) -> None:
+        """End a worker's process; its nanny begins another."""
+        self._left_out[worker] = why
+        if worker in self.there:
+            self.there.remove(worker)
+        try:
+            self._client.restart_workers([worker], timeout=ANSWER_S, raise_for_error=False)
+        except Exception:  # it has no nanny
+            with suppress(Exception):
+                self._client.run(os._exit, 1, workers=[worker], wait=False, on_error="ignore")
+
+
+def _connected(address: str) -> Any:
+    """A client of the scheduler there. Raises BatchError."""
+    try:
+        from distributed import Client
+        from distributed.comm import get_address_host_port
+    except ImportError as error:
+        raise BatchError(f"a cluster needs Dask's distributed: {INSTALL}") from error
+    try:
+        # A client that finds nobody takes its time, and has last words.
+        place = get_address_host_port(address, strict=True)
+        socket.create_connection(place, timeout=ANSWER_S).close()
+        return Client(address, timeout=ANSWER_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise BatchError(
+            f"no scheduler answers at {address}: {first_line(error) or 'none is there'}; give its "
+            "address, like tcp://host:8786 (dask scheduler tells it)"
+        ) from error

@@ -1,0 +1,34 @@
+"""Final renders in ranges of passes, whose sums are those of a render in one go to the last bit."""
+
+import gc
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.batch.keys import Final
+from lightpaint.scene.render import Stream, pass_sum, passes_of
+from lightpaint.scene.scene import Scene
+
+
+class Frame:
+    """Renders passes of one relit scene, which stays loaded: close it before another is."""
+
+    def __init__(self, scene: Scene, final: Final) -> None:
+        self._scene, self._final = scene, final
+        self._passes = passes_of(scene, final.spp)
+        self._loaded: Any = scene.load()
+
+    def sum(self, some: range) -> Doubles:
+        """The undivided sums of both halves of those passes, (2, h, w, 3)."""
+        sums = np.zeros((2, *self._scene.size, 3), np.float64)
+        for k in some:
+            half, spp = self._passes[k]
+            seed, stream = self._final.seed, Stream.VERIFICATION
+            sums[half] += pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
+        return sums
+
+    def close(self) -> None:
+        """Let go of the scene."""
+        self._loaded = None
+        gc.collect()

@@ -1,0 +1,47 @@
+"""Some rows of a basis, of which a worker keeps nothing but sums."""
+
+from typing import Any
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.render import IN_PARTS, basis_lights, origin_of
+from lightpaint.basis.render.sums import mean_and_half_difference
+from lightpaint.batch.errands import SumsOfRows
+from lightpaint.batch.held import Held
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.sums import Sums, sums_of
+from lightpaint.scene.scene import Scene
+
+
+def sums_of_rows(errand: SumsOfRows, held: Held) -> list[Sums]:
+    """Those with each painting, of the very images that a whole basis has in these rows."""
+    renderer, scene = held.renderer(errand), held.film(errand.film)
+    halves: list[Any] = [None, None]
+    spp, seen = [0, 0], None
+    for part in errand.parts:
+        planes, its = renderer.render(part)
+        before = halves[part.half]
+        halves[part.half] = planes if before is None else before + planes
+        seen = its if seen is None else seen + its
+        spp[part.half] += part.spp
+    assert seen is not None
+    images, half_differences = mean_and_half_difference(halves, spp)
+    rows = slice(errand.parts[0].top, errand.parts[0].bottom)
+    basis = about_lights(scene, errand.seed, (spp[0], spp[1]), images, half_differences, seen > 0)
+    return [
+        sums_of(basis, held.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
+        for wanted in errand.paintings
+    ]
+
+
+def about_lights(
+    scene: Scene,
+    seed: int,
+    halves: tuple[int, int],
+    images: Floats,
+    half_differences: Floats,
+    seen: Bools,
+) -> Basis:
+    """A basis of the scene's lights, of these pixels. halves: samples per pixel of each."""
+    origin = origin_of(scene, seed, IN_PARTS, halves, (1, 1))
+    return Basis(basis_lights(scene), images, half_differences, seen, origin, asked=scene.asked)

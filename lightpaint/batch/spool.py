@@ -1,0 +1,103 @@
+"""Parts of a basis that are rendered and not yet added up, on the disk: no kill costs them."""
+
+import hashlib
+import shutil
+import tempfile
+import time
+import zipfile
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.parts import Part
+from lightpaint.errors import BasisError
+from lightpaint.files import first_line
+from lightpaint.scene.scene import Scene
+from lightpaint.version import __version__
+
+#: Seconds after which nobody will go on with the parts of a basis.
+LEFTOVER_S = 7 * 86_400.0
+
+
+class Spool:
+    """The parts of one basis. A disk that takes none is no reason to lose a render."""
+
+    def __init__(
+        self, scene: Scene, parts: Sequence[Part], *, seed: int, start: Basis | None
+    ) -> None:
+        begun = None if start is None else start.origin
+        what = (__version__, scene.identity, scene.sensor, seed, scene.size, begun, list(parts))
+        name = hashlib.sha256(repr(what).encode()).hexdigest()[:32]
+        self.folder = cache.folder() / "parts" / name
+        self._delete_leftovers()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            self.folder = Path(tempfile.mkdtemp(prefix="lightpaint-"))
+
+    @property
+    def learned(self) -> Path:
+        """Where the lesson goes."""
+        return self.folder / "learned.npz"
+
+    def lesson(self) -> Floats | None:
+        """What was learned; None before that."""
+        try:
+            return read_lesson(str(self.learned))
+        except BasisError:
+            return None
+
+    def keep_lesson(self, learned: Floats) -> None:
+        """Keep what was learned. Raises OSError."""
+        _write(self.learned, compressed=True, learned=learned)
+
+    def part(self, part: Part) -> tuple[Floats, Floats] | None:
+        """The sums of that part; None if they are not kept, or not as they were."""
+        try:
+            with np.load(self._file(part), allow_pickle=False) as kept:
+                return kept["planes"], kept["seen"]
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+            return None
+
+    def keep_part(self, part: Part, planes: Floats, seen: Floats) -> None:
+        """Keep the sums of that part, if the disk takes them."""
+        with suppress(OSError):
+            _write(self._file(part), planes=planes, seen=seen)
+
+    def drop(self) -> None:
+        """Delete all: the basis is made."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _file(self, part: Part) -> Path:
+        light = "" if part.light is None else f"-{part.light}"
+        return self.folder / f"{part.half}-{part.top}-{part.first}{light}.npz"
+
+    def _delete_leftovers(self) -> None:
+        for folder in self.folder.parent.glob("*"):
+            with suppress(OSError):
+                if time.time() - folder.stat().st_mtime > LEFTOVER_S:
+                    shutil.rmtree(folder, ignore_errors=True)
+
+
+def read_lesson(file: str) -> Floats:
+    """What a lesson came to. Raises BasisError."""
+    try:
+        with np.load(file, allow_pickle=False) as kept:
+            learned: Floats = kept["learned"]
+            return learned
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise BasisError(f"cannot read {file}: {first_line(error)}") from error
+
+
+def _write(file: Path, *, compressed: bool = False, **arrays: Any) -> None:
+    """All of it under that name, or nothing."""
+    half = file.with_name(f".{file.name}.half")
+    with half.open("wb") as opened:
+        (np.savez_compressed if compressed else np.savez)(opened, **arrays)
+    half.replace(file)

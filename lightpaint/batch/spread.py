@@ -1,0 +1,53 @@
+"""One final render by many workers."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.batch.engine import Engine
+from lightpaint.batch.errands import Passes
+from lightpaint.batch.estimate import SAMPLE_S
+from lightpaint.batch.task import Task
+from lightpaint.errors import SceneError
+from lightpaint.images.estimate import Estimate
+from lightpaint.progress import Listener
+from lightpaint.scene.render import estimate_of, passes_of, ranges_of
+from lightpaint.scene.scene import Scene
+from lightpaint.sources import SceneFile
+
+
+def rendered_by(
+    engine: Engine, task: Task, variant: str | None, listen: Listener
+) -> Callable[[Scene], Estimate]:
+    """What has `engine` render the scene of a look that is answered, in ranges of passes.
+
+    variant: Mitsuba's, of the look's own scene.
+    """
+
+    def rendered(relit: Scene) -> Estimate:
+        # As the answer has left it, which comes out the same when it is written anew.
+        path = str(Path(task.writes) / "relit.xml")
+        file = SceneFile(path, relit.sensor, variant=variant, use_lights_file=False)
+        files = tuple(map(str, file.content.read_files))
+        height, width = relit.size
+        passes = passes_of(relit, task.final.spp)
+        errands = []
+        for some in ranges_of(relit, passes):
+            samples = height * width * sum(passes[k][1] for k in some)
+            name, expected_s = f"{task.look} {some.start}", samples * SAMPLE_S
+            its = SceneFile(path, relit.sensor, variant=variant, use_lights_file=False)
+            errands.append(Passes(name, its, task.final, some.start, some.stop, files, expected_s))
+        came = {}
+        sums, following = np.zeros((2, height, width, 3), np.float64), 0
+        for count, done in enumerate(engine.run(errands)):
+            if done.failure:
+                raise SceneError(done.failure)
+            came[done.look] = done.value
+            while following < len(errands) and errands[following].name in came:
+                sums += came.pop(errands[following].name)
+                following += 1
+            listen("relit", count + 1, len(errands), "ranges of passes")
+        return estimate_of(sums, passes)
+
+    return rendered

@@ -1,0 +1,178 @@
+"""What goes to a worker and comes back, without a network: by content, and to the right places."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from batches import contents, write_batch
+from light_groups import interleaved, pictures
+
+from lightpaint.batch.errands import Done, Errand
+from lightpaint.batch.held import Held
+from lightpaint.batch.parcels import Contents, Parcel, Store, packed, pieces, unpack
+from lightpaint.batch.plan import plan
+from lightpaint.batch.run import run_batch
+from lightpaint.batch.task import Task
+from lightpaint.batch.work import do
+from lightpaint.errors import BatchError, OutputError
+from lightpaint.progress import silent
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "project").mkdir()
+    monkeypatch.chdir(tmp_path / "project")
+    write_batch(tmp_path / "project")
+    return tmp_path / "project"
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "worker")
+
+
+def task(manifest: Path, out: Path, look: str = "p0") -> Task:
+    return next(x.steps[0].task for x in plan(manifest, out).looks if x.entry.name == look)
+
+
+def here_done(errand: Errand) -> Done:
+    return do(errand, Held(), silent)
+
+
+def sent(store: Store, parcel: Parcel) -> None:
+    """Send what is lacking, as the engine does."""
+    files = {its: file for file, its in (*parcel.files, *parcel.carried)}
+    for sum_ in store.lacking(parcel):
+        for data, is_first, is_last in pieces(Path(files[sum_]).read_bytes()):
+            store.put(sum_, data, is_first=is_first, is_last=is_last)
+    assert store.lacking(parcel) == []
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_look_done_elsewhere_is_the_look_done_here(here: Path, store: Store, whole: bool) -> None:
+    base = here if whole else Path()
+    run_batch(plan(base / "looks.toml", base / "expected").only("p0"))
+    errand = task(base / "looks.toml", base / "expected")
+    elsewhere = task(base / "looks.toml", base / "out")
+    parcel = packed(elsewhere, Contents(), run="a", is_shared=False)
+    assert len(store.lacking(parcel)) == 2  # basis and painting
+    sent(store, parcel)
+    done = store.done(parcel, here_done)
+    assert (done.failure, done.files and sorted(done.files)) == (
+        "",
+        ["lighting.json", "predicted.exr", "report.json", "result.json"],
+    )
+    assert not (here / "out").exists()
+    assert done.files is not None
+    unpack(elsewhere, done.files)
+    assert contents(here / "out/p0") == contents(here / errand.writes)
+    # And again, as the same answer; but not over what was changed by hand.
+    unpack(elsewhere, done.files)
+    (here / "out/p0/lighting.json").write_text("mine", encoding="utf-8")
+    with pytest.raises(OutputError, match="was changed since lightpaint wrote it"):
+        unpack(elsewhere, done.files)
+    unpack(forced(elsewhere), done.files)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
+    here: Path, store: Store, whole: bool
+) -> None:
+    base, images = here if whole else Path(), pictures()
+    (here / "renders").mkdir()
+    for name, image in zip("abc", images, strict=True):
+        interleaved(here / f"renders/{name}.exr", {"": image})
+    for k in range(2):
+        interleaved(here / f"renders/p{k}.exr", {"": images[k] + images[2] / 2})
+    (here / "groups.toml").write_text(
+        'look = [{ light_groups = "renders", paintings = ["renders/p*.exr"], '
+        'variations = ["warmer"], want = ["predict"] }]',
+        encoding="utf-8",
+    )
+    run_batch(plan(base / "groups.toml", base / "expected"))
+    for look in ("p0", "p1", "p1-warmer"):
+        errand = task(base / "groups.toml", base / "out", look)
+        parcel = packed(errand, Contents(), run="a", is_shared=False)
+        sent(store, parcel)
+        done = store.done(parcel, here_done)
+        assert done.failure == ""
+        assert done.files is not None
+        unpack(errand, done.files)
+        assert contents(here / f"out/{look}") == contents(here / f"expected/{look}")
+
+
+def forced(one: Task) -> Task:
+    job = json.loads(one.job)
+    job["settings"]["force"] = True
+    return replace(one, job=json.dumps(job))
+
+
+def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: Store) -> None:
+    errand, contents_ = task(here / "looks.toml", here / "out"), Contents()
+    sent(store, packed(errand, contents_, run="a", is_shared=False))
+    (here / "p0.exr").write_bytes((here / "p1.exr").read_bytes())
+    parcel = packed(errand, contents_, run="a", is_shared=False)
+    assert len(store.lacking(parcel)) == 1
+    sent(store, parcel)
+    seen: list[bytes] = []
+
+    def look(given: Errand) -> Done:
+        assert isinstance(given, Task)
+        [painting] = [file for file in given.reads if file.endswith("p0.exr")]
+        seen.append(Path(painting).read_bytes())
+        return Done("p0", "answer")
+
+    store.done(parcel, look)
+    assert seen == [(here / "p1.exr").read_bytes()]
+
+
+def test_what_comes_otherwise_than_it_was_sent_is_refused(store: Store) -> None:
+    with pytest.raises(BatchError, match="otherwise than it was sent"):
+        store.put("0" * 64, b"data", is_first=True, is_last=True)
+
+
+def test_a_shared_disk_is_believed_only_if_it_holds_the_same(here: Path, store: Store) -> None:
+    errand = task(here / "looks.toml", here / "out")
+    parcel = packed(errand, Contents(), run="a", is_shared=True)
+    assert store.lacking(parcel) == []
+    assert store.done(parcel, here_done).failure == ""
+    assert (here / "out/p0/lighting.json").is_file()
+    (here / "p0.exr").write_bytes(b"other")
+    assert "p0.exr is another on a worker" in store.done(parcel, here_done).failure
+
+
+def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
+    here: Path, store: Store
+) -> None:
+    only_here = (here / "b.basis.exr").rename(here / "only-here.exr")
+    write_batch(here)
+    errand = replace(task(here / "looks.toml", here / "out"), files=(str(only_here),))
+    parcel = packed(errand, Contents(), run="a", is_shared=True)
+    assert len(store.lacking(parcel)) == 1
+    sent(store, parcel)
+
+    def look(given: Errand) -> Done:
+        assert isinstance(given, Task)
+        assert given.reads == errand.reads
+        [file] = given.files
+        assert file != errand.files[0]
+        assert Path(file).read_bytes() == only_here.read_bytes()
+        return Done("p0", "answer")
+
+    store.done(parcel, look)
+
+
+@pytest.mark.parametrize("size", [0, 1, 2**26, 2**26 + 1])
+def test_pieces_make_the_whole(size: int) -> None:
+    some = list(pieces(bytes(size)))
+    assert sum(len(data) for data, _, _ in some) == size
+    assert [first for _, first, _ in some] == [True] + [False] * (len(some) - 1)
+    assert [last for _, _, last in some] == [False] * (len(some) - 1) + [True]
+
+
+def test_a_file_that_is_gone_is_one_look_s_failure(here: Path) -> None:
+    errand = task(here / "looks.toml", here / "out")
+    (here / "p0.exr").unlink()
+    with pytest.raises(BatchError, match="cannot read"):
+        packed(errand, Contents(), run="a", is_shared=False)

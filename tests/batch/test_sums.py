@@ -1,0 +1,180 @@
+"""Lightings by sums alone: those that a basis would have led to, and no picture of it anywhere."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import BasisFactory
+from renderer import LIGHTS, write_room
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render import parts as parts_module
+from lightpaint.batch.plan import plan
+from lightpaint.batch.run import run_batch
+from lightpaint.errors import BatchError, TargetError
+from lightpaint.images.exr import write_rgb
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.solve import solution_of, solve
+from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of, why_not_by_sums
+from lightpaint.scene.threads import limit_threads
+from lightpaint.target.target import Target
+
+ROWS = [slice(0, 5), slice(5, 12)]
+
+
+def cut(basis: Basis, rows: slice) -> Basis:
+    return Basis(
+        basis.lights,
+        basis.images[:, rows],
+        basis.half_differences[:, rows],
+        basis.emitters_seen[rows],
+        basis.origin,
+    )
+
+
+def of_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
+    about = cut(basis, slice(0, 1))
+    constraints = asked.pop("constraints", Constraints())
+    fit = Fit(literal=True, **asked)
+    return solution_of(problem_of_sums(about, "it", sums, constraints=constraints, fit=fit)).weights
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {},
+        {"constraints": Constraints.of({"light 1": {"limits": {"max": 0.4}}}, prefer_current=0.1)},
+        {"constraints": Constraints.of(sparse=2)},
+        {"colors": "white"},
+        {"emitters": "skip"},
+    ],
+)
+def test_the_lighting_is_that_of_the_whole_basis(
+    make_basis: BasisFactory, asked: dict[str, Any]
+) -> None:
+    seen = np.zeros((12, 10), bool)
+    seen[3:6, 2:4] = True
+    basis = make_basis(3, seen=seen)
+    rng = np.random.default_rng(2)
+    mix = np.einsum("nhwc,n->hwc", basis.images, [0.7, 0.9, 0.0]).astype(np.float32)
+    image = mix + 0.2 * rng.random(mix.shape, np.float32)
+    importance = rng.random((12, 10), np.float32) * (np.arange(12) > 1)[:, None]
+    target = Target.of(image, importance.astype(np.float32))
+    fit = Fit(literal=True, **{k: v for k, v in asked.items() if k != "constraints"})
+    assert why_not_by_sums(target, fit) == ""
+    first, second = (sums_of(cut(basis, rows), target, rows, fit) for rows in ROWS)
+    expected = solve(basis, target, literal=True, **asked).weights
+    # Sums of float64 in another order.
+    np.testing.assert_allclose(of_sums(basis, first + second, **asked), expected, atol=1e-9)
+
+
+def test_what_needs_pictures_says_so() -> None:
+    image = np.ones((4, 4, 3), np.float32)
+    target = Target.of(image, np.eye(4))
+    for fit in (Fit(), Fit(hold=1.0), Fit(space="display"), Fit(colors="gentle")):
+        assert bool(why_not_by_sums(target, fit)) == (fit != Fit())
+    white = replace(target, at_least=np.ones((4, 4, 3), bool))
+    assert "brighter" in why_not_by_sums(white, Fit(literal=True))
+
+
+def test_where_nothing_counts(make_basis: BasisFactory) -> None:
+    basis = make_basis(2, images=np.zeros((2, 12, 10, 3)))
+    target = Target.of(np.zeros((12, 10, 3)))
+    sums = sums_of(cut(basis, ROWS[0]), target, ROWS[0], Fit())
+    with pytest.raises(TargetError, match="no light reaches"):
+        of_sums(basis, sums)
+
+
+LOOKS = """
+[defaults]
+scene = "room.xml"
+settings = { spp = 16, literal = true }
+
+[[look]]
+paintings = ["bright.exr", "dark.exr"]
+want = ["WANT"]
+"""
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sums")
+    write_room(folder, lights=LIGHTS["panel"] + LIGHTS["bulb"])
+    rng = np.random.default_rng(0)
+    for name, light in (("bright", 0.8), ("dark", 0.2)):
+        write_rgb(folder / f"{name}.exr", light * rng.random((20, 24, 3), np.float32))
+    return folder
+
+
+def hearing(labels: list[str]) -> Any:
+    return lambda label, *_: labels.append(label)
+
+
+@pytest.fixture
+def _one_thread() -> Iterator[None]:
+    limit_threads(1)
+    yield
+    limit_threads(None)
+
+
+@pytest.mark.usefixtures("_one_thread")
+def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts_module, "SAMPLES", 2**10)
+    monkeypatch.setattr(parts_module, "LESSON", 2**12)
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(here / "cache"))
+    found = {}
+    for want in ("lights", "solve"):
+        (here / "looks.toml").write_text(LOOKS.replace("WANT", want), encoding="utf-8")
+        out = here / want
+        outcome = run_batch(plan(here / "looks.toml", out))
+        assert not outcome.failed
+        assert run_batch(plan(here / "looks.toml", out)).done == []
+        found[want] = {
+            name: np.array(list(read_lighting(out / name / "lighting.json").emission.values()))
+            for name in ("bright", "dark")
+        }
+    written = {file.name for file in (here / "lights" / "bright").iterdir()}
+    assert written == {"lighting.json", "relit.xml", "result.json"}
+    for name, lights in found["lights"].items():
+        # Sums of float64 in another order.
+        np.testing.assert_allclose(lights, found["solve"][name], rtol=1e-9)
+    # Of a basis that is kept by now the same comes without rendering.
+    text = LOOKS.replace("WANT", "lights")
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    heard: list[str] = []
+    outcome = run_batch(plan(here / "looks.toml", here / "kept"), None, hearing(heard))
+    assert outcome.done == ["bright", "dark"]
+    assert "basis" not in heard
+    for name in ("bright", "dark"):
+        kept = read_lighting(here / "kept" / name / "lighting.json").emission
+        np.testing.assert_allclose(np.array(list(kept.values())), found["lights"][name], rtol=1e-9)
+    # Of one that nobody has, nothing is kept.
+    cache = [file for file in (here / "cache").rglob("*") if file.is_file()]
+    assert len(cache) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("literal = true", "settings need literal = true"),
+        ('want = ["lights"]', "leave the rest out"),
+        ("spp = 16", "refine needs images"),
+    ],
+)
+def test_what_does_not_go_with_it_is_said_before_anything_is_rendered(
+    here: Path, change: str, said: str
+) -> None:
+    instead = {
+        "literal = true": "literal = false",
+        'want = ["lights"]': 'want = ["lights", "verify"]',
+        "spp = 16": "spp = 16, refine = 1",
+    }[change]
+    text = LOOKS.replace("WANT", "lights").replace(change, instead)
+    (here / "wrong.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(BatchError, match=said):
+        plan(here / "wrong.toml", here / "wrong")
