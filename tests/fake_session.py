@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.protocol import VERSION, Message, Paint, Said
+from lightpaint.paint.frames import Message
+from lightpaint.paint.protocol import VERSION, Paint, Said
 
 
 class FakeSession:

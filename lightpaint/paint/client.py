@@ -8,17 +8,8 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.protocol import (
-    VERSION,
-    Hello,
-    Message,
-    Paint,
-    Said,
-    TakeOver,
-    of_frame,
-    said_of,
-    to_frame,
-)
+from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
+from lightpaint.paint.protocol import VERSION, Hello, Paint, Said, TakeOver
 
 #: Messages of a page that wait to be answered, before no more are taken from its socket.
 MOST_HEARD = 64

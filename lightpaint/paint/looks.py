@@ -8,16 +8,9 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.images.blocks import block_mean
+from lightpaint.paint.frames import Message
 from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.protocol import (
-    CopyLook,
-    DropLook,
-    LoadLook,
-    Message,
-    MixLooks,
-    RenameLook,
-    SaveLook,
-)
+from lightpaint.paint.protocol import CopyLook, DropLook, LoadLook, MixLooks, RenameLook, SaveLook
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import KeptLook, Pixels
 from lightpaint.paint.wishes import Wishes

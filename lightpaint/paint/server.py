@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.client import Client
+from lightpaint.paint.frames import MAX_FRAME
 from lightpaint.paint.guard import App, Guard
 from lightpaint.paint.line import Line, Painted, pictured
 from lightpaint.paint.page_files import PageFile, page_files
-from lightpaint.paint.protocol import MAX_FRAME
 from lightpaint.paint.store import Store
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from lightpaint.lighting.problem import Problem, reduced_by
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.paint import protocol
-from lightpaint.paint.protocol import Message
+from lightpaint.paint.frames import Message
 from lightpaint.paint.steps import Patch, Pixels, Region, Step, painted_by
 from lightpaint.paint.store import Store
 from lightpaint.paint.told import lights_fields

@@ -26,9 +26,9 @@ from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
 from lightpaint.paint.exports import PAINTING, export, verified
+from lightpaint.paint.frames import Message
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import Moment, Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store

@@ -28,8 +28,9 @@ from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.bundle import widget_script, widget_style
+from lightpaint.paint.frames import Message, said_of
 from lightpaint.paint.launch import wait_for_renders
-from lightpaint.paint.protocol import VERSION, Hello, Message, TakeOver, said_of
+from lightpaint.paint.protocol import VERSION, Hello, TakeOver
 from lightpaint.paint.session import Moment
 from lightpaint.paint.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio

@@ -24,8 +24,9 @@ from websockets.typing import Origin
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
+from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.launch import subject_of
-from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
+from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.steps import Identity, Step
 from lightpaint.paint.store import Store
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile

@@ -17,10 +17,11 @@ from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
 from lightpaint.paint import client, line, server
+from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.guard import Guard
 from lightpaint.paint.line import Line
 from lightpaint.paint.page_files import page_files
-from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
+from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.server import Server, listening, page_app
 
 PORT = 8421

@@ -13,7 +13,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.cli.spelling import solve_command
 from lightpaint.paint import protocol
-from lightpaint.paint.protocol import Message
+from lightpaint.paint.frames import Message
 from lightpaint.paint.session import Moment
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.paint.protocol import Message, of_frame, said_of, to_frame
+from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
 
 
 @pytest.fixture
