@@ -3,6 +3,7 @@
 import os
 import sys
 import webbrowser
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,8 @@ from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server import Server
+    from lightpaint.paint.subject import Subject
+    from lightpaint.paint.wishes import Wishes
 
 #: Said of a --host.
 OPEN = (
@@ -27,7 +30,7 @@ OPEN = (
 
 def paint(
     *,
-    source: SceneFile | BasisFile | GroupsFile,
+    sources: Sequence[SceneFile | BasisFile | GroupsFile],
     folder: Path,
     settings: Settings,
     constraints: Constraints,
@@ -38,29 +41,29 @@ def paint(
     port: int | None,
     with_browser: bool,
 ) -> Outcome:
-    """`lightpaint paint SCENE|BASIS|LIGHTS`"""
+    """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
     # The server and the session file bring much that no other command needs.
-    from lightpaint.paint.launch import paint_in_browser, subject_of
+    from lightpaint.paint.launch import paint_in_browser, subjects_of
     from lightpaint.paint.server import check_installed
 
     check_installed()
     from lightpaint.cli.spelling import solve_command
 
-    subject = subject_of(
-        source,
+    def command(paintings: Mapping[str, str], wishes: "Wishes") -> str:
+        return solve_command(sources[0].path, paintings, options, wishes)
+
+    subjects = subjects_of(
+        sources,
         folder,
         settings=settings,
         constraints=constraints,
         choice=choice,
-        command=lambda painting, wishes: solve_command(source.path, painting, options, wishes),
+        # A basis has one view only for `solve`.
+        **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )
-    if (scene := subject.scene) is not None:
-        remarks = *remarks_of_scene(scene), *remarks_of_film(scene, settings)
-        for remark in (*remarks, *remarks_of_memory(scene)):
-            terminal.say(remark)
-    if subject.groups is not None:
-        for remark in subject.groups.remarks:
-            terminal.say(remark)
+    subject = subjects[0]
+    for remark in _remarks(subjects, settings):
+        terminal.say(remark)
     addresses = []
 
     def told() -> dict[str, str]:
@@ -77,7 +80,7 @@ def paint(
 
     try:
         paint_in_browser(
-            subject, opened, new=new, host=host, port=port, say=lambda text: _say(text)
+            subjects, opened, new=new, host=host, port=port, say=lambda text: _say(text)
         )
     except KeyboardInterrupt:
         if not addresses:  # it had not begun
@@ -87,6 +90,16 @@ def paint(
         terminal.complain("paint", str(error))
         return Outcome(told, 2)
     return Outcome(told)
+
+
+def _remarks(subjects: Sequence["Subject"], settings: Settings) -> Iterator[str]:
+    """What somebody should know before it begins."""
+    for k, subject in enumerate(subjects):
+        if (scene := subject.scene) is not None:
+            yield from remarks_of_scene(scene) if k == 0 else ()
+            yield from (*remarks_of_film(scene, settings), *remarks_of_memory(scene))
+        if subject.groups is not None:
+            yield from subject.groups.remarks
 
 
 def _say(text: str) -> None:

@@ -94,7 +94,9 @@ class Client:
         old, new = last.said, heard.said
         if not (isinstance(old, Paint) and isinstance(new, Paint)):
             return False
-        if old.done or old.stroke != new.stroke or not _is_within(old.region, new.region):
+        if old.done or (old.stroke, old.view) != (new.stroke, new.view):
+            return False
+        if not _is_within(old.region, new.region):
             return False
         heard.replies[:0] = last.replies
         self._heard[-1] = heard

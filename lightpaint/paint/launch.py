@@ -2,26 +2,29 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.colour.transform import TransformChoice
-from lightpaint.files import check_writable
+from lightpaint.errors import PaintError
+from lightpaint.files import check_writable, is_name, one_line
 from lightpaint.job import NOT_IN_GROUPS, RENDERED
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.database import set_aside
 from lightpaint.paint.server import Server, check_installed
-from lightpaint.paint.steps import Identity
+from lightpaint.paint.steps import Identity, Seen
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.wishes import Wishes
 from lightpaint.scene.quality import on_film
+from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
@@ -39,9 +42,10 @@ def subject_of(
     settings: Settings | None = None,
     constraints: Constraints | None = None,
     choice: TransformChoice | None = None,
-    command: Callable[[str, Wishes], str] = lambda painting, wishes: "",
+    command: Callable[[Mapping[str, str], Wishes], str] = lambda paintings, wishes: "",
+    among: int = 1,
 ) -> Subject:
-    """What is to be painted, read and checked before anything is rendered.
+    """One view to be painted, as of `Subject`, read and checked before anything is rendered.
 
     Raises LightpaintError for what cannot be painted, or asked of its lights.
     """
@@ -53,6 +57,7 @@ def subject_of(
         "constraints": constraints,
         "choice": choice or TransformChoice(),
         "command": command,
+        "among": among,
     }
     if not isinstance(source, SceneFile):
         default = Settings()
@@ -69,19 +74,47 @@ def subject_of(
     return Subject(scene=scene, **about)
 
 
-def identity_of(subject: Subject) -> Identity:
-    """What its session is of; of a scene that of the basis which is still to be rendered."""
-    if subject.basis is not None:
-        return Identity.of(subject.basis)
-    scene = subject.scene
-    assert scene is not None
-    names = tuple(light.name for light in scene.lights)
-    sensor = scene.sensor_names[scene.sensor]
-    return Identity(scene.path.name, scene.identity, scene.size, names, sensor)
+def subjects_of(
+    sources: Sequence[SceneFile | BasisFile | GroupsFile], folder: Path, **how: Any
+) -> tuple[Subject, ...]:
+    """Views of one lighting to be painted together. how: as of `subject_of`.
+
+    Raises LightpaintError for what cannot be painted, alone or together.
+    """
+    made = tuple(subject_of(one, folder, among=len(sources), **how) for one in sources)
+    check_together([subject.sensor for subject in made])
+    bases = [subject.basis for subject in made if subject.basis is not None]
+    for basis in bases[1:]:
+        check_same_lights(bases[0], basis)
+    return made
+
+
+def check_together(sensors: Sequence[str]) -> None:
+    """Raise PaintError unless several views have names, by which files can be called."""
+    if len(sensors) == 1:
+        return
+    if len(set(sensors)) < len(sensors):
+        raise PaintError(f"a view is there twice: {some_names(sensors)}; give each sensor once")
+    for name in sensors:
+        if not is_name(name):
+            raise PaintError(
+                f"the sensor id {one_line(repr(name))} cannot name a file: choose another id"
+            )
+
+
+def identity_of(subjects: Sequence[Subject]) -> Identity:
+    """What their session is of; of scenes that of the bases which are still to be rendered."""
+    bases = [subject.basis for subject in subjects if subject.basis is not None]
+    if bases:
+        return Identity.of(bases)
+    scenes = [subject.scene for subject in subjects if subject.scene is not None]
+    names = tuple(light.name for light in scenes[0].lights)
+    views = tuple(Seen(scene.sensor_names[scene.sensor], scene.size) for scene in scenes)
+    return Identity(scenes[0].path.name, scenes[0].identity, names, views)
 
 
 def paint_in_browser(
-    subject: Subject,
+    subjects: Sequence[Subject],
     opened: Callable[[Server], None],
     *,
     new: bool = False,
@@ -89,7 +122,7 @@ def paint_in_browser(
     port: int | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> None:
-    """Serve a page that paints `subject`, until Ctrl-C or the like; all that was done is kept.
+    """Serve a page that paints these views, until Ctrl-C or the like; all that was done is kept.
 
     opened: called when the page can be opened. new: whether an earlier session is put aside. host,
     port: as of `Server`. say: hears remarks.
@@ -98,12 +131,13 @@ def paint_in_browser(
     not be written.
     """
     check_installed()
-    check_writable(subject.folder)
-    path = subject.folder / SESSION
+    folder = subjects[0].folder
+    check_writable(folder)
+    path = folder / SESSION
     if new and (aside := set_aside(path)) is not None:
         say(f"the earlier session is kept as {aside}")
-    store = Store.open(path, identity_of(subject))
-    studio = Studio(subject, lambda _: store)
+    store = Store.open(path, identity_of(subjects))
+    studio = Studio(subjects, lambda _: store)
     try:
         server = Server(studio, store, host=host, port=port, say=say)
         try:

@@ -2,11 +2,12 @@
 
 `frames.py` says how they travel. The page numbers its messages (`seq`), and every one of them is
 answered by one that gives the number back (`reply`), errors included: the page keeps one stroke in
-flight, and the newest wins. Lights and objects are known by their place in what `state` lists. A
-region is rows and columns of the picture, `[top, bottom, left, right]`, the ends not included.
-Colours are linear Rec.709.
+flight, and the newest wins. Lights, views and objects are known by their place in what `state`
+lists. A region is rows and columns of a picture, `[top, bottom, left, right]`, the ends not
+included. Colours are linear Rec.709.
 
-Pictures are fetched, and not sent: `resources` in `state` and `renewed` say which there are.
+Pictures are fetched, and not sent: `resources` in `state` and `renewed` say which there are, those
+of views but the first as `plane/3@1`.
 """
 
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 #: Of this protocol; a page of another one is told to load itself anew.
-VERSION = 1
+VERSION = 2
 
 Region: TypeAlias = tuple[int, int, int, int]
 
@@ -34,13 +35,15 @@ class Paint:
     (rows, columns) float32. Answered by `answer`.
 
     stroke: number of the stroke, which the page counts. done: whether the brush has left the
-    picture with it: only then is the stroke kept. label: what undo calls it.
+    picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
+    it is.
     """
 
     stroke: int
     region: Region
     done: bool = False
     label: str = "stroke"
+    view: int = 0
 
 
 @dataclass(frozen=True)
@@ -148,14 +151,17 @@ class Export:
 
 @dataclass(frozen=True)
 class Verify:
-    """Render the answer, or stop that. Answered by `progress`, later by `verified`."""
+    """Render the answer in a view, or stop that. Answered by `started`, later by `verified`."""
 
     run: bool = True
+    view: int = 0
 
 
 @dataclass(frozen=True)
 class Explain:
-    """Why it is not closer: answered by `explained`, with the picture `beyond`."""
+    """Why a view is not closer: answered by `explained`, with the picture `beyond`."""
+
+    view: int = 0
 
 
 @dataclass(frozen=True)

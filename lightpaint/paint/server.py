@@ -10,7 +10,6 @@ import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from importlib.util import find_spec
-from math import prod
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
@@ -133,7 +132,7 @@ class Server:
         self.port = int(self._socket.getsockname()[1])
         self._guard = Guard(page_app(self._line), port=self.port, host=host)
         self._host = _shown(host)
-        pixels = MAX_FRAME if store is None or store.identity is None else prod(store.identity.size)
+        pixels = MAX_FRAME if store is None or store.identity is None else store.identity.largest
         self._largest = min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
         self._serving: uvicorn.Server | None = None
 

@@ -1,5 +1,6 @@
 """What a page is told of an answer: short sentences, and of each light what people go by."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,14 +36,22 @@ def light_fields(light: BasisLight) -> dict[str, Any]:
     }
 
 
-def lights_fields(basis: Basis, weights: Doubles) -> list[dict[str, Any]]:
-    """Of each light as it is answered: emission, change, colour, part of the picture."""
-    lit = (basis.totals * weights) @ LUMINANCE
-    whole = float(lit.sum())
-    return [
-        _light(light, weight, float(lit[k]) / whole if whole > 0 else 0.0)
-        for k, (light, weight) in enumerate(zip(basis.lights, weights, strict=True))
+def answer_fields(bases: Sequence[Basis], weights: Doubles) -> dict[str, Any]:
+    """Of each light as it is answered: emission, change, colour, part of the picture.
+
+    Of several views `shares` has its part of each, too.
+    """
+    lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
+    lights = [
+        _light(light, weight, share)
+        for light, weight, share in zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
     ]
+    return {"lights": lights} | ({"shares": [_shares(x) for x in lit]} if len(bases) > 1 else {})
+
+
+def _shares(lit: Doubles) -> list[float]:
+    whole = float(lit.sum())
+    return [float(x) / whole if whole > 0 else 0.0 for x in lit]
 
 
 def _light(light: BasisLight, weight: Doubles, share: float) -> dict[str, Any]:
@@ -59,18 +68,32 @@ def _light(light: BasisLight, weight: Doubles, share: float) -> dict[str, Any]:
     }
 
 
-def analysis_fields(analysis: Analysis) -> dict[str, Any]:
-    """The headline, what holds the lights, and of each light how sure it is and whether held."""
-    solution, seen = analysis.solution, analysis.seen
-    errors = spoken_errors(analysis.uncertainty, len(solution.basis.names))
+def analysis_fields(analyses: Sequence[Analysis], painted: Sequence[int]) -> dict[str, Any]:
+    """The headline, what holds the lights, and of each light how sure it is and whether held.
+
+    painted: the view of each analysis. What is said of the whole is of the view missed most.
+    """
+    solution = analyses[0].solution
+    errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings = solution.lighting.lights
+    of_views = {view: _seen_fields(its) for view, its in zip(painted, analyses, strict=True)}
+    worst = max(of_views.values(), key=lambda its: float(its["delta_e"]))
+    return {
+        **worst,
+        "of_views": [of_views.get(k) for k in range(max(painted) + 1)],
+        "of_lights": [
+            {"error": error, "held": its.is_active, "unreached": not any(its.reached)}
+            for error, its in zip(errors, settings, strict=True)
+        ],
+    }
+
+
+def _seen_fields(analysis: Analysis) -> dict[str, Any]:
+    """How close one view is, and why not closer."""
+    seen = analysis.seen
     return {
         "headline": headline(seen),
         "delta_e": seen.delta_e,
         "delta_e_asked": seen.asked,
         "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],
-        "of_lights": [
-            {"error": error, "held": its.is_active, "unreached": not any(its.reached)}
-            for error, its in zip(errors, settings, strict=True)
-        ],
     }

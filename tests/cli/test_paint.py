@@ -65,8 +65,9 @@ def test_what_is_painted_and_where_it_is_kept(
     line: str, kind: type, path: str, folder: str | None
 ) -> None:
     values = asked(line)
-    assert type(values["source"]) is kind
-    assert values["source"].path == path
+    [source] = values["sources"]
+    assert type(source) is kind
+    assert source.path == path
     # Scenes that are called alike go by their folders.
     assert values["folder"] == Path(folder or f"{Path.cwd().name}.paint")
 
@@ -105,12 +106,12 @@ def test_what_cannot_be_painted_is_said_in_one_line(here: Path, line: str, said:
 
 @pytest.mark.usefixtures("here")
 def test_a_subject_of_light_groups_knows_them() -> None:
-    subject = subject_of(asked("groups.exr")["source"], Path("x"))
+    subject = subject_of(asked("groups.exr")["sources"][0], Path("x"))
     assert subject.groups is not None
     assert subject.basis is subject.groups.basis
     assert subject.scene is None
     options = command_parser().parse_args(["paint", "groups.exr"])
-    assert isinstance(painted_of(options), GroupsFile)
+    assert isinstance(painted_of(options)[0], GroupsFile)
 
 
 #: `lightpaint …` where no renderer is installed.
@@ -162,7 +163,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         said = process.stderr.read()
         assert "Traceback" not in said
         assert said.endswith("what was painted is kept in room.paint\n")
-    identity = Identity.of(make_basis(2))
+    identity = Identity.of([make_basis(2)])
     with Store.open(path, identity) as store:
         store.append(Step("stroke", "mine"))
     with painting(here, "room.basis.exr", "--new") as (process, _):
@@ -241,7 +242,7 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(here: Path) 
 
 def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:
     folder = here / "room.paint"
-    Store.open(folder / "session.db", Identity.of(make_basis(2, (6, 5)))).close()
+    Store.open(folder / "session.db", Identity.of([make_basis(2, (6, 5))])).close()
     said = refused(here, "paint", "room.basis.exr", "--no-browser")
     assert "is a session of 5x6 pixels, and scene.xml has 10x12" in said
     assert "(-o)" in said

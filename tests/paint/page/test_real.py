@@ -56,7 +56,7 @@ class Served:
     def __init__(self, subject: Subject) -> None:
         self.folder = subject.folder
         self.store: Store | None = None
-        self.studio = Studio(subject, self._opened)
+        self.studio = Studio([subject], self._opened)
         self.server = Server(self.studio, port=0)
         self.thread = threading.Thread(target=self.server.run, daemon=True)
         self.thread.start()

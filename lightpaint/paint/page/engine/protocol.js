@@ -6,7 +6,7 @@
  */
 
 /** Of this protocol. */
-export const VERSION = 1;
+export const VERSION = 2;
 
 /** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
 /** An array; float16 is the bits of halves in a Uint16Array (see half.js).
