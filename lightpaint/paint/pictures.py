@@ -70,8 +70,8 @@ class Pictures:
         return self._made[name]
 
     def named(self) -> dict[str, int]:
-        """Generation of each, by name."""
-        return dict(self.generations)
+        """Generation of each, by name; of what changes under the brush there are none."""
+        return {name: k for name, k in self.generations.items() if not is_changing(name)}
 
 
 def is_changing(name: str) -> bool:

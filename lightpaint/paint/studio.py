@@ -23,7 +23,7 @@ from lightpaint.paint.frames import Message
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.offered import clean_plane, fields_of_views, offer_transforms, offer_view
-from lightpaint.paint.pictures import Picture, Pictures, is_changing
+from lightpaint.paint.pictures import Picture, Pictures
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity, Pixels, of_view
 from lightpaint.paint.store import Store
@@ -118,14 +118,16 @@ class Studio:
             return Message("state", {**about, **session.about, "answer": answer}, arrays)
 
     def greet(self, *, is_back: bool) -> Message:
-        """The state, for a page that begins; is_back: it was there before, and will send what it
-        has of a stroke again. What another one had begun is kept as it was left.
+        """The state, for a page that begins. What another one had begun is kept as it was left.
+
+        is_back: it was there before, and nobody since: it sends what it has of a stroke again.
         """
         with self._lock:
             if self._session is not None and self._session.is_open:
                 self._session.left(with_stroke=not is_back)
                 self._settling.ring()
-            return self.state()
+            state = self.state()
+            return Message(state.kind, {**state.fields, "is_back": is_back}, state.arrays)
 
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
         """What comes of a message at once. Raises LightpaintError for what cannot be done."""
@@ -253,12 +255,11 @@ class Studio:
         wanted, basis = self.subjects[0].wanted, session.basis
         painted = [view.name for view in session.views if view.is_painted]
         sensors = [""] if len(session.views) == 1 else painted
-        changing = [name for name in self.pictures.named() if is_changing(name)]
         return fields_of_views(session.views) | {
             "transforms": [x.name for x in self._transforms(session)],
             "transform": {"name": session.transform.name, "stops": session.transform.stops},
             "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
-            "resources": self.pictures.named() | dict.fromkeys(changing, session.version),
+            "resources": self.pictures.named(),
             "looks": self._looks.listed() if self._looks is not None else [],
             "basis": {
                 "spp": basis.origin.spp,

@@ -265,6 +265,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             seq, said, arrays = said_of(content, [bytes(x) for x in buffers or ()])
             page = seq // MESSAGES
             with self._lock:
+                is_back = page == self._page
                 if isinstance(said, Hello | TakeOver):
                     self._give(page)
                 if isinstance(said, Hello) and said.version != VERSION:
@@ -273,6 +274,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                 elif page != self._page:
                     self._tell_taken(page, seq)
                     return
+                elif isinstance(said, Hello | TakeOver):
+                    answers = [self._studio.greet(is_back=is_back)]
                 else:
                     answers = self._studio.said(said, arrays)
         except LightpaintError as error:

@@ -124,7 +124,25 @@ def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
 def test_a_cookie_of_another_launch_is_worth_nothing(stranger: Served) -> None:
     for value in ("", "wrong", "é", '"'):
         headers = {"cookie": f"lightpaint_{PORT}={value}".encode()}
-        assert stranger.browser.get("/", headers=headers).status_code == 403
+        assert stranger.browser.get("/", headers=headers).status_code in (403, 410)
+
+
+def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path: Path) -> None:
+    other = Served(tmp_path / "later")
+    other.browser.cookies = served.browser.cookies
+    with other.browser:
+        for path in ("/", "/data/", "/data/present"):
+            answer = other.browser.get(path)
+            assert answer.status_code == 410
+            assert "of an earlier start of the painter: open" in answer.text
+            assert other.guard.token not in answer.text
+        with pytest.raises(REFUSED), other.socket():
+            pass
+        # Elsewhere it is told no more than anybody.
+        for headers in ({"host": "evil.example"}, {"origin": "http://evil.example"}):
+            assert other.browser.get("/", headers=headers).status_code == 403
+        other.enter()
+        assert other.browser.get("/").status_code == 200
 
 
 @pytest.mark.parametrize(
@@ -410,7 +428,10 @@ def test_the_second_tab_is_told_and_may_take_over(served: Served) -> None:
         second.send_bytes(paint(7))
         assert heard(second)["kind"] == "answer"
         first.send_bytes(frame("take_over", 8))
-        assert heard(first)["kind"] == "state"
+        told = heard(first)
+        # What it has not said yet is of before the other one.
+        assert (told["kind"], told["is_back"]) == ("state", False)
+        assert greet(first, 9)["is_back"]
 
 
 def test_the_session_is_free_when_its_tab_has_gone(served: Served) -> None:

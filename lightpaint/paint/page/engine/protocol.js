@@ -32,6 +32,24 @@ export const VERSION = 2;
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */
 
+/** What something of a view is called: by its name alone of the first, `name@1` of the next.
+ * @param {string} name @param {number} view */
+export function inView(name, view) {
+  return view ? `${name}@${view}` : name;
+}
+
+/** A state as it is of one view: its size, its objects, and how its planes are scaled.
+ * @param {Message} state @param {number} view @returns {Message} */
+export function stateOfView(state, view) {
+  const its = state.views?.[view];
+  if (!its) return state;
+  const lights = state.lights.map((/** @type {Light} */ light, /** @type {number} */ k) => ({
+    ...light,
+    scale: its.scales[k],
+  }));
+  return { ...state, lights, size: its.size, objects: its.objects };
+}
+
 /** @type {Record<string, {new (buffer: ArrayBuffer, at: number, length: number): Data,
  *   BYTES_PER_ELEMENT: number}>} */
 const DTYPES = {

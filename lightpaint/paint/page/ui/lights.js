@@ -1,5 +1,6 @@
 /** The list of lights: search, sort, groups that fold, a row for each light. */
 
+import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { luminance } from './colours.js';
 import { Button, Select } from './controls.js';
@@ -64,7 +65,8 @@ function row(ui, hands, k, isMany) {
     rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${ui.asked[light.name]} tied=${tied}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} readonly=${ui.readonly} hasSlider=${isOpen || !isMany}
-    thumb=${ui.resources[`thumb/${k}`]} others=${isOpen ? ui.lights : undefined} />`;
+    picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
+    others=${isOpen ? ui.lights : undefined} />`;
 }
 
 /** @param {{name: string, ui: Ui, hands: Hands, members: number[], isMany: boolean}} props */

@@ -1,5 +1,6 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
+import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { Bar } from './bar.js';
 import { Button, Choice } from './controls.js';
@@ -33,7 +34,8 @@ export function TruthPanel({ ui, hands }) {
   const legend = overlay && LEGENDS[overlay];
   const choose = (/** @type {any} */ value) => {
     look(store, { overlay: value });
-    if (value === 'beyond' && ui.resources.beyond === undefined) session.send('explain');
+    const isThere = ui.resources[inView('beyond', ui.view)] !== undefined;
+    if (value === 'beyond' && !isThere) session.explain();
   };
   // The first of them stands below the pictures, too.
   const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
@@ -50,7 +52,7 @@ export function TruthPanel({ ui, hands }) {
     ${
       !ui.readonly &&
       html`<div class="row">
-      <${Button} label="Why not closer?" act=${() => session.send('explain')}
+      <${Button} label="Why not closer?" act=${() => session.explain()}
         tip="What keeps the lights from what was painted" />
       ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
     </div>`
