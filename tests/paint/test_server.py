@@ -294,7 +294,9 @@ def test_a_picture_is_kept_by_its_generation_only(served: Served) -> None:
 
 def test_each_message_is_answered_by_its_number(served: Served) -> None:
     with served.socket() as socket:
-        assert greet(socket, 7) | {"reply": 7, "kind": "state"} == greet(socket, 7)
+        told = greet(socket, 7)
+        assert (told["reply"], told["kind"], told["is_back"]) == (7, "state", False)
+        assert greet(socket, 7) == told | {"is_back": True}
         socket.send_bytes(paint(8))
         content, [weights] = of_frame(socket.receive_bytes())
         assert (content["kind"], content["reply"]) == ("answer", 8)
