@@ -10,12 +10,30 @@ from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analyse import Analysis
-from lightpaint.report.sentences import spoken_errors, what_holds
-from lightpaint.report.verdict import headline
+from lightpaint.lighting.analysis.held_back import Held
+from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.report.sentences import spoken_errors, spoken_percent, what_holds
+from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
 #: Distance from Planck's locus up to which a colour is called white, and part of the present light
 #: under which one is off.
 WHITE, OFF = 0.02, 1e-4
+
+
+#: How far what was asked has come about, from which share of it on.
+WAYS = (
+    (0.85, "Nearly there"),
+    (0.6, "Most of the way"),
+    (0.4, "About half of the way"),
+    (0.15, "A part of the way"),
+    (0.0, "A first step"),
+)
+
+#: What to do about what holds the lights.
+HELP: dict[Held, str] = {
+    "hold": "Paint what may change too, or let it go.",
+    "colors": "The settings give them any colour.",
+}
 
 
 def light_fields(light: BasisLight) -> dict[str, Any]:
@@ -88,11 +106,26 @@ def analysis_fields(analyses: Sequence[Analysis], painted: Sequence[int]) -> dic
     }
 
 
+def sketched(seen: Seen) -> str:
+    """How far a painting in progress has come, and what would bring it further: no judgement yet.
+
+    A sketch begins with a stroke, of which little can come about before more is said.
+    """
+    if seen.is_close:
+        return headline(seen)
+    far = next(words for least, words in WAYS if seen.share_met >= least)
+    said = f"{far}, {spoken_percent(seen.share_met)}"
+    if seen.place is None:
+        return f"{said}. Paint what matters most, or give it more importance."
+    told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(seen)}."
+    return " ".join([told, *(HELP[its] for its in seen.held[:1] if its in HELP)])
+
+
 def _seen_fields(analysis: Analysis) -> dict[str, Any]:
     """How close one view is, and why not closer."""
     seen = analysis.seen
     return {
-        "headline": headline(seen),
+        "headline": sketched(seen),
         "delta_e": seen.delta_e,
         "delta_e_asked": seen.asked,
         "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],

@@ -69,8 +69,13 @@ function answerFields(answer, before) {
 function seenOf(answer, { view, views }) {
   const isOne = views.length < 2;
   const its = isOne ? answer : answer.ofViews?.[view];
-  if (!its) return { headline: UNPAINTED, deltaE: null, sentences: [] };
-  return { headline: its.headline, deltaE: its.delta_e ?? null, sentences: its.sentences ?? [] };
+  if (!its) return { headline: UNPAINTED, deltaE: null, deltaAsked: null, sentences: [] };
+  return {
+    headline: its.headline,
+    deltaE: its.delta_e ?? null,
+    deltaAsked: its.delta_e_asked ?? null,
+    sentences: its.sentences ?? [],
+  };
 }
 
 const UNPAINTED = 'Nothing is painted in this view: it goes with the others.';

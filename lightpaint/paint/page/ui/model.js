@@ -14,7 +14,8 @@ import { ofKelvin } from './colours.js';
 /** @typedef {{id: number, name: string, weights: RGB[], delta_e: number | null, stamp: string,
  *   thumbnail: string}} Look */
 /** @typedef {Record<string, any>} Asked */
-/** @typedef {{headline: string, delta_e: number, sentences: string[]}} Seen */
+/** @typedef {{headline: string, delta_e: number, delta_e_asked: number, sentences: string[]}}
+ * Seen */
 /** @typedef {{what: string, done: number, total: number, unit: string}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
@@ -36,6 +37,7 @@ import { ofKelvin } from './colours.js';
  * @property {RGB[]} weights the last answer
  * @property {string} headline
  * @property {number | null} deltaE
+ * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
  * @property {string[]} sentences
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {Record<string, Asked>} asked
@@ -121,6 +123,7 @@ export function first() {
     weights: [],
     headline: '',
     deltaE: null,
+    deltaAsked: null,
     sentences: [],
     isLive: false,
     asked: {},

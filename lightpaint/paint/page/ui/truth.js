@@ -94,6 +94,9 @@ function Verified({ ui, hands }) {
   </div>`;
 }
 
+const DELTA_E =
+  'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear; and of the light as it was';
+
 /** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
@@ -113,7 +116,9 @@ export function AnswerLine({ ui, hands }) {
       ${
         !first &&
         ui.deltaE !== null &&
-        html`<span class="faint" data-tip=${'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear'}>ΔE ${number(ui.deltaE, 2)}</span>`
+        html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
+          ui.deltaAsked !== null && `, was ${number(ui.deltaAsked, 2)}`
+        }</span>`
       }
     </p>
     ${
