@@ -1,6 +1,6 @@
 """The painting of one view: its pixels, and the stroke that is not done yet."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -140,6 +140,79 @@ class Canvas:
         if image.size and not (image.min() >= 0 and image.max() <= BRIGHTEST):
             raise PaintError(f"light beyond 0 to {BRIGHTEST:g}")
         return image.astype(np.float32), importance.astype(np.float32)
+
+
+class Canvases:
+    """Those of all views of a session: strokes go to one of them at a time, looks to all."""
+
+    def __init__(
+        self, bases: Sequence[Basis], presents: Sequence[Floats], steps: Sequence[Step]
+    ) -> None:
+        self._all = tuple(
+            Canvas(k, basis, present, steps)
+            for k, (basis, present) in enumerate(zip(bases, presents, strict=True))
+        )
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __iter__(self) -> Iterator[Canvas]:
+        return iter(self._all)
+
+    def __getitem__(self, view: int) -> Canvas:
+        """That of a view. Raises PaintError if there is none."""
+        if view >= len(self):
+            raise PaintError(f"no view {view}: there are {len(self)}")
+        return self._all[view]
+
+    def improve(
+        self, bases: Sequence[Basis], presents: Sequence[Floats], steps: Sequence[Step]
+    ) -> None:
+        """As of each."""
+        for view, basis, present in zip(self, bases, presents, strict=True):
+            view.improve(basis, present, steps)
+
+    @property
+    def live(self) -> list[LiveView]:
+        """The sums of each."""
+        return [view.live for view in self]
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether any pixel counts."""
+        return any(view.is_painted for view in self)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a stroke is not done yet."""
+        return any(view.is_open for view in self)
+
+    def strokes(self) -> tuple[Patch, ...]:
+        """What strokes that are open have changed."""
+        return tuple(patch for view in self if (patch := view.stroke()) is not None)
+
+    def close(self) -> None:
+        """What is open is done."""
+        for view in self:
+            view.close()
+
+    def drop(self) -> list[tuple[int, Region]]:
+        """What is open is forgotten; in which views, and where."""
+        return [(view.view, view.drop()) for view in self if view.is_open]
+
+    def put(self, patches: Sequence[Patch], *, is_back: bool = False) -> None:
+        """The pixels after a step, or those before it."""
+        for patch in patches:
+            self[patch.view].put(patch.region, patch.before if is_back else patch.after)
+
+    def instead(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
+        """What it changes to have these, by view, instead of all that is painted."""
+        made = []
+        for k, (image, importance) in paintings.items():
+            view = self[k]
+            given = np.asarray(image, np.float32), np.asarray(importance, np.float32)
+            made.append(Patch(view.whole, view.pixels(view.whole), given, k))
+        return tuple(made)
 
 
 def _slices(region: Region) -> tuple[slice, slice]:

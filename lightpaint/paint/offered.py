@@ -9,7 +9,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.paint import pictures
-from lightpaint.paint.canvas import Canvas
+from lightpaint.paint.canvas import Canvas, Canvases
 from lightpaint.paint.pictures import Picture, Pictures
 from lightpaint.paint.steps import of_view
 from lightpaint.paint.told import light_fields
@@ -54,7 +54,7 @@ def clean_plane(basis: Basis, k: int) -> Picture:
     return pictures.as_halves(clean, pictures.scale_of(basis.images[k]))
 
 
-def fields_of_views(views: Sequence[Canvas]) -> dict[str, Any]:
+def fields_of_views(views: Canvases) -> dict[str, Any]:
     """Size, lights and objects, as of the first view, and `views` with those of each."""
     each = [_view_fields(view) for view in views]
     lights = [

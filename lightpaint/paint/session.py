@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
@@ -25,10 +24,10 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.answering import Answering
-from lightpaint.paint.canvas import Canvas
+from lightpaint.paint.canvas import Canvases
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
-from lightpaint.paint.steps import Patch, Pixels, Region, Step
+from lightpaint.paint.steps import Pixels, Region, Step
 from lightpaint.paint.store import Store
 from lightpaint.paint.told import answer_fields
 from lightpaint.paint.wishes import Wishes
@@ -73,12 +72,9 @@ class Session:
         self.version, self._stroke = 0, -1
         done = store.steps[: store.position]
         told = [step.fields["after"] for step in done if step.fields]
-        self.views = tuple(
-            Canvas(k, basis, present, done)
-            for k, (basis, present) in enumerate(zip(bases, presents, strict=True))
-        )
+        self.views = Canvases(bases, presents, done)
         self.answering = Answering(
-            [view.live for view in self.views],
+            self.views.live,
             Wishes.of(told[-1]) if told else Wishes(),
             settings=settings,
             constraints=constraints or Constraints(),
@@ -106,7 +102,7 @@ class Session:
     @property
     def is_painted(self) -> bool:
         """Whether any pixel counts."""
-        return any(view.is_painted for view in self.views)
+        return self.views.is_painted
 
     @property
     def stroke(self) -> int:
@@ -116,7 +112,7 @@ class Session:
     @property
     def is_open(self) -> bool:
         """Whether a stroke, or a slider, is not done yet."""
-        return self.answering.kept is not None or any(view.is_open for view in self.views)
+        return self.answering.kept is not None or self.views.is_open
 
     def target(self, view: int = 0) -> Target | None:
         """A painting, with arrays of its own; None where nothing is painted."""
@@ -216,10 +212,8 @@ class Session:
 
         A stroke that is open stays so.
         """
-        done = self.store.steps[: self.store.position]
-        for view, basis, present in zip(self.views, bases, presents, strict=True):
-            view.improve(basis, present, done)
-        self.answering.begin([view.live for view in self.views])
+        self.views.improve(bases, presents, self.store.steps[: self.store.position])
+        self.answering.begin(self.views.live)
         self._changed()
 
     def left(self, *, with_stroke: bool) -> None:
@@ -235,18 +229,13 @@ class Session:
 
     def load(self, paintings: Mapping[int, Pixels], wishes: Wishes, label: str) -> list[Message]:
         """Go on from other paintings, by view, and what was asked with them: one step."""
-        if any(view.is_open for view in self.views):
+        if self.views.is_open:
             self._drop()
         self.answering.check(wishes)
-        patches = []
-        for k, (image, importance) in paintings.items():
-            view = self.views[k]
-            given = np.asarray(image, np.float32), np.asarray(importance, np.float32)
-            patches.append(Patch(view.whole, view.pixels(view.whole), given, k))
+        patches = self.views.instead(paintings)
         fields = {"before": self.wishes.as_json(), "after": wishes.as_json()}
-        self.store.append(Step("look_loaded", label, fields, tuple(patches)))
-        for patch in patches:
-            self.views[patch.view].put(patch.region, patch.after)
+        self.store.append(Step("look_loaded", label, fields, patches))
+        self.views.put(patches)
         self.answering.ask(wishes)
         self._changed()
         return self._patched(*((patch.view, patch.region) for patch in patches))
@@ -254,7 +243,7 @@ class Session:
     # Paint
 
     def _paint(self, said: protocol.Paint, arrays: Mapping[str, npt.NDArray[Any]]) -> Message:
-        view = self._view(said.view)
+        view = self.views[said.view]
         given = view.checked(said.region, arrays)
         if said.stroke != self._stroke:
             # Of a stroke whose end was never heard, what is there is kept.
@@ -270,23 +259,16 @@ class Session:
         self._changed()
         return self.answer(**(self.about if said.done else {}))
 
-    def _view(self, number: int) -> Canvas:
-        if number >= len(self.views):
-            raise PaintError(f"no view {number}: there are {len(self.views)}")
-        return self.views[number]
-
     def _close(self, label: str) -> None:
         """Make a step of the stroke that is open, if one is; a slider that was left moves back."""
         self.answering.move_back()
-        patches = tuple(patch for view in self.views if (patch := view.stroke()) is not None)
-        if patches:
+        if patches := self.views.strokes():
             self.store.append(Step("stroke", label, {}, patches))
-        for view in self.views:
-            view.close()
+        self.views.close()
 
     def _drop(self) -> list[tuple[int, Region]]:
         """The stroke that is open is forgotten; where it was."""
-        where = [(view.view, view.drop()) for view in self.views if view.is_open]
+        where = self.views.drop()
         self._changed()
         return where
 
@@ -301,8 +283,7 @@ class Session:
             raise PaintError(f"there is nothing to {'undo' if is_back else 'redo'}")
         step = steps[position] if is_back else steps[now]
         self.store.move_to(position)
-        for patch in step.patches:
-            self._view(patch.view).put(patch.region, patch.before if is_back else patch.after)
+        self.views.put(step.patches, is_back=is_back)
         if step.fields:
             self.answering.ask(Wishes.of(step.fields["before" if is_back else "after"]))
         self._changed()

@@ -7,7 +7,6 @@ its event loop, where there is one. Without one, as in a script, they say it the
 import asyncio
 import atexit
 import contextvars
-import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ from threading import Event, RLock
 from typing import Any
 
 from lightpaint.colour.transform import TransformChoice, ViewTransform
-from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.errors import PaintError
 from lightpaint.files import first_line
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -25,10 +24,10 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import cells
 from lightpaint.paint.bundle import widget_script, widget_style
-from lightpaint.paint.frames import Message, said_of
+from lightpaint.paint.frames import Message
 from lightpaint.paint.launch import wait_for_renders
 from lightpaint.paint.moment import Moment
-from lightpaint.paint.protocol import VERSION, Hello, TakeOver
+from lightpaint.paint.places import Places
 from lightpaint.paint.session import Session
 from lightpaint.paint.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
@@ -41,9 +40,6 @@ try:
     import traitlets
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
-
-#: Numbers of messages that one place has at which the painter is shown: `seq // MESSAGES`.
-MESSAGES = 2**32
 
 #: What can be set from a cell, and is told of.
 LIVE = ("target", "targets", "lighting", "constraints")
@@ -123,7 +119,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         **settings: Any,
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
-        self._page, self._waiting = 0, list[Callable[[], None]]()
+        self._waiting = list[Callable[[], None]]()
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
@@ -133,6 +129,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._studio = Studio(
             subjects, lambda its: MemoryStore(its) if place is None else Store.open(place, its)
         )
+        self._places = Places(self._studio, self._lock, self._carry)
         self._failed = ""
         super().__init__(height=height)
         self.on_msg(self._said)
@@ -201,7 +198,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             return value
         with self._lock:
             for message in self._studio.load(*ACTS[name](self._studio.session, value)):
-                self._tell(message)
+                self._places.tell(message)
             new = self._now()
             self._follow({key: its for key, its in new.items() if key != name})
         return new[name]
@@ -219,7 +216,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             traceback.print_exc()
             said = f"{type(error).__name__}: {first_line(error)}"
             text = f"a callback of painter.{change['name']} failed: {said}"
-            self._tell(Message("say", {"text": text, "tone": "warn"}))
+            self._places.tell(Message("say", {"text": text, "tone": "warn"}))
 
     def _now(self) -> dict[str, Any]:
         """What the session has, by name of what says so."""
@@ -259,50 +256,11 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     # What page and session say
 
     def _said(self, _: Any, content: Any, buffers: Any) -> None:
-        """Answer the page, whatever it says."""
-        seq = content.get("seq") if isinstance(content, dict) else None
-        try:
-            seq, said, arrays = said_of(content, [bytes(x) for x in buffers or ()])
-            page = seq // MESSAGES
-            with self._lock:
-                is_back = page == self._page
-                if isinstance(said, Hello | TakeOver):
-                    self._give(page)
-                if isinstance(said, Hello) and said.version != VERSION:
-                    text = "lightpaint has been updated: run the cell again"
-                    answers = [Message("closed", {"reason": "version", "text": text})]
-                elif page != self._page:
-                    self._tell_taken(page, seq)
-                    return
-                elif isinstance(said, Hello | TakeOver):
-                    answers = [self._studio.greet(is_back=is_back)]
-                else:
-                    answers = self._studio.said(said, arrays)
-        except LightpaintError as error:
-            answers = [Message("failed", {"text": str(error)})]
-        except Exception as error:
-            # A mistake of lightpaint's own, which anywidget would say nothing of.
-            traceback.print_exc(file=sys.stderr)
-            text = f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
-            answers = [Message("failed", {"text": text})]
-        for k, message in enumerate(answers):
-            self._tell(message, seq if k == 0 else None)
+        self._places.hear(content, buffers)
 
-    def _give(self, page: int) -> None:
-        """Who was shown last has the session; who had it is told."""
-        before, self._page = self._page, page
-        if before not in (0, page):
-            self._tell_taken(before)
-
-    def _tell_taken(self, page: int, reply: int | None = None) -> None:
-        text = "the painter is open at another place of this notebook"
-        self._tell(Message("closed", {"reason": "taken", "text": text}), reply, page=page)
-
-    def _tell(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
-        if self.comm is None:
-            return
-        content = message.content(reply) | {"page": self._page if page is None else page}
-        self.send(content, message.buffers())
+    def _carry(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+        if self.comm is not None:
+            self.send(content, buffers)
 
     def _hears(self, message: Message) -> None:
         """What the studio says by itself, from a thread of its own."""
@@ -320,7 +278,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._loop.call_soon_threadsafe(act, context=self._context)
 
     def _heard(self, message: Message) -> None:
-        self._tell(message)
+        self._places.tell(message)
         if message.kind == "state":
             waiting, self._waiting = self._waiting, []
             for act in waiting:
