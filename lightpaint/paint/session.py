@@ -197,8 +197,8 @@ class Session:
         fit = self.answering.fit
         return {
             "history": {
-                "undo": [step.label for step in steps[:position]][-50:],
-                "redo": [step.label for step in steps[position:]][:50],
+                "undo": [self._called(step) for step in steps[:position][-50:]],
+                "redo": [self._called(step) for step in steps[position:][:50]],
                 "count": position,
             },
             "asked": {name: dict(its) for name, its in self.wishes.lights.items()},
@@ -206,6 +206,12 @@ class Session:
             "settings": dict(self.wishes.values),
             "meant": {"space": fit.space, "hold": fit.hold, "colors": fit.colors},
         }
+
+    def _called(self, step: Step) -> str:
+        """What undo calls it; of several views, in which it was."""
+        where = [self.views[patch.view].name for patch in step.patches]
+        is_told = len(self.views) > 1 and len(where) == 1
+        return f"{step.label}, {where[0]}" if is_told else step.label
 
     def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
         """Go on with bases of the same lights and sizes that have more samples.

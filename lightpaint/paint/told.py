@@ -1,6 +1,7 @@
 """What a page is told of an answer: short sentences, and of each light what people go by."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -117,8 +118,10 @@ def sketched(seen: Seen) -> str:
     said = f"{far}, {spoken_percent(seen.share_met)}"
     if seen.place is None:
         return f"{said}. Paint what matters most, or give it more importance."
-    told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(seen)}."
-    return " ".join([told, *(HELP[its] for its in seen.held[:1] if its in HELP)])
+    # One reason at a time: the next one is told when that has been seen to.
+    first = replace(seen, held=seen.held[:1])
+    told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
+    return " ".join([told, *(HELP[its] for its in first.held if its in HELP)])
 
 
 def _seen_fields(analysis: Analysis) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import urllib.request
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,13 @@ from websockets.typing import Origin
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
+from lightpaint.cli.spelling import solve_command
 from lightpaint.paint.frames import Message, of_frame, to_frame
-from lightpaint.paint.launch import subject_of
+from lightpaint.paint.launch import subject_of, subjects_of
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.steps import Identity, Step
 from lightpaint.paint.store import Store
+from lightpaint.paint.wishes import Wishes
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 
@@ -85,9 +88,35 @@ def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> No
     assert (values["new"], values["port"], values["host"]) == (True, 0, "127.0.0.1")
 
 
+@pytest.mark.usefixtures("here")
+def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> None:
+    values = asked("scene.xml --spp 8 -s a --sensor b")
+    assert [(one.path, one.sensor) for one in values["sources"]] == [
+        ("scene.xml", "a"),
+        ("scene.xml", "b"),
+    ]
+    assert values["options"] == ("--spp=8",)
+    paintings = {"a": "x/painting-a.exr", "b c": "x/painting-b c.exr"}
+    command = solve_command("scene.xml", paintings, values["options"], Wishes())
+    words = shlex.split(command)[1:]
+    options = command_parser().parse_args(words)
+    assert options.views == list(paintings.items())
+    basis = make_basis(2)
+    write_basis("side.basis.exr", replace(basis, origin=replace(basis.origin, sensor="side")))
+    values = asked("room.basis.exr side.basis.exr")
+    assert values["folder"] == Path("room.paint")
+    subjects = subjects_of(values["sources"], Path("x"))
+    assert [subject.sensor for subject in subjects] == [basis.origin.sensor, "side"]
+    assert all(subject.among == 2 for subject in subjects)
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
+        ("room.basis.exr room.basis.exr", "a view is there twice"),
+        ("room.basis.exr groups.exr", "several are bases of the views of one scene"),
+        ("scene.xml room.basis.exr", "named with --sensor, once for each"),
+        ("room.basis.exr -s a", "-s cannot change a saved basis|--sensor"),
         ("", "nothing to paint: give a scene, a basis, or light groups"),
         ("--lights key,fill", "no such file or folder of light groups: --lights key,fill"),
         ("scene.xml --lights groups.exr", "at once: give one to paint"),

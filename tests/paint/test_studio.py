@@ -302,6 +302,31 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     studio.close()
 
 
+def test_a_view_that_comes_later_finds_the_session(both: list[lp.Basis], tmp_path: Path):
+    heard = Heard(tmp_path, both[0])
+    heard.paint(1, 0.8)
+    heard.studio.said(protocol.SaveLook("alone"), {})
+    painted = heard.studio.session.views[0].image.copy()
+    heard.studio.close()
+    heard = Heard(tmp_path, *both)
+    studio = heard.studio
+    heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
+    heard.paint(3, 0.4, (0, 6, 2, 9))
+    told = studio.state().fields["history"]["undo"]
+    assert told == [f"stroke, {name}" for name in ("sensor", "side", "sensor")]
+    # The look knows nothing of the view, and leaves it as it was before it was painted.
+    studio.said(protocol.LoadLook(1), {})
+    np.testing.assert_array_equal(studio.session.views[0].image, painted)
+    assert [view.is_painted for view in studio.session.views] == [True, False]
+    [looks] = studio.said(protocol.SaveLook("both"), {})
+    [looks] = studio.said(protocol.MixLooks(1, 2, 0.5, "between"), {})
+    assert len(looks.fields["looks"]) == 3
+    studio.said(protocol.DropLook(2), {})
+    with pytest.raises(lp.LightpaintError, match="no picture"):
+        studio.resource("look/2@1")
+    studio.close()
+
+
 def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
     class Broken(Subject):
         def bases(self, progress: Any = None) -> Any:

@@ -32,7 +32,13 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             6.0,
             {"held": ("colors", "views"), "held_by_views": ("side",)},
             "Most of the way, 70 %: brighter light on the floor is missing; lamps keep their "
-            "colours, and view side asks for other light. The settings give them any colour.",
+            "colours. The settings give them any colour.",
+        ),
+        (
+            8.0,
+            {"held": ("views",), "held_by_views": ("side",)},
+            "Most of the way, 60 %: brighter light on the floor is missing; view side asks for "
+            "other light.",
         ),
         (
             14.0,

@@ -85,6 +85,13 @@ const UNPAINTED = 'Nothing is painted in this view: it goes with the others.';
 export function viewOf(ui, view) {
   const verified = ui.verifiedOf[view] ?? null;
   const isRender = ui.show.right === 'verified' && !verified;
+  const isAsLarge = String(ui.views[view].size) === String(ui.views[ui.view].size);
+  /** @type {Ui['show']} */
+  const show = {
+    ...ui.show,
+    ...(isRender ? { left: 'painting', right: 'solution' } : {}),
+    ...(isAsLarge ? {} : { zoom: 1, pan: [0, 0] }),
+  };
   const { ofViews, shares } = ui;
   return {
     view,
@@ -92,7 +99,7 @@ export function viewOf(ui, view) {
     verified,
     explained: [],
     pointed: null,
-    ...(isRender ? { show: { ...ui.show, left: 'painting', right: 'solution' } } : {}),
+    show,
     ...(ofViews ? seenOf({ ofViews }, { ...ui, view }) : {}),
     lit: ui.lit.map((one, k) => ({ ...one, share: shares?.[view]?.[k] ?? one.share })),
   };
@@ -122,7 +129,11 @@ export function answerOf(message, ui) {
     if (message[key]) made[key] = message[key];
   }
   if (message.lights) Object.assign(made, answerFields(message, ui));
-  else if (!message.exact) made.isLive = true;
+  else if (!message.exact) {
+    made.isLive = true;
+    // What was said of a view before it was painted is so no more.
+    if (ui.headline === UNPAINTED) made.headline = '';
+  }
   if (made.weights) {
     const old = Object.entries(ui.verifiedOf).map(([view, one]) => [view, { ...one, isOld: true }]);
     made.verifiedOf = Object.fromEntries(old);

@@ -112,7 +112,7 @@ export function AnswerLine({ ui, hands }) {
           ? html`<span class="live" data-tip=${'A quick answer while you paint, without what takes longer; the exact one follows'}>live</span>`
           : null
       }
-      <span class="said">${text}</span>
+      <span class="said" data-tip=${text.length > 100 ? text : undefined}>${text}</span>
       ${
         !first &&
         ui.deltaE !== null &&
