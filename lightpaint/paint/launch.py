@@ -4,7 +4,7 @@ import gc
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,10 +17,11 @@ from lightpaint.files import check_writable, file_length
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.database import set_aside
+from lightpaint.paint.keeping import Keeping, check_together, identity_of
 from lightpaint.paint.opening import Opening
 from lightpaint.paint.server import Server, check_installed
-from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -50,9 +51,10 @@ def subject_of(
     settings: Settings | None = None,
     constraints: Constraints | None = None,
     choice: TransformChoice | None = None,
-    command: Callable[[str, Wishes], str] = lambda painting, wishes: "",
+    command: Callable[[Mapping[str, str], Wishes], str] = lambda paintings, wishes: "",
+    among: int = 1,
 ) -> Subject:
-    """What is to be painted, read and checked before anything is rendered.
+    """One view to be painted, as of `Subject`, read and checked before anything is rendered.
 
     Raises LightpaintError for what cannot be painted, or asked of its lights.
     """
@@ -64,6 +66,7 @@ def subject_of(
         "constraints": constraints,
         "choice": choice or TransformChoice(),
         "command": command,
+        "among": among,
     }
     if not isinstance(source, SceneFile):
         default = Settings()
@@ -90,26 +93,24 @@ def subject_of(
     return Subject(scene=opening, **about)
 
 
-def identity_of(subject: Subject) -> Identity | None:
-    """What its session is of; None of a scene of which that is known when it has been loaded."""
-    if subject.basis is not None:
-        return Identity.of(subject.basis)
-    if (known := subject.known) is not None:
-        name = Path(known.path).name
-        names = tuple(light.name for light in known.lights)
-        return Identity(name, known.identity, known.size, names, known.sensor)
-    return None if isinstance(subject.scene, Opening) else identity_of_scene(subject.loaded)
+def subjects_of(
+    sources: Sequence[SceneFile | BasisFile | GroupsFile], folder: Path, **how: Any
+) -> tuple[Subject, ...]:
+    """Views of one lighting to be painted together. how: as of `subject_of`.
 
-
-def identity_of_scene(scene: Scene) -> Identity:
-    """That of the basis which is still to be rendered."""
-    names = tuple(light.name for light in scene.lights)
-    sensor = scene.sensor_names[scene.sensor]
-    return Identity(scene.path.name, scene.identity, scene.size, names, sensor)
+    Raises LightpaintError for what cannot be painted, alone or together, as far as it is known.
+    """
+    made = tuple(subject_of(one, folder, among=len(sources), **how) for one in sources)
+    if (identity := identity_of(made)) is not None:
+        check_together([view.sensor for view in identity.views])
+    bases = [subject.basis for subject in made if subject.basis is not None]
+    for basis in bases[1:]:
+        check_same_lights(bases[0], basis)
+    return made
 
 
 def paint_in_browser(
-    subject: Subject,
+    subjects: Sequence[Subject],
     opened: Callable[[Server], None],
     *,
     new: bool = False,
@@ -117,7 +118,7 @@ def paint_in_browser(
     port: int | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> None:
-    """Serve a page that paints `subject`, until Ctrl-C or the like; all that was done is kept.
+    """Serve a page that paints these views, until Ctrl-C or the like; all that was done is kept.
 
     opened: called when the page can be opened. new: whether an earlier session is put aside. host,
     port: as of `Server`. say: hears remarks.
@@ -126,15 +127,16 @@ def paint_in_browser(
     not be written.
     """
     check_installed()
-    check_writable(subject.folder)
-    path = subject.folder / SESSION
+    folder = subjects[0].folder
+    check_writable(folder)
+    path = folder / SESSION
     if new and (aside := set_aside(path)) is not None:
         say(f"the earlier session is kept as {aside}")
-    places = _Places(subject, path, say)
-    studio = Studio(subject, places.opened)
+    keeping = Keeping(subjects, path, say)
+    studio = Studio(subjects, keeping.opened)
     try:
-        server = Server(studio, places.store, host=host, port=port, say=say)
-        places.server = server
+        server = Server(studio, keeping.store, host=host, port=port, say=say)
+        keeping.server = server
         try:
             studio.on_failure = partial(_failed, server)
             opened(server)
@@ -146,7 +148,7 @@ def paint_in_browser(
         if studio.failure is not None and studio.store is None:
             raise studio.failure
     finally:
-        _end(studio, places.store)
+        _end(studio, keeping.store)
 
 
 @contextmanager
@@ -164,48 +166,6 @@ def at_hand() -> Iterator[None]:
     finally:
         gc.unfreeze()
         sys.setswitchinterval(before)
-
-
-class _Places:
-    """Where a session is kept: opened at once, unless its scene has to be loaded for that."""
-
-    def __init__(self, subject: Subject, path: Path, say: Callable[[str], None]) -> None:
-        self.path = path
-        self.store: Store | None = None
-        self.server: Server | None = None
-        if (identity := identity_of(subject)) is not None or path.exists():
-            self.store = Store.open(path, identity)
-        scene = subject.scene
-        if isinstance(scene, Opening):
-            if scene.known is not None:
-                for remark in scene.remarks:
-                    say(remark)
-            else:
-                scene.checks.append(partial(self._loaded, scene, say))
-
-    def _loaded(self, opening: Opening, say: Callable[[str], None], scene: Scene) -> None:
-        """Once a scene is there of which nothing was known."""
-        from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
-
-        identity = identity_of_scene(scene)
-        if self.store is None:
-            self.store = Store.open(self.path, identity)
-        else:
-            self.store.becomes(identity)
-        if self.server is not None:
-            self.server.keeps(self.store)
-        of_scene, of_film = remarks_of_scene(scene), remarks_of_film(scene, opening.settings)
-        for remark in (*of_scene, *of_film, *remarks_of_memory(scene)):
-            say(remark)
-        from lightpaint.scene.variant import use_variant
-
-        # What is said of this machine may not be so the next time.
-        opening.remarks = tuple(x for x in (*of_scene, *of_film) if x != use_variant().note)
-
-    def opened(self, _: Identity) -> Store:
-        """The store, when there is a basis."""
-        assert self.store is not None
-        return self.store
 
 
 #: Seconds in which a page that a browser was asked to open comes to hear why there is nothing.
