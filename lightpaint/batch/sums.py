@@ -12,7 +12,7 @@ from lightpaint.batch.engine import Engine
 from lightpaint.batch.errands import Done, Film, SumsOfRows, Wanted
 from lightpaint.batch.estimate import rendered_s
 from lightpaint.batch.held import Held
-from lightpaint.batch.lights import write_lights
+from lightpaint.batch.lights import leave_lights
 from lightpaint.batch.rows import about_lights
 from lightpaint.batch.spool import Spool
 from lightpaint.batch.task import Task
@@ -100,7 +100,7 @@ def _write(job: Job, sums: Sums) -> None:
     half = -(-(scene.spp if asked is None else asked) // 2)
     nothing = np.zeros((len(scene.lights), 1, 1, 3), np.float32)
     seed, seen = job.settings.seed, np.zeros((1, 1), bool)
-    write_lights(job, about_lights(scene, seed, (half, half), nothing, nothing, seen), sums)
+    leave_lights(job, about_lights(scene, seed, (half, half), nothing, nothing, seen), sums)
 
 
 def _file_of(job: Job) -> Painting:

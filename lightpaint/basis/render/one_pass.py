@@ -49,14 +49,19 @@ class Tracer:
         # One stream of numbers for each half and for the rehearsal, far from all others.
         self.streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
 
-    def rehearse(self, spp: int, *, first: int = 0) -> None:
-        """A pass that counts for what it learns alone: it is the noisiest, knowing nothing.
-
-        first: samples per pixel of rehearsals before it.
-        """
+    def rehearse(self, spp: int) -> None:
+        """A pass that counts for what it learns alone: it is the noisiest, knowing nothing."""
         nowhere = HalfSums(len(self.scene.lights), self.scene.size)
+        self._trace(nowhere.planes[0], nowhere.seen, spp, Guided(self.streams[2], 0, self.guide))
+
+    def learn(self, rows: range, first: int, spp: int) -> None:
+        """Learn from some samples of some rows, whose light is not kept.
+
+        first: samples of a pixel that were learned from before.
+        """
+        planes, seen = dr.zeros(mi.Float, 3 * len(self.scene.lights)), dr.zeros(mi.Float, 1)
         numbers = Guided(self.streams[2], first, self.guide)
-        self._trace(nowhere.planes[0], nowhere.seen, spp, numbers)
+        self._trace(planes, seen, spp, numbers, rows, is_kept=False)
 
     def add_pass(self, sums: HalfSums, half: int, spp: int) -> None:
         """Add `spp` samples per pixel to one of the halves of `sums`."""
@@ -83,7 +88,14 @@ class Tracer:
         del self.loaded, self.light_of, self.guide
 
     def _trace(
-        self, planes: Any, seen: Any, spp: int, numbers: "Guided", rows: range | None = None
+        self,
+        planes: Any,
+        seen: Any,
+        spp: int,
+        numbers: "Guided",
+        rows: range | None = None,
+        *,
+        is_kept: bool = True,
     ) -> None:
         accumulate(
             self.loaded,
@@ -97,6 +109,7 @@ class Tracer:
             block=self.scene.film.block,
             must_bounce=needs_a_bounce(self.scene),
             rows=rows,
+            is_kept=is_kept,
         )
         # A running kernel cannot be interrupted, and what is not waited for is still running.
         dr.sync_thread()
@@ -142,6 +155,7 @@ def accumulate(
     block: int = 1,
     must_bounce: bool = False,
     rows: range | None = None,
+    is_kept: bool = True,
 ) -> int:
     """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.
 
@@ -154,6 +168,7 @@ def accumulate(
     must_bounce: whether paths that only pass surfaces carry nothing (see integrators.py).
     rows: those of the picture that are rendered, which are then all that `planes` and `seen` have;
     guided alone. Their samples are the same as of the whole picture.
+    is_kept: whether pixels are kept apart; else these have one, for all.
     Returns the number of paths per pixel, which some samplers round up.
     """
     width, height = (int(v) // block for v in camera.film().crop_size())
@@ -168,7 +183,9 @@ def accumulate(
     rows = range(height) if rows is None else rows
     sample = dr.arange(mi.UInt32, width * len(rows) * spp)
     its = sample // dr.opaque(mi.UInt32, spp)
-    pixel = its + dr.opaque(mi.UInt32, width * rows.start)
+    row = its // width
+    pixel = (row * dr.opaque(mi.UInt32, rows.step) + dr.opaque(mi.UInt32, rows.start)) * width
+    pixel += its - row * width
     numbers = None
     if guided is not None:
         term = sample - its * dr.opaque(mi.UInt32, spp) + dr.opaque(mi.UInt32, guided.first)
@@ -182,7 +199,13 @@ def accumulate(
         guide,
         ray,
         weight,
-        Planes(planes, seen, light_of, its, dr.opaque(mi.UInt32, width * len(rows))),
+        Planes(
+            planes,
+            seen,
+            light_of,
+            its & dr.opaque(mi.UInt32, 0xFFFFFFFF if is_kept else 0),
+            dr.opaque(mi.UInt32, width * len(rows) if is_kept else 1),
+        ),
         hide_emitters=integrator.hide_emitters,
         must_bounce=must_bounce,
         max_depth=mi.UInt32(depth_limit(integrator)),

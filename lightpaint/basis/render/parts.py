@@ -130,9 +130,10 @@ def lesson(scene: Scene, spp: int, seed: int) -> Floats | None:
     try:
         # The order of additions, which only one thread keeps to, decides what is learned.
         with kernels(threads=1):
-            its = max(1, LESSON // (height * width))
+            its, step = max(1, LESSON // (height * width)), max(1, height * width // LESSON)
             for k in range(min(max(spp * height * width // PER_LESSON, 1), LESSONS)):
-                tracer.rehearse(its, first=k * its)
+                # Of a large picture some rows tell enough, each time others.
+                tracer.learn(range(k * step // LESSONS, height, step), k * its, its)
         learned: Floats = tracer.guide.learned()
         return learned
     finally:
