@@ -19,7 +19,6 @@ from scipy.optimize import nnls
 
 from lightpaint.basis.basis import Basis, BasisLight, Origin
 from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.algebra.threads import one_thread
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import reduce_to
@@ -27,6 +26,7 @@ from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_p
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target
+from lightpaint.threads import one_thread
 
 HEIGHT, WIDTH, BRUSH = 360, 640, 64
 

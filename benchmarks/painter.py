@@ -2,16 +2,21 @@
 
     pip install '.[test]'
     python benchmarks/painter.py [--cases 12x960x540 64x960x540 ...] [--strokes N] [--minutes M]
+    python benchmarks/painter.py --start scenes/gallery/scene.xml [--times N]
 
 A basis of soft lights that is made up, the painter's own server, and headless Chromium that
 renders in software. A pointer is moved 60 times a second over the picture. For every answer that
 comes on screen, the time since the last move of the pointer that it answers; Python's part of a
 stroke is timed in this process. Up to a frame of the display, 16.7 ms, of each figure is waiting
 for it. With --minutes, how the memory of page and server grows while somebody paints.
+
+With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
+with what that has kept, from the start of its process. The browser is open already.
 """
 
 import argparse
 import json
+import os
 import resource
 import shutil
 import subprocess
@@ -70,7 +75,12 @@ def main() -> None:
     parser.add_argument("--strokes", type=int, default=6)
     parser.add_argument("--view", choices=("gl", "cpu"), help="picture view (default: the quicker)")
     parser.add_argument("--minutes", type=float, default=0.0)
+    parser.add_argument("--start", metavar="SCENE")
+    parser.add_argument("--times", type=int, default=5)
     options = parser.parse_args()
+    if options.start:
+        print_starts(options.start, options.times)
+        return
     cases = [tuple(map(int, case.split("x"))) for case in options.cases]
     print_session(cases[0])
     print("\nthrough the page, ms from pointer to screen")
@@ -257,6 +267,86 @@ class Opened:
         for name, column in (("page", 1), ("server", 2)):
             slope = np.polyfit(each[:, 0], each[:, column], 1)[0] if len(each) > 1 else 0.0
             print(f"{name}: {1e3 * slope:+.0f} kB a stroke")
+
+
+#: What of a page is there, in the order in which it comes: itself, the first picture to paint on
+#: with the list of lights, all their planes.
+PAINTER = "document.getElementById('lightpaint')?.painter"
+STAGES = {
+    "page": f"() => {PAINTER}",
+    "picture": f"() => {PAINTER}?.engine.work.isReady && document.querySelector('.lightpaint .tag')"
+    " && document.querySelector('.is-lights input')",
+    "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.work;"
+    " return !loader.missing().length && !loader.onTheWay.size; }",
+}
+
+
+def print_starts(scene: str, times: int) -> None:
+    """From the start of a process to an answered stroke, with an empty cache and a full one."""
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        path = shutil.which("chromium")
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        # As installed packages have it, and a source tree may not.
+        around = {**os.environ, "LIGHTPAINT_CACHE": folder, "PYTHONPYCACHEPREFIX": f"{folder}/py"}
+        around.pop("PYTHONDONTWRITEBYTECODE", None)
+        print(f"{scene}: s from the start of its process, and s of the processor that it took")
+        heads = ("", "address", *STAGES, "stroke", "processor")
+        print(f"{heads[0]:12s}" + "".join(f"{head:>10s}" for head in heads[1:]))
+        print_times("nothing kept", [started(browser, scene, folder, around, is_first=True)])
+        every = []
+        for _ in range(times):
+            every.append(started(browser, scene, folder, around))
+            print_times("kept", every[-1:])
+        print_times("median", every)
+        browser.close()
+
+
+def print_times(name: str, every: list[list[float]]) -> None:
+    """A row: the median of each column."""
+    print(f"{name:12s}" + "".join(f"{x:10.2f}" for x in np.median(every, axis=0)), flush=True)
+
+
+def started(
+    browser: Any, scene: str, folder: str, around: dict[str, str], *, is_first: bool = False
+) -> list[float]:
+    """Seconds to each stage. is_first: wait at the end until all that can be kept is."""
+    place = tempfile.mkdtemp(dir=folder)
+    words = [sys.executable, "-m", "lightpaint", "paint", scene, "-o", place]
+    page = browser.new_context(viewport={"width": 1600, "height": 900}).new_page()
+    begin = time.perf_counter()
+    painter = subprocess.Popen(
+        [*words, "--no-browser", "--port", "0"],
+        env=around,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert painter.stdout is not None
+    said = painter.stdout.readline()
+    times = [time.perf_counter() - begin]
+    page.goto(said.partition(" at ")[2].split()[0])
+    for is_there in STAGES.values():
+        page.wait_for_function(is_there, timeout=600_000)
+        times.append(time.perf_counter() - begin)
+    box = page.evaluate(
+        f"() => {{ const {{ engine }} = {PAINTER}, [pane] = engine.panes();"
+        " const box = engine.element.getBoundingClientRect();"
+        " return [box.x + pane.x + pane.width / 2, box.y + pane.y + pane.height / 2]; }"
+    )
+    page.mouse.click(*box)
+    page.wait_for_function(f"() => {PAINTER}.engine.work.strokes.count && {PAINTER}.engine.work"
+                           ".strokes.isPending === false", timeout=60_000)  # fmt: skip
+    times.append(time.perf_counter() - begin)
+    used = Path(f"/proc/{painter.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    times.append(sum(map(int, used)) / os.sysconf("SC_CLK_TCK"))
+    if is_first:
+        until = time.monotonic() + 600
+        while not list(Path(folder).glob("*.clean.npz")) and time.monotonic() < until:
+            time.sleep(0.5)
+    page.context.close()
+    painter.terminate()
+    painter.wait()
+    return times
 
 
 if __name__ == "__main__":

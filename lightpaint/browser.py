@@ -162,13 +162,14 @@ def _pairs(names: str) -> list[tuple[str, str]]:
     return [(x[0].strip(), x[-1].strip()) for x in parts]
 
 
-def _exported(path: str) -> list[str]:
+@cache
+def _exported(path: str) -> tuple[str, ...]:
     """Names that a module exports."""
     text = _code(path)
     names = [match["name"] for match in _DECLARED.finditer(text)]
     for match in _LISTED.finditer(text):
         names += [name for _, name in _pairs(match["names"])]
-    return names
+    return tuple(names)
 
 
 def _spare(text: str) -> str:

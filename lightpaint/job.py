@@ -37,6 +37,8 @@ from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
 from lightpaint.settings import Settings
 from lightpaint.sources import (
+    NOT_IN_GROUPS,
+    RENDERED,
     BasisFile,
     GroupsFile,
     Painting,
@@ -47,10 +49,7 @@ from lightpaint.sources import (
     to_json,
 )
 from lightpaint.target.target import Target
-
-#: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
-NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
+from lightpaint.threads import side_by_side
 
 
 @dataclass(frozen=True)
@@ -116,9 +115,8 @@ class Job:
     def __post_init__(self) -> None:
         self._check_counts()
         self._check_nothing_idle()
-        # What is read soonest comes first, so that mistakes are said soon.
-        targets = [content(target) for target in self.targets]
-        basis = content(self.basis)
+        # A painting is read beside the basis, and a mistake in it is said first.
+        *targets, basis = side_by_side(content, [*self.targets, self.basis])
         basis = basis.basis if isinstance(basis, LightGroups) else basis
         scenes = [content(scene) for scene in self.scenes]
         folders = [self.folder]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import MOST, clean_planes
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import samples_for
 from lightpaint.images.estimate import write_estimate
@@ -103,6 +104,8 @@ def obtain(scene: Scene, settings: Settings, progress: Progress, *, views: int =
             f"the basis could not be kept in {cache.folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
+    elif settings.use_cache and is_rendered:
+        clean_planes(basis, most=MOST, progress=lambda k, n: listen("denoising", k, n, "planes"))
     has = f"basis of {basis.origin.spp} samples per pixel"
     wanted = scene.spp if asked is None else asked
     if not is_rendered and basis.origin.spp > samples_for(scene, asked):

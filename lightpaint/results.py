@@ -11,7 +11,6 @@ from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -29,6 +28,7 @@ from lightpaint.report.looks import Looks
 from lightpaint.report.notebook import look_html
 from lightpaint.report.numbers import report_numbers
 from lightpaint.report.page import report_page
+from lightpaint.report.pictures import residual_of, transform_of
 from lightpaint.report.verdict import verdict
 from lightpaint.scene.render import Stream
 from lightpaint.scene.scene import Scene, load_scene
@@ -36,6 +36,7 @@ from lightpaint.scene.surfaces import render_features
 from lightpaint.screen import some_names
 from lightpaint.staging import finish
 from lightpaint.target.target import Target
+from lightpaint.threads import side_by_side
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
 VIEW_KEY = "lightpaint.view"
@@ -171,7 +172,10 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
     larger = None
     if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
         larger = render_features(look.relit)
-    looks = Looks.clean(look.basis, look.predicted.image, verified, larger=larger)
+    weights, predicted = look.solution.weights, look.predicted.image
+    looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
+    transform = transform_of(look.target, predicted, verified)
+    missed = residual_of(look.solution, predicted, transform=transform)
 
     def comparison() -> None:
         sheet = comparison_image(
@@ -182,14 +186,15 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
             verified=verified,
             seen=look.analysis.seen,
             looks=looks,
+            missed=missed,
         )
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
     def page() -> None:
-        write_text(folder / "report.html", report_page(**how, looks=looks))
+        write_text(folder / "report.html", report_page(**how, looks=looks, missed=missed))
 
     def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(**how))
+        write_text(folder / "report.json", report_numbers(**how, missed=missed))
 
     side_by_side(lambda write: write(), (page, comparison, numbers))
 

@@ -26,6 +26,10 @@ from lightpaint.target.target import Target
 FORMAT = "lightpaint-job 1"
 FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by_sensor")
 
+#: Settings that only change what is rendered, and those that light groups know nothing of.
+RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
+NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
+
 
 @dataclass(frozen=True)
 class SceneFile:

@@ -1,12 +1,14 @@
 """Bases kept from earlier runs, so that a second painting of a scene is answered at once.
 
-One file per scene content, sensor, size and seed; more samples are added to it when asked for. The
-folder is the user's cache folder, or what LIGHTPAINT_CACHE names, and may be deleted at any
+One file per scene content, sensor, size and seed; more samples are added to it when asked for.
+Beside it lies, under its name with another ending, what was made of it or is known of its scene.
+The folder is the user's cache folder, or what LIGHTPAINT_CACHE names, and may be deleted at any
 time.
 """
 
 import hashlib
 import os
+import re
 import shutil
 import time
 from collections.abc import Iterable
@@ -24,16 +26,21 @@ from lightpaint.errors import BasisError, LightpaintError, OutputError
 #: Bytes above which the bases that were not used for longest are deleted.
 LARGEST = 8 * 2**30
 SUFFIX = ".basis.exr"
+#: Endings of what is put beside: pictures made of a basis, what is known of its scene.
+CLEAN, KNOWN = ".clean.npz", ".known.json"
+_COMPANION = re.compile(r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json)")
 #: Seconds after which an unfinished file belongs to nobody.
 LEFTOVER_S = 3600.0
+#: And after which what was made of a basis that is not kept here is made again if need be.
+UNUSED_S = 30 * 86400.0
 
 
 @dataclass(frozen=True)
 class Entry:
     """One cached basis.
 
-    size: in bytes. image_size: (height, width), lights: how many. origin and these are None
-    if the file cannot be read.
+    size: in bytes, with what is kept beside it. image_size: (height, width), lights: how many.
+    origin and these are None if the file cannot be read.
     """
 
     path: Path
@@ -100,6 +107,45 @@ def keep(basis: Basis) -> bool:
     return True
 
 
+def kept_at(basis: Basis) -> Path | None:
+    """The file in which just `basis` is kept; None where it is not, or has more samples there."""
+    path = _path_of(basis)
+    return path if path.is_file() and _entry(path).origin == basis.origin else None
+
+
+def place_beside(basis: Basis, ending: str) -> Path:
+    """Where something is kept that was made of `basis`, whether that is kept itself or not.
+
+    ending: CLEAN or KNOWN, what stands before it included.
+    """
+    return folder() / f"{_path_of(basis).name.removesuffix(SUFFIX)}{ending}"
+
+
+def beside(path: Path) -> list[Path]:
+    """What is kept beside the basis at `path`, and nothing else that lies there."""
+    name = path.name.removesuffix(SUFFIX)
+    return [other for other, its in _companions() if its == name]
+
+
+def sweep(unused_s: float = 0.0) -> int:
+    """Delete what lies beside no kept basis and was not used for that long; how many bytes."""
+    freed = 0
+    for path, name in _companions():
+        with suppress(OSError):
+            its = path.stat()
+            is_alone = not path.with_name(name + SUFFIX).exists()
+            if is_alone and time.time() - its.st_mtime >= unused_s:
+                path.unlink()
+                freed += its.st_size
+    return freed
+
+
+def _companions() -> list[tuple[Path, str]]:
+    """What was put beside bases, and the name that each basis has before its ending."""
+    found = ((path, _COMPANION.fullmatch(path.name)) for path in folder().glob("*"))
+    return [(path, match[1]) for path, match in found if match is not None]
+
+
 def is_kept(basis: Basis) -> bool:
     """Whether `basis` is kept, with all its samples, or one of the same with more."""
     path = _path_of(basis)
@@ -109,17 +155,21 @@ def is_kept(basis: Basis) -> bool:
 
 def _prune(path: Path) -> None:
     """Bring the folder back under LARGEST, and keep `path`."""
-    for leftover in folder().glob(f".*{SUFFIX}.*"):
+    for leftover in (
+        path for end in (SUFFIX, CLEAN, KNOWN) for path in folder().glob(f".*{end}.*")
+    ):
         # What a killed process was writing.
         if time.time() - leftover.stat().st_mtime > LEFTOVER_S:
             shutil.rmtree(leftover, ignore_errors=True)
-    rest = LARGEST - path.stat().st_size
+    sweep(UNUSED_S)
+    rest = LARGEST - _entry(path).size
     for entry in reversed(entries()):
         if entry.path == path:
             continue
         rest -= entry.size
         if rest < 0:
-            entry.path.unlink(missing_ok=True)
+            for gone in (*beside(entry.path), entry.path):
+                gone.unlink(missing_ok=True)
 
 
 def entries() -> list[Entry]:
@@ -142,7 +192,8 @@ def drop(kept: Iterable[Entry]) -> int:
     freed = 0
     for entry in kept:
         try:
-            entry.path.unlink(missing_ok=True)
+            for gone in (*beside(entry.path), entry.path):
+                gone.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
         freed += entry.size
@@ -168,7 +219,7 @@ def _path_of(basis: Basis) -> Path:
 
 
 def _entry(path: Path) -> Entry:
-    size = path.stat().st_size
+    size = sum(file.stat().st_size for file in (path, *beside(path)))
     try:
         origin, image_size, lights = read_origin(path)
     except LightpaintError:

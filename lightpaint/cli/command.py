@@ -5,7 +5,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from lightpaint.cli import lines
 from lightpaint.cli.manner import Manner, Outcome, speaking
@@ -34,14 +34,16 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
         from lightpaint.signals import interruptible_between_pieces
 
         with interruptible_between_pieces():
-            from lightpaint.cli import commands, terminal
+            from lightpaint.cli import terminal
             from lightpaint.cli.options import values_of
             from lightpaint.scene.variant import SlowBackendWarning
+
+            command = _command(options.command)
 
         # The commands say it in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
         with speaking(Manner(options.as_json, options.is_quiet, options.is_verbose)):
-            outcome: Outcome = getattr(commands, options.command)(**values_of(options, given))
+            outcome = command(**values_of(options, given))
             if options.as_json:
                 terminal.write_json(outcome.told())
             terminal.note("done")
@@ -54,6 +56,17 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
             return _failed(options.command, error)
     lines.err(f"lightpaint {options.command}: interrupted{how_to_go_on}")
     return 130
+
+
+def _command(name: str) -> Callable[..., Outcome]:
+    """The function of a command."""
+    if name == "paint":  # which is to be there at once, and needs few of the rooms
+        from lightpaint.cli.painter import paint
+
+        return paint
+    from lightpaint.cli import commands
+
+    return getattr(commands, name)  # type: ignore[no-any-return]
 
 
 def _failed(command: str, error: Exception) -> int:

@@ -8,6 +8,7 @@ import os
 import sys
 
 from lightpaint.errors import OutputError
+from lightpaint.images.silence import heard
 from lightpaint.screen import visible
 
 #: Characters of a line on stderr; what is longer was in no sentence.
@@ -20,7 +21,8 @@ def out(line: str, *, swatch: str | None = None) -> None:
     swatch: a colour like `#ffaa66`, of which a block stands before the line; "" for room for one.
     """
     try:
-        print(_block(swatch) + visible(line), flush=True)
+        with heard():
+            print(_block(swatch) + visible(line), flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
@@ -37,7 +39,8 @@ def _block(color: str | None) -> str:
 
 def err(line: str) -> None:
     """A line of progress, a remark or an error, to stderr."""
-    print(cut(line), file=sys.stderr, flush=True)
+    with heard():
+        print(cut(line), file=sys.stderr, flush=True)
 
 
 def cut(line: str) -> str:

@@ -10,24 +10,23 @@ from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
-from lightpaint.batch.gallery import check_gallery
-from lightpaint.batch.plan import ALONE
-from lightpaint.batch.run import How
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
-from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
+
+if TYPE_CHECKING:
+    from lightpaint.job import Job
 
 #: Options that say how a scene is loaded, by the names that Python has for them.
 LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
@@ -68,6 +67,8 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             jobs = jobs_of(options, settings, failed)
             together = None if len(options.targets) < 2 else output
             if together is not None:
+                from lightpaint.batch.gallery import check_gallery
+
                 check_gallery(together, force=options.force)
             how = {"failed": failed, "together": together, "keep_going": options.keep_going}
             return {"jobs": jobs, "table": options.table, "wanted": wanted, **how}
@@ -128,12 +129,16 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
 
 def jobs_of(
     options: Namespace, settings: Settings, failed: dict[str, str] | None = None
-) -> list[Job]:
+) -> "list[Job]":
     """What `solve` is asked for, a job for each painting or one for several views.
 
     All are born, and so checked, before the first is run. failed: where the others are to go on,
     receives why one cannot be done, by the name of its folder.
     """
+    # Jobs know all rooms, of which other commands need less.
+    from lightpaint.batch.plan import ALONE
+    from lightpaint.job import Job
+
     basis = basis_of(options)
     if options.views and options.targets:
         raise TargetError("TARGET and --target at once: give every painting with its sensor")
@@ -189,6 +194,8 @@ def _scene_to_export(options: Namespace) -> SceneFile | None:
 
 def _to_do(options: Namespace) -> dict[str, Any]:
     """What `batch` is asked for."""
+    from lightpaint.batch.run import How
+
     return {
         "paths": options.paths,
         "output": Path(options.output) if options.output else None,

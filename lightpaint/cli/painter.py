@@ -2,9 +2,9 @@
 
 import os
 import sys
-import webbrowser
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from lightpaint.cli import lines, terminal
@@ -12,13 +12,11 @@ from lightpaint.cli.manner import Outcome, manner
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server import Server
-    from lightpaint.paint.subject import Subject
     from lightpaint.paint.wishes import Wishes
 
 #: Said of a --host.
@@ -62,8 +60,9 @@ def paint(
         **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )
     subject = subjects[0]
-    for remark in _remarks(subjects, settings):
-        terminal.say(remark)
+    if subject.groups is not None:
+        for remark in subject.groups.remarks:
+            terminal.say(remark)
     addresses = []
 
     def told() -> dict[str, str]:
@@ -76,7 +75,9 @@ def paint(
         said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
         (lines.err if manner().as_json else terminal.write)(said)
         if with_browser and _has_browser():
-            webbrowser.open(server.url_once())
+            # Some browsers keep who starts them waiting.
+            given = (server.url_once(),)
+            Thread(target=_show, args=given, name="browser", daemon=True).start()
 
     try:
         paint_in_browser(
@@ -92,20 +93,16 @@ def paint(
     return Outcome(told)
 
 
-def _remarks(subjects: Sequence["Subject"], settings: Settings) -> Iterator[str]:
-    """What somebody should know before it begins."""
-    for k, subject in enumerate(subjects):
-        if (scene := subject.scene) is not None:
-            yield from remarks_of_scene(scene) if k == 0 else ()
-            yield from (*remarks_of_film(scene, settings), *remarks_of_memory(scene))
-        if subject.groups is not None:
-            yield from subject.groups.remarks
-
-
 def _say(text: str) -> None:
     """What the server says; a mistake of lightpaint's own has many lines."""
     for line in text.rstrip().split("\n"):
         terminal.say(line)
+
+
+def _show(url: str) -> None:
+    import webbrowser
+
+    webbrowser.open(url)
 
 
 def _has_browser() -> bool:

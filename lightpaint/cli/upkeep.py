@@ -26,6 +26,8 @@ def cache(*, action: str, names: Sequence[str]) -> Outcome:
         return Outcome(lambda: {**about, "kept": listed})
     dropped = bases.entries() if action == "clear" else _kept_by_names(names)
     freed = bases.drop(dropped)
+    if action == "clear":
+        freed += bases.sweep()
     if action == "drop":
         tables.show_kept(dropped)
     terminal.write(f"{len(dropped)} deleted from {bases.folder()}: {freed / 1e6:.1f} MB are free")

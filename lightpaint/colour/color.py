@@ -63,7 +63,12 @@ def cct_and_duv(rgb: Floats) -> tuple[float, float] | None:
     None where it has none: for black, for a colour more than 0.05 from Planck's locus, and
     beyond 1000 and 100,000 K. Raises ColorError unless it is three finite numbers.
     """
-    rgb = _three(rgb)
+    return _cct_and_duv(*_three(rgb).tolist())
+
+
+@lru_cache(maxsize=4096)
+def _cct_and_duv(*light: float) -> tuple[float, float] | None:
+    rgb = np.array(light)
     if rgb.max() <= 0:
         return None
     xyz = rgb_to_xyz(REC709) @ (rgb / rgb.max())

@@ -13,6 +13,10 @@ from lightpaint.arrays import Floats
 
 Size = tuple[int, int]
 
+#: Sides of blocks up to which adding their pixels one after the other is sooner done than NumPy's
+#: mean, by four times.
+FEW = 8
+
 
 def whole_factor(larger: Size, smaller: Size) -> int | None:
     """Side of the largest blocks of which `larger` has as many as `smaller` has pixels.
@@ -46,8 +50,14 @@ def block_mean(image: Floats, factor: int) -> Floats:
     """
     if factor == 1:
         return image
-    blocks = _in_blocks(image, factor)
-    return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64).astype(image.dtype))
+    if factor > FEW:
+        blocks = _in_blocks(image, factor)
+        return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64).astype(image.dtype))
+    whole = covered(image, blocks_in(image.shape[:2], factor))
+    total = whole[::factor, ::factor].astype(np.float64)
+    for k in range(1, factor * factor):
+        total += whole[k // factor :: factor, k % factor :: factor]
+    return np.asarray((total / factor**2).astype(image.dtype))
 
 
 def block_pixels(image: Floats, factor: int) -> Floats:

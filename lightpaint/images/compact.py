@@ -19,6 +19,9 @@ from lightpaint.arrays import Floats
 #: The brightest light of a picture as halves: 24 stops below it are as precise.
 BRIGHTEST = 1024.0
 
+#: Effort of deflating: 6, the usual, takes off another 4 % in twice the time.
+EFFORT = 3
+
 #: Bits of halves that are dropped: the 7 that stay tell light to 1/256, half of that on average.
 DROPPED = 3
 
@@ -46,7 +49,7 @@ def compact(image: Floats, *, dropped: int = DROPPED) -> Compact:
     folded = np.asarray((rest << 1) ^ (rest >> 31), np.uint16)
     whole = np.concatenate([(folded & 255).ravel(), (folded >> 8).ravel()]).astype(np.uint8)
     height, width = image.shape[:2]
-    return Compact(zlib.compress(whole.tobytes(), 6), float(scale), dropped, (height, width))
+    return Compact(zlib.compress(whole.tobytes(), EFFORT), float(scale), dropped, (height, width))
 
 
 def expanded(its: Compact) -> Floats:

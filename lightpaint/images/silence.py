@@ -10,7 +10,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 
 #: The descriptors belong to the whole process: two threads would put back each other's.
-_silencing = threading.Lock()
+_silencing = threading.RLock()
+
+
+@contextmanager
+def heard() -> Iterator[None]:
+    """Say something meanwhile that is not lost because another thread keeps a library quiet."""
+    with _silencing:
+        yield
 
 
 @contextmanager

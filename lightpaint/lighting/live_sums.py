@@ -11,11 +11,11 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
-from lightpaint.lighting.algebra.threads import one_thread
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pixels import STRIP, Pixels, joined
 from lightpaint.lighting.reweighted import between
 from lightpaint.lighting.tiles import FEW_LIGHTS, TiledEquations
+from lightpaint.threads import one_thread
 
 Region = tuple[slice, slice]
 

@@ -14,7 +14,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import SizeError
 from lightpaint.lighting.algebra.quadratic import UNREACHED
-from lightpaint.lighting.algebra.threads import one_thread
+from lightpaint.threads import one_thread
 
 #: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
 BLOCK = 2**13

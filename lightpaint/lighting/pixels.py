@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.lighting.algebra.threads import side_by_side
+from lightpaint.threads import side_by_side
 
 #: Pixels in a strip.
 STRIP = 2**13

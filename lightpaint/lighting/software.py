@@ -4,7 +4,7 @@ import importlib.metadata
 from dataclasses import dataclass
 from functools import cache
 
-from lightpaint.lighting.algebra.threads import linear_algebra
+from lightpaint.threads import linear_algebra
 from lightpaint.version import __version__
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.errors import SizeError
-from lightpaint.lighting.algebra.threads import one_thread, side_by_side
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.threads import one_thread, side_by_side
 
 #: Pixels along the side of a tile. Smaller ones fit a brush better and are more to add.
 SIDE = 16

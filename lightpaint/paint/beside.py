@@ -81,11 +81,12 @@ def later(work: Callable[[], None], name: str, say: Callable[[Message], None]) -
     Thread(target=run, name=f"lightpaint-{name}", daemon=True).start()
 
 
-def told(error: Exception) -> str:
+def told(error: Exception, *, at_length: bool = True) -> str:
     """What to say of it; a mistake of lightpaint's own is told at length where it was started."""
     if isinstance(error, LightpaintError):
         return str(error)
-    traceback.print_exception(error)
+    if at_length:
+        traceback.print_exception(error)
     return f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
 
 

@@ -105,6 +105,13 @@ def _renew(database: sqlite3.Connection) -> None:
     database.execute(f"PRAGMA user_version = {VERSION}")
 
 
+def identify(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
+    """That an open database is of this. Raises PaintError for one of something else."""
+    with _told(path), transaction(database):
+        _check(database, path, identity)
+        _keep(database, json.dumps(asdict(identity)))
+
+
 def _keep(database: sqlite3.Connection, identity: str) -> None:
     """That it is of this; nothing is written if it is already, as the disk may be full."""
     if (identity,) not in database.execute("SELECT value FROM about WHERE name = 'identity'"):

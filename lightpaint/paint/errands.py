@@ -4,17 +4,17 @@ from collections.abc import Callable, Sequence
 from threading import Lock
 from typing import Any, Protocol
 
+from lightpaint.basis.clean import as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.paint import pictures, protocol
+from lightpaint.paint import protocol
 from lightpaint.paint.beside import StoppedError, later
-from lightpaint.paint.exports import export, painted_sensors, painting_of, verified
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.pictures import Picture
 from lightpaint.paint.steps import of_view
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import Subject, painting_of
 from lightpaint.paint.wishes import Wishes
 from lightpaint.progress import Progress
 
@@ -86,6 +86,9 @@ class Errands:
         return moment, with_findings(solution, analyse(solution)).lighting
 
     def _export(self, message: protocol.Export) -> None:
+        # It brings all rooms, of which painting needs a few.
+        from lightpaint.paint.exports import export
+
         moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -94,11 +97,13 @@ class Errands:
 
         with self._render:
             files = export(self._place.subjects, moment, lighting, message.what, hears)
-        command = self.command(painted_sensors(moment), moment.wishes)
+        command = self.command(moment.sensors, moment.wishes)
         fields = {"files": [str(x) for x in files], "command": command}
         self._place.tell(Message("exported", fields))
 
     def _verified(self, asked: protocol.Verify) -> None:
+        from lightpaint.paint.exports import verified
+
         moment, lighting = self._answer()
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -111,7 +116,7 @@ class Errands:
         with self._render:
             basis = moment.bases[asked.view]
             picture, said, agrees = verified(self._subject(asked.view), basis, lighting, progress)
-        self._place.put(of_view("verified", asked.view), pictures.as_halves(picture))
+        self._place.put(of_view("verified", asked.view), as_halves(picture))
         about = {"agrees": agrees, "text": said, "view": asked.view}
         self._place.tell(Message("verified", about))
 

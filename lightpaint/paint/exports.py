@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -13,7 +14,7 @@ from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.paint.moment import Moment
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import Subject, painting_of
 from lightpaint.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
@@ -22,20 +23,8 @@ from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.own import write_painting
 
-#: Files of an export, and the folder of its report.
+#: Files of an export beside the paintings, and the folder of its report.
 LIGHTING, RELIT, ANSWER = "lighting.json", "relit.xml", "answer"
-
-
-def painting_of(folder: Path, sensor: str) -> Path:
-    """Where the painting of a view goes. sensor: "" of the only one."""
-    return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
-
-
-def painted_sensors(moment: Moment) -> list[str]:
-    """Of the views that count, by which their paintings are told apart."""
-    if len(moment.bases) == 1:
-        return [""]
-    return [moment.bases[k].origin.sensor for k in moment.painted]
 
 
 def export(
@@ -59,7 +48,7 @@ def export(
     if "target" in what or "report" in what:
         if not moment.painted:
             raise PaintError("nothing is painted yet: there is no painting to write")
-        for sensor, target in zip(painted_sensors(moment), moment.painted_targets, strict=True):
+        for sensor, target in zip(moment.sensors, moment.painted_targets, strict=True):
             written.append(painting_of(folder, sensor))
             write_painting(written[-1], target)
     if "lighting" in what:
@@ -68,7 +57,7 @@ def export(
     if "relit" in what:
         if first.scene is None:
             raise PaintError("there is no scene to relight: it was opened from a saved basis")
-        relight(first.scene, lighting, folder / RELIT)
+        relight(first.loaded, lighting, folder / RELIT)
         written.append(folder / RELIT)
     if "report" in what:
         written += _report(subjects, moment, progress)
@@ -79,16 +68,20 @@ def _report(subjects: Sequence[Subject], moment: Moment, progress: Progress) -> 
     """All that `solve` leaves, for the paintings as they are; the reports of it."""
     answer = subjects[0].folder / ANSWER
     settings = replace(moment.settings, force=True)
-    of_painted = [subjects[k].scene for k in moment.painted]
-    scenes = tuple(scene for scene in of_painted if scene is not None)
+    painted = [subjects[k] for k in moment.painted]
+    scenes = tuple(subject.loaded for subject in painted if subject.scene is not None)
     targets, asked = moment.painted_targets, moment.constraints
     if len(subjects) == 1:
         groups = subjects[0].groups
         basis = moment.bases[0] if groups is None else groups
         job, bases = Job(scenes, targets, answer, basis, asked, settings), None
     elif scenes:
-        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
         bases = [moment.bases[k] for k in moment.painted]
+        # They are on their film already, and have their samples.
+        spp = bases[0].origin.spp if settings.checks_as_basis else settings.spp
+        done: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
+        settings = replace(settings, **done)
+        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
     else:
         raise PaintError("a report of several saved bases needs their scene: open that instead")
     run(job, progress, bases=bases)
@@ -99,8 +92,7 @@ def verified(
     subject: Subject, basis: Basis, lighting: Lighting, progress: Progress
 ) -> tuple[Floats, str, bool]:
     """The scene as it is relit, rendered: (h, w, 3) clean, what that says, whether it agrees."""
-    scene = subject.scene
-    assert scene is not None
+    scene = subject.loaded
     with tempfile.TemporaryDirectory(dir=scene.path.parent, prefix=".lightpaint-") as place:
         relit = relight(scene, lighting, Path(place) / RELIT)
         if relit.sensor != scene.sensor:

@@ -63,6 +63,7 @@ class Line:
         self._holder: Client | None = None
         self._last: Client | None = None
         self._clients: set[Client] = set()
+        self.farewell = "the painter has ended; what was painted is kept"
         self._worker = ThreadPoolExecutor(1, "lightpaint-session")
         self._unsaved: str | None = None
         self._watch: asyncio.Task[None] | None = None
@@ -80,6 +81,11 @@ class Line:
         self.session.on_message = post
         self._watch = loop.create_task(self._watched())
 
+    @property
+    def has_page(self) -> bool:
+        """Whether a page is there that has heard what there is."""
+        return self._holder is not None
+
     async def end(self) -> None:
         """Tell all pages, and finish what the session is at."""
         self._is_over = True
@@ -87,8 +93,7 @@ class Line:
         if self._watch is not None:
             self._watch.cancel()
         for client in self._clients:
-            text = "the painter has ended; what was painted is kept"
-            client.send(Message("closed", {"reason": "ended", "text": text}))
+            client.send(Message("closed", {"reason": "ended", "text": self.farewell}))
         leaving = [asyncio.ensure_future(client.sent()) for client in self._clients]
         if leaving:
             await asyncio.wait(leaving, timeout=GOODBYE_S)
@@ -117,7 +122,9 @@ class Line:
         return await self._done(self.session.resource, name)
 
     async def _done(self, work: Callable[..., _Made], *given: Any) -> _Made:
-        """What the session does, one thing at a time."""
+        """What the session does, one thing at a time. Raises PaintError at the end."""
+        if self._is_over:
+            raise PaintError(self.farewell)
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._worker, partial(work, *given))
 

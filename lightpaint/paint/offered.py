@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes, as_halves, scale_of
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.paint import pictures
 from lightpaint.paint.canvas import Canvas, Canvases
@@ -21,8 +21,10 @@ def offer_transforms(shelf: Pictures, transforms: Sequence[ViewTransform]) -> No
         shelf.offer(f"lut/{transform.name}", partial(pictures.table_of, transform))
 
 
-def offer_view(shelf: Pictures, view: Canvas, transform: ViewTransform) -> None:
-    """Pictures of a view from now on; clean ones come later."""
+def offer_view(
+    shelf: Pictures, view: Canvas, transform: ViewTransform, clean: CleanPlanes | None
+) -> None:
+    """Pictures of a view from now on. clean: planes without their grain, if there are any yet."""
     basis = view.basis
 
     def offer(name: str, make: Any) -> None:
@@ -31,27 +33,24 @@ def offer_view(shelf: Pictures, view: Canvas, transform: ViewTransform) -> None:
     for k, plane in enumerate(basis.images):
         offer(f"plane/{k}", partial(_plane, plane))
         offer(f"thumb/{k}", partial(pictures.small, basis, k))
-        shelf.withdraw(of_view(f"clean/{k}", view.view))
-    offer("present", lambda: pictures.as_halves(view.present))
+        if clean is None:
+            shelf.withdraw(of_view(f"clean/{k}", view.view))
+        else:
+            shelf.put(of_view(f"clean/{k}", view.view), clean.halves[k])
+    offer("present", lambda: as_halves(view.present))
     offer("look", lambda: pictures.small_picture(view.present, transform))
     offer("painting", lambda: view.image.copy())
     offer("importance", lambda: view.importance.copy())
     if basis.features is not None:
         albedo = basis.features.albedo
-        offer("albedo", lambda: pictures.as_halves(albedo))
+        offer("albedo", lambda: as_halves(albedo))
     if basis.objects is not None:
         index = basis.objects.index
         offer("objects", lambda: index.astype(np.int16))
 
 
 def _plane(plane: Any) -> Picture:
-    return pictures.as_halves(plane, pictures.scale_of(plane))
-
-
-def clean_plane(basis: Basis, k: int) -> Picture:
-    """The plane of light k without its grain, as `plane/k` has it with."""
-    clean = pictures.clean_plane(basis, k)
-    return pictures.as_halves(clean, pictures.scale_of(basis.images[k]))
+    return as_halves(plane, scale_of(plane))
 
 
 def fields_of_views(views: Canvases) -> dict[str, Any]:
@@ -71,5 +70,5 @@ def _view_fields(view: Canvas) -> dict[str, Any]:
         "name": view.name,
         "size": list(view.size),
         "objects": [] if objects is None else list(objects.names),
-        "scales": [pictures.scale_of(plane) for plane in view.basis.images],
+        "scales": [scale_of(plane) for plane in view.basis.images],
     }

@@ -11,12 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images.blocks import block_mean
-from lightpaint.images.denoise import denoised
 from lightpaint.report.figures import thumbnail
-
-#: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
-#: precision.
-BRIGHTEST = 1024.0
 
 #: Pixels of a thumbnail's longer side, about.
 THUMBNAIL = 192
@@ -77,22 +72,6 @@ class Pictures:
 def is_changing(name: str) -> bool:
     """Whether it is a picture that changes under the brush."""
     return name.partition("@")[0] in ("painting", "importance")
-
-
-def scale_of(plane: Floats) -> float:
-    """What a plane is divided by to be sent as half floats: a power of two."""
-    brightest = float(plane.max(initial=0))
-    return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST))) if brightest > 0 else 1.0
-
-
-def as_halves(plane: Floats, scale: float = 1.0) -> Picture:
-    """Light as half floats, what they cannot hold clipped."""
-    return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
-
-
-def clean_plane(basis: Basis, k: int) -> Floats:
-    """What light k does at unit emission, without its grain."""
-    return denoised(basis.images[k], basis.features)
 
 
 def small(basis: Basis, k: int) -> Picture:

@@ -115,6 +115,9 @@ class Server:
 
     host, port: where to listen; a host other than the loopback is for those who know why. say: as
     of `Line`.
+
+    Attributes:
+        is_expected: Whether a browser has been told where the page is.
     """
 
     def __init__(
@@ -130,11 +133,11 @@ class Server:
         self._line = Line(session, store, say)
         self._socket = listening(host or "127.0.0.1", port)
         self.port = int(self._socket.getsockname()[1])
-        self._guard = Guard(page_app(self._line), port=self.port, host=host)
+        self._guard = Guard(_nothing_yet, port=self.port, host=host)
         self._host = _shown(host)
-        pixels = MAX_FRAME if store is None or store.identity is None else store.identity.largest
-        self._largest = min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
         self._serving: uvicorn.Server | None = None
+        self._is_to_stop = False
+        self.is_expected = False
 
     @property
     def url(self) -> str:
@@ -143,13 +146,34 @@ class Server:
 
     def url_once(self) -> str:
         """The same, for a browser that is started now: good once."""
+        self.is_expected = True
         return f"http://{self._host}:{self.port}/?token={self._guard.once()}"
+
+    def keeps(self, store: Store) -> None:
+        """What is done is kept there, from now on; of a session that was opened later."""
+        self._line.store = store
+        if self._serving is not None:
+            self._serving.config.ws_max_size = self._largest
+
+    @property
+    def _largest(self) -> int:
+        """Bytes of the longest message that a page may send."""
+        store = self._line.store
+        pixels = MAX_FRAME if store is None or store.identity is None else store.identity.largest
+        return min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
+
+    @property
+    def has_page(self) -> bool:
+        """Whether a page is there to hear what is said."""
+        return self._line.has_page
 
     def run(self) -> None:
         """Serve until Ctrl-C or the like, which is raised again when all has ended well."""
+        # Whoever comes meanwhile waits at the socket.
         import uvicorn
 
         line = self._line
+        self._guard.app = page_app(line)
 
         class Ending(uvicorn.Server):
             async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
@@ -171,17 +195,24 @@ class Server:
             timeout_graceful_shutdown=5,
         )
         self._serving = Ending(config)
+        self._serving.should_exit = self._is_to_stop
         with _hanging_up(self._serving):
             self._serving.run(sockets=[self._socket])
 
-    def stop(self) -> None:
-        """Let `run` end, from another thread."""
+    def stop(self, why: str = "") -> None:
+        """Let `run` end, from another thread. why: what pages are told, if not the usual."""
+        self._line.farewell = why or self._line.farewell
+        self._is_to_stop = True
         if self._serving is not None:
             self._serving.should_exit = True
 
     def close(self) -> None:
         """Listen no more."""
         self._socket.close()
+
+
+async def _nothing_yet(scope: Any, receive: Any, send: Any) -> None:
+    """What is behind the guard before anybody serves."""
 
 
 @contextmanager

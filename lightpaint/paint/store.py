@@ -24,7 +24,7 @@ from typing import Any
 
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import first_line
-from lightpaint.paint.database import damaged, opened, transaction
+from lightpaint.paint.database import damaged, identify, opened, transaction
 from lightpaint.paint.kept import KeptPatch, LookArrays, PackedArrays, Place, packed_arrays
 from lightpaint.paint.packed import packed_patches
 from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
@@ -68,13 +68,21 @@ class Store:
             raise
 
     @classmethod
-    def open(cls, path: Path, identity: Identity) -> "Store":
+    def open(cls, path: Path, identity: Identity | None) -> "Store":
         """The session at `path`, as it was left, or a new one; for this process alone.
+
+        identity: None where it is still to be known what is painted (`becomes`).
 
         Raises PaintError for one that another process has, that is damaged, or that is of other
         lights or another size; OutputError for a place that cannot be written.
         """
         return cls(path, identity)
+
+    def becomes(self, identity: Identity) -> None:
+        """It is of this, which was not known when it was opened. Raises PaintError if it is not."""
+        with self._lock:
+            identify(self._database, self.path, identity)
+            self.identity = identity
 
     def append(self, step: Step) -> None:
         """Do `step`, after what is done; what was taken back is cut off."""

@@ -9,20 +9,23 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import RLock, Thread
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_planes
 from lightpaint.errors import PaintError
 from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
 from lightpaint.paint.beside import Settling, StoppedError, give_way, told
+from lightpaint.paint.canvas import Canvas
 from lightpaint.paint.errands import Errands
 from lightpaint.paint.frames import Message
 from lightpaint.paint.looks import Looks
 from lightpaint.paint.moment import Moment
-from lightpaint.paint.offered import clean_plane, fields_of_views, offer_transforms, offer_view
+from lightpaint.paint.offered import fields_of_views, offer_transforms, offer_view
 from lightpaint.paint.pictures import Picture, Pictures
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity, Pixels, of_view
@@ -41,6 +44,8 @@ class Studio:
 
     Attributes:
         on_message: Hears what is said unasked, from other threads.
+        on_failure: Hears why there is nothing to paint, from another thread.
+        failure: The same, afterwards.
     """
 
     def __init__(
@@ -48,6 +53,8 @@ class Studio:
     ) -> None:
         self.subjects, self._open_store = tuple(subjects), open_store
         self.on_message: Callable[[Message], None] | None = None
+        self.on_failure: Callable[[Exception], None] | None = None
+        self.failure: Exception | None = None
         self.pictures = Pictures()
         self._session: Session | None = None
         self._looks: Looks | None = None
@@ -214,15 +221,24 @@ class Studio:
         except StoppedError:
             pass
         except Exception as error:
-            self._failed = told(error)
+            is_told = self._session is None and self.on_failure is not None
+            self._failed = told(error, at_length=not is_told)
             self.tell(Message("say", {"text": self._failed, "tone": "warn"}))
             if self._session is None:
+                self.failure = error
                 self.tell(self.state())
+            if is_told and self._is_open:
+                self.on_failure(error)  # type: ignore[misc]
 
     def _take(self, bases: Sequence[Basis]) -> None:
         """Paint on with these bases."""
-        presents = [denoised(basis.present_look, basis.features) for basis in bases]
         first = self.subjects[0]
+        is_kept = first.settings.use_cache
+        clean = [kept_planes(basis) if is_kept else None for basis in bases]
+        presents = [
+            denoised(basis.present_look, basis.features) if planes is None else planes.present
+            for basis, planes in zip(bases, clean, strict=True)
+        ]
         with self._lock:
             if not self._is_open:
                 raise StoppedError
@@ -240,8 +256,8 @@ class Studio:
             else:
                 self._session.improve(bases, presents)
             session = self._session
-            for view in session.views:
-                offer_view(self.pictures, view, session.transform)
+            for view, planes in zip(session.views, clean, strict=True):
+                offer_view(self.pictures, view, session.transform, planes)
             offer_transforms(self.pictures, self._transforms(session))
         self.tell(self.state())
         self._settling.ring()
@@ -277,13 +293,21 @@ class Studio:
         session = self.session
         bases = [view.basis for view in session.views]
         for view, basis in zip(session.views, bases, strict=True):
-            if not basis.knows_noise:
-                continue
-            for k in range(len(basis.images)):
-                if not self._is_open or view.basis is not basis:
-                    return
-                clean = clean_plane(basis, k)
-                self.put(of_view(f"clean/{k}", view.view), clean)
+            is_there = of_view("clean/0", view.view) in self.pictures.generations
+            if basis.knows_noise and not is_there and not self._clean_view(view, basis):
+                return
+
+    def _clean_view(self, view: Canvas, basis: Basis) -> bool:
+        """Those of one view, which are kept. Returns whether they are wanted to the end."""
+        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        for k in range(len(basis.lights)):
+            if not self._is_open or view.basis is not basis:
+                return False
+            halves[k], scales[k] = clean_plane(basis, k)
+            self.put(of_view(f"clean/{k}", view.view), halves[k])
+        if self.subjects[0].settings.use_cache:
+            keep_planes(basis, CleanPlanes(halves, scales, view.present))
+        return True
 
     def _find(self) -> None:
         """The exact answer, then what is known of it."""

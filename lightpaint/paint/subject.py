@@ -1,20 +1,21 @@
 """What is painted: a scene, a saved basis, or light groups; and how its lights come to be known."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.known import Known
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint.opening import Opening
 from lightpaint.paint.wishes import Wishes
-from lightpaint.pipeline import obtain
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene
@@ -28,17 +29,18 @@ FIRST = (2, 8, 32, 128)
 class Subject:
     """One view to be painted, alone or among others.
 
-    source: as it was named, for people and for command lines. scene: on the film of the basis;
-    None without a renderer. basis: where there is one already, as of light groups. settings,
-    constraints: how paintings are answered. choice: of a view transform, to paint through. folder:
-    receives what is exported. command: that answers exported paintings as a session does in which
-    this is wished; their paths by sensor, "" for that of the only view; "" where there are no
-    commands. among: how many views the time is for in which bases are rendered.
+    source: as it was named, for people and for command lines. scene: on the film of the basis, or
+    one that is loaded when it is needed; None without a renderer. basis: where there is one
+    already, as of light groups. settings, constraints: how paintings are answered. choice: of a
+    view transform, to paint through. folder: receives what is exported. command: that answers
+    exported paintings as a session does in which this is wished; their paths by sensor, "" for that
+    of the only view; "" where there are no commands. among: how many views the time is for in which
+    bases are rendered.
     """
 
     source: str
     folder: Path
-    scene: Scene | None = None
+    scene: Scene | Opening | None = None
     basis: Basis | None = None
     groups: LightGroups | None = None
     settings: Settings = field(default_factory=Settings)
@@ -53,12 +55,15 @@ class Subject:
         return called(Path(self.source))
 
     @property
-    def sensor(self) -> str:
-        """That it is seen through."""
-        if self.scene is not None:
-            return self.scene.sensor_names[self.scene.sensor]
-        assert self.basis is not None
-        return self.basis.origin.sensor
+    def loaded(self) -> Scene:
+        """Its scene, which it has; loaded if it is not yet. Raises LightpaintError."""
+        assert self.scene is not None
+        return self.scene.scene if isinstance(self.scene, Opening) else self.scene
+
+    @property
+    def known(self) -> Known | None:
+        """What is known of a scene that need not be loaded for it."""
+        return self.scene.known if isinstance(self.scene, Opening) else None
 
     @property
     def wanted(self) -> int | None:
@@ -67,15 +72,20 @@ class Subject:
             return None
         settings = self.settings
         asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
-        return asked or self.scene.spp
+        return asked or (self.known or self.loaded).spp
 
     def bases(self, progress: Progress = silent) -> Iterator[Basis]:
         """Its basis; where it is still to be rendered, first ones of few samples."""
         if self.basis is not None:
             yield self.basis
             return
-        assert self.scene is not None
-        scene, settings, wanted = self.scene, self.settings, self.wanted or 1
+        if (kept := self._kept()) is not None:
+            yield kept
+            return
+        # What renders is not needed for a basis that is there.
+        from lightpaint.pipeline import obtain
+
+        scene, settings, wanted = self.loaded, self.settings, self.wanted or 1
         sensor = scene.sensor_names[scene.sensor]
         kept = cache.find(scene.identity, sensor, settings.seed, scene.size)
         has = 0 if kept is None or not settings.use_cache else kept.origin.spp
@@ -83,14 +93,35 @@ class Subject:
             for spp in FIRST:
                 if has < spp < wanted:
                     yield self._obtained(spp, progress)
-        yield obtain(scene, settings, progress, views=self.among).asking(scene.asked)
+        basis = obtain(scene, settings, progress, views=self.among)
+        if isinstance(self.scene, Opening):
+            self.scene.remember(basis)
+        yield basis.asking(scene.asked)
+
+    def _kept(self) -> Basis | None:
+        """The basis of a scene that is known, if all of it is kept."""
+        known, settings = self.known, self.settings
+        if known is None or settings.time_s is not None or settings.exact_spp:
+            return None
+        kept = cache.find(known.identity, known.sensor, settings.seed, known.size)
+        names = tuple(light.name for light in known.lights)
+        if kept is None or kept.names != names or kept.origin.spp < (self.wanted or 1):
+            return None
+        if kept.features is None or kept.objects is None:  # by an earlier version
+            return None
+        return replace(kept, lights=known.lights, asked=known.asked)
 
     def _obtained(self, spp: int, progress: Progress) -> Basis:
         from lightpaint.basis.render.obtain import obtain_basis
 
-        assert self.scene is not None
-        basis = obtain_basis(self.scene, spp=spp, seed=self.settings.seed, progress=progress)
-        return basis.asking(self.scene.asked)
+        scene = self.loaded
+        basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
+        return basis.asking(scene.asked)
+
+
+def painting_of(folder: Path, sensor: str) -> Path:
+    """Where the painting of a view is exported to. sensor: "" of the only one."""
+    return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
 
 
 def bases_of(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:

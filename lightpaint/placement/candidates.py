@@ -12,11 +12,11 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import block_mean, whole_factor
-from lightpaint.lighting.algebra.threads import one_thread
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.solution import Solution
+from lightpaint.threads import one_thread
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.looks import Looks
 from lightpaint.report.pictures import (
+    Residual,
     diverging,
     painted,
     residual_of,
@@ -53,6 +54,7 @@ def comparison_image(
     verified: Floats | None,
     seen: Seen | None = None,
     looks: Looks | None = None,
+    missed: Residual | None = None,
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
@@ -60,7 +62,8 @@ def comparison_image(
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target, of raw data; pixels that
     do not count are grey, dim and hatched. seen: what `what_is_seen` says, where somebody has
-    looked. looks: what to show instead of raw renders.
+    looked. looks: what to show instead of raw renders. missed: what
+    `residual_of` says.
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
@@ -92,7 +95,7 @@ def comparison_image(
                 transform.encode(looks.verified),
             )
         )
-    missed = residual_of(solution, predicted, transform=transform)
+    missed = missed or residual_of(solution, predicted, transform=transform)
     picture = residual_picture(missed, solution, looks.current, transform=transform)
     detail = f"luminance, predicted - target{missed.spoken}"
     tiles.append(Tile("residual", detail, picture, missed.limit))

@@ -29,8 +29,10 @@ def emitters_in_view(target: Target, solution: Solution, predicted: Estimate) ->
             *_too_bright(target, solution, predicted, out),
         ]
     counted = seen & painted
+    if not counted.any():
+        return []
     energy = target.importance[..., None] * np.square(target.image, dtype=np.float64)
-    if counted.any() and (part := energy[counted].sum() / (energy.sum() or 1)) >= MOST:
+    if (part := energy[counted].sum() / (energy.sum() or 1)) >= MOST:
         return [
             f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted energy "
             'and rule the fit: emitters="skip" leaves them out'

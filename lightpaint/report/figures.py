@@ -13,16 +13,17 @@ from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import denoised
 from lightpaint.images.png import png_bytes
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.pictures import (
     DIVERGING,
+    Residual,
     diverging,
     importance_picture,
     residual_of,
     residual_picture,
 )
+from lightpaint.threads import side_by_side
 
 #: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
 UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
@@ -32,6 +33,9 @@ SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGIN
 
 #: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
 LARGEST_PNG = 150_000
+
+#: Lines of a picture in a row that tell how well they pack.
+STRIP = 8
 
 #: JPEG quality of pictures with their noise, which is what takes the room.
 RAW_QUALITY = 75
@@ -69,9 +73,9 @@ def data_uri(
 
 def _small_png(image_8_bit: npt.NDArray[np.uint8], largest: int) -> bytes | None:
     """A picture as a PNG of that many bytes at most, if it can be one."""
-    # A quarter of it tells what will be far too large.
-    quarter = image_8_bit[: -(-len(image_8_bit) // 4)]
-    if largest == 0 or len(png_bytes(quarter)) > 0.5 * largest:
+    # Every fourth strip of it tells what will be too large.
+    quarter = image_8_bit[np.arange(len(image_8_bit)) // STRIP % 4 == 0]
+    if largest == 0 or len(png_bytes(quarter)) > 0.3 * largest:
         return None
     data = png_bytes(image_8_bit)
     return data if len(data) <= largest else None
@@ -166,12 +170,14 @@ def maps(
     *,
     verification: Verification | None,
     transform: ViewTransform,
+    missed: Residual | None = None,
 ) -> str:
     """False-colour pictures: what is missed, what counts, and where the render disagrees.
 
-    predicted: (h, w, 3) linear, as rendered; current: behind what does not count.
+    predicted: (h, w, 3) linear, as rendered; current: behind what does not count. missed: what
+    `residual_of` says.
     """
-    missed = residual_of(solution, predicted, transform=transform)
+    missed = missed or residual_of(solution, predicted, transform=transform)
     picture = residual_picture(missed, solution, current, transform=transform)
     figures = [
         figure(

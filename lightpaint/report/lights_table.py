@@ -13,7 +13,6 @@ from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.photometry import Photometry
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
@@ -29,6 +28,7 @@ from lightpaint.report.sentences import (
     spoken_percent,
     unreached_channels,
 )
+from lightpaint.threads import side_by_side
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (

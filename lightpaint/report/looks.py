@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes, clean_planes
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.denoise import DENOISED_KEY, Features, denoised, how_denoised
 
@@ -35,32 +36,42 @@ class Looks:
     """Current look, prediction and verification, (h, w, 3) linear.
 
     verified: None where there is none. texts: what a PNG of them says of itself; none where they
-    are as they were rendered. encoders: what has encoded them.
+    are as they were rendered. planes: what each light does, where that is without its grain, too.
+    encoders: what has encoded them.
     """
 
     current: Floats
     predicted: Floats
     verified: Floats | None
     texts: dict[str, str]
+    planes: CleanPlanes | None = field(default=None, compare=False, repr=False)
     encoders: dict[ViewTransform, Encoder] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def clean(
         cls,
         basis: Basis,
+        weights: Doubles,
         predicted: Floats,
         verified: Floats | None,
         *,
         larger: Features | None = None,
     ) -> "Looks":
-        """Without their grain. larger: of a verification that has another size than the basis."""
-        present = basis.present_look
+        """Without their grain.
+
+        weights: (n, 3), of which `predicted` is the sum. larger: of a verification that has another
+        size than the basis.
+        """
         features = basis.features
         if verified is not None:
             verified = denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = how_denoised(features, raw=raw)
-        return cls(denoised(present, features), denoised(predicted, features), verified, texts)
+        if (planes := clean_planes(basis)) is None:
+            shown = denoised(basis.present_look, features), denoised(predicted, features)
+        else:
+            shown = planes.present, planes.mix(weights)
+        return cls(*shown, verified, texts, planes)
 
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "Looks":

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes
 from lightpaint.browser import bundled, styles
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display import to_8_bit
@@ -28,6 +29,7 @@ from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED
 from lightpaint.report.figures import ENOUGH, data_uri
 from lightpaint.report.measures import that_do_most
+from lightpaint.threads import side_by_side
 
 #: Pixels of a plane from left to right, and of all planes together, at most.
 WIDEST, MOST_PIXELS = 480, 1_000_000
@@ -53,6 +55,7 @@ def mixer_html(
     *,
     transform: ViewTransform | None = None,
     is_clean: bool = False,
+    planes: CleanPlanes | None = None,
     scene: str | None = None,
     title: str = "Light mixer",
 ) -> str:
@@ -64,15 +67,16 @@ def mixer_html(
         painting: (h, w, 3) display values, to be wiped over the mix.
         transform: What the mix is seen through.
         is_clean: Whether planes are denoised.
+        planes: They, where that has been done.
         scene: For the command line; None where there is no scene to relight.
         title: Heading.
     """
     shown = that_do_most(basis, lighting)
-    pictures = _pictures(basis, lighting, shown, is_clean=is_clean)
+    pictures = _pictures(basis, lighting, shown, planes=planes, is_clean=is_clean)
     transform = transform or ViewTransform()
     data = {
         "size": list(pictures[0].shape[:2]),
-        "planes": [_written(compact(picture)) for picture in pictures],
+        "planes": side_by_side(lambda picture: _written(compact(picture)), pictures),
         "lights": [_light(basis, lighting, k) for k in shown],
         "rest": _rest(basis, lighting, shown),
         "kelvins": _kelvins(),
@@ -107,20 +111,32 @@ def _factor(basis: Basis, count: int) -> int:
     return min(factor, height, width)
 
 
-def _pictures(basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool) -> list[Floats]:
+def _pictures(
+    basis: Basis,
+    lighting: Lighting,
+    shown: Indices,
+    *,
+    planes: CleanPlanes | None,
+    is_clean: bool,
+) -> list[Floats]:
     """Of each light its plane; then all others, as they are in the answer and at present."""
     rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
     factor = _factor(basis, len(shown) + 2 * bool(rest.size))
-    planes = [basis.images[k] for k in shown]
-    for weights in (lighting.weights_for(basis), basis.present_weights) if rest.size else ():
-        its = np.zeros_like(weights)
-        its[rest] = weights[rest]
-        planes.append(mix(basis.images, its))
-    small = [np.asarray(block_mean(plane, factor), np.float32) for plane in planes]
-    if not is_clean or factor >= ENOUGH:
-        return small
+    looks = [lighting.weights_for(basis), basis.present_weights] if rest.size else []
+    looks = [np.where(np.isin(np.arange(len(x)), rest)[:, None], x, 0) for x in looks]
+
+    def small(k: int) -> Floats:
+        if k < len(shown):
+            plane = planes.plane(shown[k]) if planes else basis.images[shown[k]]
+        else:
+            plane = (planes or basis).mix(looks[k - len(shown)])
+        return np.asarray(block_mean(plane, factor), np.float32)
+
+    pictures = side_by_side(small, range(len(shown) + len(looks)))
+    if not is_clean or planes or factor >= ENOUGH:
+        return pictures
     features = basis.features and basis.features.reduced(factor)
-    return [denoised(plane, features) for plane in small]
+    return [denoised(picture, features) for picture in pictures]
 
 
 def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:

@@ -32,7 +32,7 @@ from lightpaint.report.measures import (
     noise_residual,
     relative_residual,
 )
-from lightpaint.report.pictures import brighter_than_white, residual_of, transform_of
+from lightpaint.report.pictures import Residual, brighter_than_white, residual_of, transform_of
 from lightpaint.report.sentences import (
     UNTOLD_HERE,
     brightness,
@@ -60,11 +60,12 @@ def report_numbers(
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
     color_choices: Choices = (),
+    missed: Residual | None = None,
 ) -> str:
     """JSON of the numbers of `report_page`, whose arguments these are."""
     verified = None if verification is None else verification.verified.image
     transform = transform_of(target, predicted.image, verified)
-    residual = residual_of(solution, predicted.image, transform=transform)
+    residual = missed or residual_of(solution, predicted.image, transform=transform)
     told = {
         "format": FORMAT,
         "lightpaint": __version__,

@@ -5,7 +5,8 @@ are data: URIs; nothing is loaded from anywhere, and the page's own content poli
 """
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from html import escape
 from importlib import resources
 from string import Template
@@ -31,11 +32,17 @@ from lightpaint.report.lights_table import lights_table
 from lightpaint.report.looks import Looks
 from lightpaint.report.meant import spoken_meaning
 from lightpaint.report.mixer import mixer_assets, mixer_html
-from lightpaint.report.pictures import brighter_than_white, target_picture, transform_of
+from lightpaint.report.pictures import (
+    Residual,
+    brighter_than_white,
+    target_picture,
+    transform_of,
+)
 from lightpaint.report.suggestion import suggestion_section
 from lightpaint.report.tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.verdict import verdict
 from lightpaint.target.target import Target
+from lightpaint.threads import side_by_side
 
 
 def report_page(
@@ -53,6 +60,7 @@ def report_page(
     seen: Seen | None = None,
     looks: Looks | None = None,
     color_choices: Choices = (),
+    missed: Residual | None = None,
 ) -> str:
     """The page as HTML text.
 
@@ -61,7 +69,7 @@ def report_page(
     uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
     what they tell. seen: what `what_is_seen` says, where somebody has looked.
     looks: the pictures without their grain, which then have it on a switch. color_choices: what
-    other colours would come to, if that is known.
+    other colours would come to, if that is known. missed: what `residual_of` says.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -72,6 +80,27 @@ def report_page(
     transform = looks.through(transform_of(target, predicted.image, verified))
     current = looks.current
     template = resources.files("lightpaint.report").joinpath("page.html.in")
+    # Pictures take the time, and none waits for another.
+    making: tuple[Callable[[], str], ...] = (
+        partial(_mixer, basis, target, solution, looks, transform=transform),
+        partial(
+            maps,
+            solution,
+            predicted.image,
+            current,
+            verification=verification,
+            transform=transform,
+            missed=missed,
+        ),
+        partial(_wipe, target, solution, looks, raw, transform=transform),
+        partial(missed_section, solution, diagnosis, current, transform=transform),
+        partial(
+            constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
+        ),
+        partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
+    )
+    made = side_by_side(lambda make: make(), making)
+    mixer, of_pixels, pictures, what_is_missed, constraints, lights = made
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(f"{target.name} · {basis.origin.scene}"),
         target=escape(target.name),
@@ -79,14 +108,10 @@ def report_page(
         verdict=escape(verdict(solution, predicted, verification, seen=seen)),
         meant=escape(spoken_meaning(solution)),
         banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
-        wipe=wipe(_pictures(target, solution, looks, raw, transform=transform)),
+        wipe=pictures,
         exposure=_exposure(transform, predicted.image, looks.how),
-        maps=maps(
-            solution, predicted.image, current, verification=verification, transform=transform
-        ),
-        missed=missed_section(solution, diagnosis, current, transform=transform)
-        + constraints_section(basis, solution, unconstrained, transform=transform, looks=looks)
-        + colors_section(color_choices),
+        maps=of_pixels,
+        missed=what_is_missed + constraints + colors_section(color_choices),
         suggestions=suggestion_section(
             suggestions,
             transform=transform,
@@ -94,21 +119,21 @@ def report_page(
             is_clean=looks.is_clean,
         ),
         sure=sure_section(basis, solution, uncertainty),
-        lights=lights_table(basis, solution, uncertainty, is_clean=looks.is_clean),
+        lights=lights,
         fit=fit_table(solution),
         verification=verification_table(verification),
         render=render_table(basis, target, solution, predicted, verification),
-        mixer=_mixer(basis, target, solution, looks, transform=transform) + mixer_assets(),
+        mixer=mixer + mixer_assets(),
         command=escape(command or "(made from Python, without a command line)"),
         again=_paint_again(basis, target, verification),
         versions=escape(versions(basis)),
     )
 
 
-def _pictures(
+def _wipe(
     target: Target, solution: Solution, looks: Looks, raw: Looks, *, transform: ViewTransform
-) -> list[Picture]:
-    """What can be put side by side under the wipe, in the order of its lists."""
+) -> str:
+    """What can be put side by side, in the order of its lists."""
 
     def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> Picture:
         size = looks.predicted.shape[:2]
@@ -132,7 +157,7 @@ def _pictures(
     if looks.verified is not None and raw.verified is not None:
         about = "An independent render of the relit scene."
         pictures.append(picture("verified", about, looks.verified, raw.verified))
-    return pictures
+    return wipe(pictures)
 
 
 def _mixer(
@@ -146,6 +171,7 @@ def _mixer(
         target_picture(target, solution, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
+        planes=looks.planes,
         scene=shlex.quote(scene) if scene.endswith(".xml") else None,
     )
 

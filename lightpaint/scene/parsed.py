@@ -231,14 +231,31 @@ class ParsedScene:
 
     def assets(self) -> Iterator[Path]:
         """Files that plugins read: meshes, textures, tables."""
+        for name in self._asset_names():
+            path = Path(str(self.resolver.resolve(name)))
+            if path.is_file():
+                yield path
+
+    def _asset_names(self) -> Iterator[str]:
+        """As they stand in the scene."""
         import mitsuba as mi
 
         for node in self.state.nodes:
             for key in node.props:
                 if "file" in key and node.props.type(key) == mi.Properties.Type.String:
-                    path = Path(str(self.resolver.resolve(node.props[key])))
-                    if path.is_file():
-                        yield path
+                    yield str(node.props[key])
+
+    def places(self) -> set[Path]:
+        """Everywhere that its files are, or would be found if there were any.
+
+        More than Mitsuba looks at: wherever it looks for one file it may look for each of them.
+        """
+        folders = {Path(str(self.resolver[k])) for k in range(len(self.resolver))}
+        folders |= {file.parent for file in self.files}
+        there = {*self.files, *self.assets()}
+        names = {Path(name) for name in self._asset_names()}
+        names |= {x.relative_to(y) for x in there for y in folders if x.is_relative_to(y)}
+        return there | {folder / name for folder in folders for name in names}
 
     @contextmanager
     def _resolving(self) -> Iterator[None]:

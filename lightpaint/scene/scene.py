@@ -25,7 +25,7 @@ from lightpaint.scene.emitters import Emitter, check_emitters, find_emitters, po
 from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
-from lightpaint.scene.lights_file import Asked, lights_file_for
+from lightpaint.scene.lights_file import Asked, lights_file_beside, lights_file_for
 from lightpaint.scene.parsed import ParsedScene, mitsuba_errors
 from lightpaint.scene.shapes import shape_names
 from lightpaint.scene.variant import use_variant
@@ -194,6 +194,12 @@ class Scene(Shown):
     def read_files(self) -> tuple[Path, ...]:
         """`originals`, and the lights file."""
         return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
+
+    @property
+    def places(self) -> frozenset[Path]:
+        """Where its files are, and where another one would make it another scene."""
+        beside = self.lights_file or lights_file_beside(self.path)
+        return frozenset({*self._parsed.places(), beside})
 
     def moved(self, old: Path, new: Path) -> "Scene":
         """This scene, when the folder `old`, in which its XML lies, has been moved to `new`."""

@@ -16,7 +16,7 @@ from command import spawn
 import lightpaint as lp
 from lightpaint.images.exr import write_rgb
 from lightpaint.images.picture import read_picture
-from lightpaint.lighting.algebra.threads import linear_algebra
+from lightpaint.threads import linear_algebra
 
 #: A kernel that every processor of this kind can run, and none has chosen for forty releases.
 OTHER = "Nehalem"

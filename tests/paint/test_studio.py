@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint import protocol
@@ -135,7 +136,11 @@ def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
     assert any(light["error"] for light in fields["lights"])
 
 
-def test_clean_planes_come_later_and_keep_the_light(heard: Heard, basis: lp.Basis):
+def test_clean_planes_come_later_and_keep_the_light(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    heard = Heard(tmp_path / "first", basis)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     state = heard.studio.state().fields
     for k, light in enumerate(state["lights"]):
@@ -146,9 +151,43 @@ def test_clean_planes_come_later_and_keep_the_light(heard: Heard, basis: lp.Basi
         # Half floats have 11 bits; a denoiser may move light, and not make any.
         np.testing.assert_allclose(raw, basis.images[k], rtol=2**-11, atol=1e-7)
         assert clean.mean() == pytest.approx(raw.mean(), rel=0.1)
-    np.testing.assert_allclose(
-        heard.studio.resource("painting"), heard.studio.session.views[0].image
-    )
+    [view] = heard.studio.session.views
+    np.testing.assert_allclose(heard.studio.resource("painting"), view.image)
+    until = time.monotonic() + 30
+    while not kept_planes(basis) and time.monotonic() < until:
+        time.sleep(0.01)
+    # The next session has the same at once, and one of other pixels has not.
+    again = Heard(tmp_path / "again", basis)
+    first = again.wait(lambda m: m.kind == "state").fields
+    for k in range(len(basis.lights)):
+        assert f"clean/{k}" in first["resources"]
+        same = (one.studio.resource(f"clean/{k}") for one in (heard, again))
+        np.testing.assert_array_equal(*same)
+    np.testing.assert_array_equal(again.studio.session.views[0].present, view.present)
+    assert kept_planes(replace(basis, images=2 * basis.images)) is None
+    for one in (heard, again):
+        one.studio.close()
+
+
+def test_kept_pictures_that_are_damaged_are_made_again(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    scales = np.ones(len(basis.lights))
+    clean = CleanPlanes(basis.images.astype(np.float16), scales, basis.present_look)
+    assert kept_planes(basis) is None
+    assert keep_planes(basis, clean)
+    [path] = tmp_path.iterdir()
+    data = path.read_bytes()
+    for damage in (b"", b"no file", data[: len(data) // 2], data[:2000] + bytes(99) + data[2099:]):
+        path.write_bytes(damage)
+        assert kept_planes(basis) is None
+    assert keep_planes(basis, replace(clean, halves=clean.halves[:1]))
+    assert kept_planes(basis) is None
+    assert keep_planes(basis, clean)
+    found = kept_planes(basis)
+    assert found is not None
+    np.testing.assert_array_equal(found.halves, clean.halves)
 
 
 def test_a_look_is_gone_back_to_and_undone(heard: Heard):

@@ -14,7 +14,7 @@ from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.nearest import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED, Cap, Quadratic, scaled
-from lightpaint.lighting.algebra.threads import one_thread, side_by_side
+from lightpaint.threads import one_thread, side_by_side
 
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]

@@ -1,15 +1,19 @@
 """All that is asked of an answer, once: how sure it is, why it is not closer, and at what cost."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
-from lightpaint.lighting.analysis.color_choices import Choices, color_choices
+from lightpaint.lighting.analysis.color_choices import Choices, best_of_each, color_choices
 from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
+from lightpaint.threads import side_by_side
 
 
 @dataclass(frozen=True)
@@ -56,18 +60,28 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
         >>> analysis.uncertainty.standard_error.shape
         (2, 3)
     """
-    uncertainty = error_bars(solution)
+    views = solution.views
+    asked: list[Callable[[], Any]] = [partial(what_is_seen, view) for view in views]
+    asked += [partial(diagnose, view) for view in views]
+    asked += [partial(error_bars, solution), partial(best_of_each, solution)]
+    asked += [partial(_alike, solution)]
+    asked += [partial(without_constraints, view) for view in views]
+    # None of them needs another, and each leaves a processor idle now and then.
+    answers = iter(side_by_side(lambda ask: ask(), asked))
+    seen, diagnoses = ([next(answers) for _ in views] for _ in range(2))
+    uncertainty, best, alike = next(answers), next(answers), next(answers)
     solution = with_error_bars(solution, uncertainty)
-    alike = () if solution.problem.asks else ambiguities(solution)
-    looks = [what_is_seen(view) for view in solution.views]
-    choices = color_choices(solution, [seen.delta_e for seen in looks])
+    choices = color_choices(solution, [its.delta_e for its in seen], best)
     found = []
-    for view, seen, its in zip(solution.views, looks, choices, strict=True):
-        diagnosis = diagnose(view)
-        told = view.told(bounds=diagnosis.bounds, **_numbers(seen))
-        free = without_constraints(view)
-        found.append(Analysis(told, uncertainty, diagnosis, seen, alike, free, its))
+    for view, its, diagnosis, colors in zip(solution.views, seen, diagnoses, choices, strict=True):
+        told = view.told(bounds=diagnosis.bounds, **_numbers(its))
+        free = next(answers)
+        found.append(Analysis(told, uncertainty, diagnosis, its, alike, free, colors))
     return tuple(found)
+
+
+def _alike(solution: Solution) -> tuple[Ambiguity, ...]:
+    return () if solution.problem.asks else ambiguities(solution)
 
 
 def with_findings(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:

@@ -5,7 +5,7 @@ found over a sample of its pixels, that of the answer too, so that what the samp
 both, and cancels.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import get_args
@@ -73,24 +73,34 @@ class ColorChoice:
 Choices = tuple[ColorChoice, ...]
 
 
-def color_choices(solution: Solution, delta_e: Sequence[float]) -> tuple[Choices, ...]:
+def color_choices(
+    solution: Solution, delta_e: Sequence[float], best: Mapping[Colors, Doubles] | None = None
+) -> tuple[Choices, ...]:
     """Of each view, what `free`, `gentle` and `white` come to.
 
-    delta_e: of the answer, of each view. Nothing where no light may have another colour than it
-    has, and of pictures without colour.
+    delta_e: of the answer, of each view. best: what `best_of_each` found, where somebody has asked
+    it. Nothing where no light may have another colour than it has, and of pictures without colour.
     """
+    best = best_of_each(solution) if best is None else best
+    if not best:
+        return tuple(() for _ in solution.views)
+    return tuple(
+        _seen_in(view, its, best) for view, its in zip(solution.views, delta_e, strict=True)
+    )
+
+
+def best_of_each(solution: Solution) -> dict[Colors, Doubles]:
+    """The best weights, (n, 3), with each choice of `colors`; none where there is no choice."""
     problem = solution.problem
     is_grey = problem.equations.reached.any(axis=0).sum() < 2
-    if is_grey or not _with_colors(problem, "free").keeps_color.any():
-        return tuple(() for _ in solution.views)
-    best = _finder(solution)
     found: dict[Colors, Doubles] = {}
+    if is_grey or not _with_colors(problem, "free").keeps_color.any():
+        return found
+    best = _finder(solution)
     for colors in get_args(Colors):
         with suppress(ConstraintError):  # what else is asked of a light may be no white
             found[colors] = best(_with_colors(problem, colors))
-    return tuple(
-        _seen_in(view, its, found) for view, its in zip(solution.views, delta_e, strict=True)
-    )
+    return found
 
 
 def _finder(solution: Solution) -> Callable[[Problem], Doubles]:
@@ -134,7 +144,7 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     return replace(problem, fit=fit, full=full, reduction=reduction)
 
 
-def _seen_in(view: Solution, delta_e: float, found: dict[Colors, Doubles]) -> Choices:
+def _seen_in(view: Solution, delta_e: float, found: Mapping[Colors, Doubles]) -> Choices:
     look = Looking.at(view.problem, most=LOOKED_AT)
     rows = look.rows(view.basis.images)
 

@@ -21,7 +21,7 @@ from lightpaint.target.target import Target
 Held = Literal["hold", "colors", "constraints", "views"]
 
 #: Painted pixels, and others, that are enough to tell, of all views together.
-ENOUGH = 2**12
+ENOUGH = 2**11
 
 #: By how much closer the painting must be without it, in ΔE and of what is missed.
 CLOSER, CLOSER_SHARE = 1.0, 0.2

@@ -70,15 +70,26 @@ class Looking:
 
     def missed(self, pixels: Doubles) -> Doubles:
         """(p,), how far light (p, 3) looks from the paint."""
-        return self.apart(pixels, self.meant(pixels))
-
-    def apart(self, one: Doubles, other: Doubles) -> Doubles:
-        """CIEDE2000, (p,), between light (p, 3) as it is displayed."""
-        return ciede2000(self.lab(one), self.lab(other))
+        return ciede2000(self.lab(pixels), self.lab_meant(pixels))
 
     def lab(self, pixels: Doubles) -> Doubles:
         """L*a*b* (p, 3) of what a display shows of light (p, 3)."""
+        if self.transform.name == "srgb":  # encoded and decoded, it is the light itself
+            return lab(np.clip(pixels * 2.0**self.transform.stops, 0, 1))
         return lab(decode_display(self.transform.encode(pixels)))
+
+    def lab_meant(self, pixels: Doubles) -> Doubles:
+        """L*a*b* (p, 3) of `meant`."""
+        return self.lab(self.meant(pixels)) if self._moves else self._painted_lab
+
+    @cached_property
+    def _moves(self) -> bool:
+        """Whether what is meant follows the light anywhere."""
+        return bool(self.at_least[self.counts].any())
+
+    @cached_property
+    def _painted_lab(self) -> Doubles:
+        return self.lab(self.painted[self.counts].astype(np.float64))
 
     def mean(self, values: Doubles) -> float:
         """Of the painted pixels, (p,), weighted by importance."""

@@ -12,10 +12,10 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import mix
-from lightpaint.lighting.algebra.threads import one_thread
 from lightpaint.lighting.analysis.peaks import Peaks
 from lightpaint.lighting.normal_equations import BLOCK, FEW_LIGHTS, NormalEquations
 from lightpaint.lighting.solution import Solution
+from lightpaint.threads import one_thread
 
 #: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
 #: the estimate of it is itself noise, and what is left of M would soon be indefinite.

@@ -150,7 +150,7 @@ def _missed(look: Looking, light: Doubles, grain: Doubles) -> tuple[Doubles, Dou
     over the same renders shares their noise: it explains no more than is left between the pixels
     when their mean is taken out, which noise hardly moves.
     """
-    of_light, of_paint = look.lab(light), look.lab(look.meant(light))
+    of_light, of_paint = look.lab(light), look.lab_meant(light)
     whole = look.in_blocks(ciede2000(of_light, of_paint))
     if not grain.any():
         return whole, whole

@@ -13,11 +13,11 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.optimum import Method, Optimum, minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import Cap, moved_along
-from lightpaint.lighting.algebra.threads import side_by_side
 from lightpaint.lighting.constraints.blocks import Block
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.threads import side_by_side
 
 #: Pull of what reaches nothing in one channel towards its start, beside its other channels.
 FAINT = 1e-8

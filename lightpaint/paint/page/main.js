@@ -9,5 +9,5 @@ if (element) {
   const engine = openEngine(host);
   // For whoever measures it, and for the console.
   Object.assign(element, { painter: { host, engine } });
-  await mount(element, host, { global: true, engine });
+  void mount(element, host, { global: true, engine });
 }

@@ -15,6 +15,17 @@ import { GROUND, SQUARES, panes } from './view.js';
 
 const OVERLAYS = { falsecolor: 1, missed: 2, importance: 3, beyond: 4 };
 
+/** Names of renderers that draw with the processor: of these no frame has to be timed. */
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+
+/** @param {WebGL2RenderingContext} gl */
+function isSoftware(gl) {
+  const told = String(gl.getParameter(gl.RENDERER));
+  // Some browsers hide the name behind an extension, of which others say that it is old.
+  const info = told.startsWith('WebKit') ? gl.getExtension('WEBGL_debug_renderer_info') : null;
+  return SOFTWARE.test(info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : told);
+}
+
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class GlView {
   /** Throws where there is no WebGL2 that renders to halves.
@@ -33,6 +44,10 @@ export class GlView {
       failIfMajorPerformanceCaveat: options.isSlowRefused ?? false,
     });
     if (!gl) throw new Error('no WebGL2');
+    if (options.isSlowRefused && isSoftware(gl)) {
+      gl.getExtension('WEBGL_lose_context')?.loseContext();
+      throw new Error('WebGL2 in software');
+    }
     this.gl = gl;
     this.isLost = false;
     canvas.addEventListener('webglcontextlost', (event) => {

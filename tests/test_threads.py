@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from lightpaint.lighting.algebra.threads import one_thread, side_by_side
 from lightpaint.lighting.normal_equations import inner_products
+from lightpaint.threads import one_thread, side_by_side
 
 
 def _threads() -> set[int]:

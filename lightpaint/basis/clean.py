@@ -1,0 +1,168 @@
+"""Planes of a basis without their grain, kept from earlier runs.
+
+Light adds, so the sum of clean planes is a clean picture of any lighting, for the price of a sum;
+beside a render of many samples it is a little nearer than the sum denoised is. Only for eyes: what
+is solved is the basis as it was rendered. They are kept where bases are, by the content of what
+they were made of, and may be deleted at any time.
+"""
+
+import hashlib
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.errors import LightpaintError
+from lightpaint.files import replacing
+from lightpaint.images.denoise import denoised, how_denoised, is_there
+from lightpaint.threads import side_by_side
+
+FORMAT, PARTS = "lightpaint-clean 1", ("halves", "scales", "present")
+
+#: Pixels of all planes below which a sum is denoised as soon as planes are read, up to which they
+#: are made where they are wanted, and up to which a render is followed by them.
+FEWEST, MOST_WANTED, MOST = 2**18, 2**22, 2**24
+
+#: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
+#: precision.
+BRIGHTEST = 1024.0
+
+#: Rows of planes that are brought to single precision at a time.
+STRIP = 64
+
+#: What comes of reading a file that is cut off, or another one.
+_DAMAGES = (
+    *(OSError, EOFError, LookupError, MemoryError, NotImplementedError, RuntimeError, ValueError),
+    zipfile.BadZipFile,
+)
+
+Halves = npt.NDArray[np.float16]
+
+
+@dataclass(frozen=True)
+class CleanPlanes:
+    """What each light does, for eyes.
+
+    halves: (n, h, w, 3) float16, linear, at unit emission over `scales`. scales: (n,), powers of 2.
+    present: (h, w, 3) float32, the scene as it is: their sum, or the sum denoised where that came
+    first, so that who paints over it goes on from what was there.
+    """
+
+    halves: Halves
+    scales: Doubles
+    present: Floats
+
+    @classmethod
+    def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "CleanPlanes":
+        """With what their sum shows of the scene as it is."""
+        return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
+
+    def mix(self, weights: Doubles) -> Floats:
+        """Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
+        return _mixed(self.halves, self.scales, weights)
+
+    def plane(self, k: int) -> Floats:
+        """That of light k at unit emission, (h, w, 3) float32."""
+        return np.asarray(self.halves[k] * np.float32(self.scales[k]), np.float32)
+
+
+def scale_of(plane: Floats) -> float:
+    """What a plane is divided by to be half floats: a power of two."""
+    brightest = float(plane.max(initial=0))
+    return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST))) if brightest > 0 else 1.0
+
+
+def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
+    """Light as half floats, what they cannot hold clipped."""
+    return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
+
+
+def clean_planes(
+    basis: Basis, *, most: int = MOST_WANTED, progress: Callable[[int, int], None] | None = None
+) -> CleanPlanes | None:
+    """Those that are kept, or else made now, and kept.
+
+    most: pixels of all planes up to which they are made. progress: hears how many are, of how many.
+    None where there are none, and sums of so few pixels are denoised sooner.
+    """
+    pixels = len(basis.lights) * basis.size[0] * basis.size[1]
+    if pixels < FEWEST or not is_there():
+        return None
+    found = kept_planes(basis)
+    if found is None and pixels <= most:
+        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        for k in range(len(basis.lights)):
+            halves[k], scales[k] = clean_plane(basis, k)
+            if progress is not None:
+                progress(k + 1, len(basis.lights))
+        found = CleanPlanes.of(basis, halves, scales)
+        keep_planes(basis, found)
+    return found
+
+
+def clean_plane(basis: Basis, k: int) -> tuple[Halves, float]:
+    """Of light k what `CleanPlanes` holds."""
+    scale = scale_of(basis.images[k])
+    return as_halves(denoised(basis.images[k], basis.features), scale), scale
+
+
+def kept_planes(basis: Basis) -> CleanPlanes | None:
+    """Those that are kept of just these pixels; None for none, and for what is damaged."""
+    path = cache.place_beside(basis, cache.CLEAN)
+    with suppress(*_DAMAGES):
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+            if str(kept["made_of"]) != _made_of(basis):
+                return None
+            found = CleanPlanes(*(kept[name] for name in PARTS))
+        its = [getattr(found, name) for name in PARTS]
+        shapes = [basis.images.shape, (len(basis.lights),), basis.images.shape[1:]]
+        types = ["float16", "float64", "float32"]
+        if [x.shape for x in its] == shapes and [x.dtype.name for x in its] == types:
+            path.touch()
+            return found
+    return None
+
+
+def keep_planes(basis: Basis, planes: CleanPlanes) -> bool:
+    """Keep what was made of `basis`. Returns whether that worked: nothing is lost if not."""
+    path = cache.place_beside(basis, cache.CLEAN)
+    try:
+        with replacing(path) as place, place.open("wb") as file:
+            made_of = np.array(_made_of(basis))
+            parts: dict[str, Any] = {name: getattr(planes, name) for name in PARTS}
+            np.savez(file, made_of=made_of, **parts)
+    except (OSError, LightpaintError):
+        return False
+    return True
+
+
+def _mixed(halves: Halves, scales: Doubles, weights: Doubles) -> Floats:
+    own = weights * scales[:, None]
+
+    def strip(top: int) -> Floats:
+        return mix(halves[:, top : top + STRIP].astype(np.float32), own)
+
+    return np.concatenate(side_by_side(strip, range(0, halves.shape[1], STRIP)))
+
+
+def _made_of(basis: Basis) -> str:
+    """What decides how they come out."""
+    pictures = [basis.images, basis.present_weights[None]]
+    if basis.features is not None:
+        pictures += [basis.features.albedo[None], basis.features.normal[None]]
+
+    def digest(plane: Floats) -> bytes:
+        return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
+
+    made = repr((FORMAT, how_denoised(basis.features, raw=""), basis.images.shape))
+    content = hashlib.blake2b(made.encode(), digest_size=16)
+    for one in side_by_side(digest, [plane for planes in pictures for plane in planes]):
+        content.update(one)
+    return content.hexdigest()

@@ -1,0 +1,193 @@
+"""What is known of a scene from an earlier run, as long as nothing is another that it depends on.
+
+Loading a scene takes seconds, of which a basis that is kept needs nothing but to be found: the
+scene's identity. So that is kept beside the basis, with what else a painter has to know, under all
+that it may depend on: how the scene was asked for, the code that read it, and every file that it
+consists of, as well as those that are not there and would be read if they were.
+
+Whoever is in doubt knows nothing, and the scene is loaded: over a file that was written while it
+was read, or of which only Mitsuba's parser knows.
+"""
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis import cache as bases
+from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.errors import LightpaintError
+from lightpaint.files import write_text
+from lightpaint.records import read_record, strict_json
+from lightpaint.scene.checks.tokens import attributes, markup
+from lightpaint.scene.lights_file import Asked
+from lightpaint.scene.scene import Scene
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-known 1"
+
+#: Seconds before a scene was read in which none of its files may have been written: clocks of
+#: disks are as coarse as that.
+COARSE_S = 2.0
+
+#: What in a process changes how Mitsuba reads a scene.
+VARIABLES = ("MI_", "MITSUBA")
+
+#: Code that reads scenes and makes identities of them; of others the libraries as well.
+OURS, OTHERS = ("scene", "scene/checks", "basis", "basis/render"), ("mitsuba", "drjit")
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a scene without loading it.
+
+    identity, sensor, size: by which its basis is kept. spp: samples that it asks for. path: as
+    `Scene.path`. lights: as its basis has them. asked: what it asks of them. remarks: what was
+    worth saying of it when it was loaded.
+    """
+
+    identity: str
+    sensor: str
+    size: tuple[int, int]
+    spp: int
+    path: str
+    lights: tuple[BasisLight, ...]
+    asked: Asked
+    remarks: tuple[str, ...]
+
+
+def key_of(asking: Mapping[str, Any]) -> str:
+    """A name for all that is neither in a scene nor in its files.
+
+    asking: all that decides how it is loaded and on which film, as plain values.
+    """
+    around = {x: y for x, y in os.environ.items() if x.startswith(VARIABLES)}
+    key = [FORMAT, dict(asking), os.getcwd(), around, _code()]
+    return hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def recall(key: str) -> Known | None:
+    """What is known of the scene that is asked for so, or None. key: as of `key_of`."""
+    if "mitsuba" in sys.modules:  # where somebody else may have told it to look for files
+        return None
+    with suppress(OSError, LightpaintError, LookupError, TypeError, ValueError):
+        for file in bases.folder().glob(f"*.{key}{bases.KNOWN}"):
+            said = strict_json(file.read_text("utf-8"))
+            if said["format"] == FORMAT and _is_as_it_was(said["places"], said["texts"]):
+                its = {**said["known"], "asked": Asked(**said["known"]["asked"])}
+                its |= {name: tuple(its[name]) for name in ("size", "remarks")}
+                lights = (read_record(BasisLight, light) for light in its["lights"])
+                return Known(**{**its, "lights": tuple(lights)})
+    return None
+
+
+def remember(
+    key: str,
+    scene: Scene,
+    basis: Basis,
+    *,
+    remarks: Iterable[str],
+    began_s: float,
+) -> bool:
+    """Keep what is known of `scene` beside its kept `basis`. Returns whether that could be done.
+
+    began_s: when the scene's files were begun to be read, by the clock of the system.
+    """
+    if bases.kept_at(basis) is None:
+        return False
+    known = Known(
+        scene.identity,
+        scene.sensor_names[scene.sensor],
+        scene.size,
+        scene.spp,
+        str(scene.path),
+        basis.lights,
+        scene.asked,
+        tuple(remarks),
+    )
+    try:
+        texts = {path for path in (*scene.files, scene.lights_file) if path is not None}
+        places = {str(path): _stamp(path) for path in sorted(scene.places)}
+        if any(_is_new(stamp, began_s) for stamp in places.values()):
+            return False
+        if any(_reads_more(path) for path in scene.files):
+            return False
+        said = {
+            "format": FORMAT,
+            "places": places,
+            "texts": {str(path): _digest(path) for path in sorted(texts)},
+            "known": asdict(known),
+        }
+        text = json.dumps(said, allow_nan=False)
+        if strict_json(text)["known"]["asked"] != asdict(known.asked):
+            return False  # TOML knows values that JSON does not
+        write_text(bases.place_beside(basis, f".{key}{bases.KNOWN}"), text)
+    except (OSError, LightpaintError, TypeError, ValueError):
+        return False
+    return True
+
+
+def _is_as_it_was(places: Mapping[str, Any], texts: Mapping[str, str]) -> bool:
+    return all(_stamp(Path(path)) == stamp for path, stamp in places.items()) and all(
+        _digest(Path(path)) == digest for path, digest in texts.items()
+    )
+
+
+def _stamp(path: Path) -> list[int] | None:
+    """What changes when a file does; None where there is none."""
+    try:
+        its = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    return [its.st_size, its.st_mtime_ns, its.st_ctime_ns, its.st_ino, its.st_dev, its.st_mode]
+
+
+def _is_new(stamp: list[int] | None, began_s: float) -> bool:
+    """Whether a file may have been written since it was read, without that being seen."""
+    return stamp is not None and max(stamp[1], stamp[2]) > 1e9 * (began_s - COARSE_S)
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _reads_more(path: Path) -> bool:
+    """Whether the XML at `path` has its parser look into more files or folders.
+
+    Raises ValueError for what is not read here, as in UTF-16.
+    """
+    for found in markup(path.read_bytes()):
+        tag = found["tag"]
+        if tag == b"path" or (tag not in (None, b"include") and "filename" in attributes(found)):
+            return True
+    return False
+
+
+@cache
+def _code() -> str:
+    """Which version it is of all that reads scenes, by its files."""
+    said = [__version__, sys.version, *(list(_files_of(name)) for name in OTHERS)]
+    package = Path(__file__).parents[1]
+    said += [list(_files_in(package / folder)) for folder in OURS]
+    return hashlib.sha256(repr(said).encode()).hexdigest()
+
+
+def _files_of(package: str) -> Iterator[tuple[str, int, int]]:
+    found = find_spec(package)
+    if found is not None and found.origin is not None:
+        yield from _files_in(Path(found.origin).parent)
+
+
+def _files_in(folder: Path) -> Iterator[tuple[str, int, int]]:
+    """Those of a folder, by name, size and time."""
+    for entry in sorted(os.scandir(folder), key=lambda entry: entry.path):
+        if entry.is_file():
+            its = entry.stat()
+            yield entry.path, its.st_size, its.st_mtime_ns

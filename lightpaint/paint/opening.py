@@ -1,0 +1,84 @@
+"""A scene that is to be painted, loaded when it is needed, and what is known of it before."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import Any
+
+from lightpaint.basis import known
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.known import Known
+from lightpaint.errors import PaintError
+from lightpaint.scene.scene import Scene
+from lightpaint.settings import Settings
+from lightpaint.sources import SceneFile, vars_of
+
+
+@dataclass
+class Opening:
+    """A scene by its file.
+
+    checks: called with the scene once it is loaded; raise for what cannot be painted of it.
+    remarks: what is worth saying of it, which is known the next time.
+    """
+
+    file: SceneFile
+    settings: Settings
+    checks: list[Callable[[Scene], None]] = field(default_factory=list)
+    remarks: tuple[str, ...] = ()
+    _key: str = ""
+    _scene: Scene | None = None
+    _began_s: float = 0.0
+    _lock: Any = field(default_factory=Lock)
+
+    def __post_init__(self) -> None:
+        self.known: Known | None = None
+        if self.settings.use_cache:
+            self._key = known.key_of(self._asking)
+            self.known = known.recall(self._key)
+        if self.known is not None:
+            self.remarks = self.known.remarks
+
+    @property
+    def _asking(self) -> dict[str, Any]:
+        """All that decides how it is loaded, and on which film."""
+        file = {name: value for name, value in vars_of(self.file).items() if value is not None}
+        names = {key: list(its) for key, its in (file.get("groups") or {}).items()}
+        lights = {"lights": list(file["lights"])} if "lights" in file else {}
+        film = {"quality": self.settings.quality, "resolution": self.settings.resolution}
+        parameters = {key: str(value) for key, value in self.file.parameters.items()}
+        return {**file, **lights, **film, "groups": names, "parameters": parameters}
+
+    @property
+    def scene(self) -> Scene:
+        """On the film of the basis; loaded when it is first asked for, by whichever thread.
+
+        Raises LightpaintError for one that cannot be painted, or that is not what was known.
+        """
+        with self._lock:
+            if self._scene is None:
+                self._scene = self._loaded()
+            return self._scene
+
+    def _loaded(self) -> Scene:
+        # The renderer, and what goes with it, comes with the first scene.
+        from lightpaint.scene.quality import on_film
+
+        self._began_s = time.time()
+        scene = on_film(self.file.content, self.settings.quality, self.settings.resolution)
+        if self.known is not None and self.known.identity != scene.identity:
+            raise PaintError(
+                f"{self.file.path} is not what it was when this session was opened: its files have "
+                "changed since; start the painter again"
+            )
+        for check in self.checks:
+            check(scene)
+        return scene
+
+    def remember(self, basis: Basis) -> None:
+        """Let the next session of this scene begin without loading it. basis: its kept one."""
+        if self.known is None and self._scene is not None and self.settings.use_cache:
+            known.remember(
+                self._key, self._scene, basis, remarks=self.remarks, began_s=self._began_s
+            )

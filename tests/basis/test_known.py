@@ -1,0 +1,188 @@
+"""What is known of a scene without loading it: right, or nothing at all."""
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from lightpaint.basis import cache, known
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.known import Known, key_of, recall, remember
+from lightpaint.basis.render.render import basis_lights
+from lightpaint.scene.scene import Scene, load_scene
+
+SCENE = """<scene version="3.0.0">
+  <include filename="parts/lamp.xml"/>
+  <sensor type="perspective"><film type="hdrfilm">
+    <integer name="width" value="4"/><integer name="height" value="3"/></film></sensor>
+  <shape type="rectangle"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
+    <string name="filename" value="textures/wood.png"/></texture></bsdf></shape>{more}
+</scene>"""
+LAMP = """<scene version="3.0.0"><emitter type="point" id="lamp"/></scene>"""
+LATER_S = 60.0  # after which files count as old
+
+
+@pytest.fixture(autouse=True)
+def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty cache, and a process that has loaded no renderer."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(known, "sys", SimpleNamespace(modules={}, version=sys.version))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A scene of several files."""
+    place = tmp_path / "scene"
+    for name in ("parts", "textures"):
+        (place / name).mkdir(parents=True)
+    (place / "hall.xml").write_text(SCENE.format(more=""))
+    (place / "parts" / "lamp.xml").write_text(LAMP)
+    Image.new("RGB", (2, 2), (200, 100, 50)).save(place / "textures" / "wood.png")
+    return place
+
+
+def asking(folder: Path, **more: Any) -> str:
+    return key_of({"path": str(folder / "hall.xml"), **more})
+
+
+def kept(scene: Scene, make_basis: Any) -> Basis:
+    """A made-up basis of it, in the cache."""
+    made = make_basis(len(scene.lights), scene.size)
+    origin = replace(made.origin, scene_identity=scene.identity, sensor=scene.sensor_names[0])
+    basis: Basis = replace(made, lights=basis_lights(scene), origin=origin)
+    assert cache.keep(basis)
+    return basis
+
+
+def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> None:
+    (folder / "hall.lights.toml").write_text('[light.lamp]\nmax = 3.0\nkelvin = "2700..4000"\n')
+    scene = load_scene(folder / "hall.xml")
+    basis = kept(scene, make_basis)
+    key, later_s = asking(folder), time.time() + LATER_S
+    assert recall(key) is None
+    assert remember(key, scene, basis, remarks=["one"], began_s=later_s)
+    found = recall(key)
+    assert found == Known(
+        scene.identity,
+        "sensor_0",
+        (3, 4),
+        scene.spp,
+        str(scene.path),
+        basis_lights(scene),
+        scene.asked,
+        ("one",),
+    )
+    [entry] = cache.entries()
+    assert entry.size > entry.path.stat().st_size
+    cache.drop([entry])
+    assert recall(key) is None
+    assert list(cache.folder().iterdir()) == []
+
+
+def same_bytes(path: Path) -> None:
+    """Write it anew as it was, at the time at which it was."""
+    its = path.stat()
+    data = bytearray(path.read_bytes())
+    data[-20] ^= 1
+    path.write_bytes(data)
+    os.utime(path, ns=(its.st_atime_ns, its.st_mtime_ns))
+
+
+def appears(path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("<!-- -->")
+
+
+CHANGES: dict[str, Callable[[Path], object]] = {
+    "the scene": lambda at: (at / "hall.xml").write_text(SCENE.format(more="<!-- -->")),
+    "an include": lambda at: (at / "parts/lamp.xml").write_text(LAMP.replace("lamp", "bulb")),
+    "a texture of the same size and time": lambda at: same_bytes(at / "textures/wood.png"),
+    "a texture that is gone": lambda at: (at / "textures/wood.png").unlink(),
+    "another texture that would be found": lambda at: appears(at / "parts/textures/wood.png"),
+    "an include in another place": lambda at: appears(at / "parts/parts/lamp.xml"),
+    "a lights file": lambda at: (at / "hall.lights.toml").write_text("group_alike = false\n"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_nothing_is_known_once_a_file_is_another(
+    folder: Path, make_basis: Any, change: Callable[[Path], object]
+) -> None:
+    scene = load_scene(folder / "hall.xml")
+    key, later_s = asking(folder), time.time() + LATER_S
+    assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    assert recall(key) is not None
+    change(folder)
+    assert recall(key) is None
+
+
+def test_nor_where_it_is_asked_for_otherwise(
+    folder: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    scene = load_scene(folder / "hall.xml")
+    key, later_s = asking(folder), time.time() + LATER_S
+    assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    for more in ({"sensor": 1}, {"parameters": {"a": "1"}}, {"resolution": "1/2"}, {"lights": []}):
+        assert recall(asking(folder, **more)) is None
+    monkeypatch.setattr(known, "_code", lambda: "another version")
+    assert recall(asking(folder)) is None
+    monkeypatch.undo()
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(folder)  # where relative names are looked for, too
+    assert asking(folder) != key
+    # A process that has loaded scenes may look for files elsewhere.
+    assert recall(key) is None
+    monkeypatch.setattr(known, "sys", SimpleNamespace(modules={}, version=sys.version))
+    assert recall(key) is not None
+
+
+def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
+    scene = load_scene(folder / "hall.xml")
+    basis, key = kept(scene, make_basis), asking(folder)
+    later_s = time.time() + LATER_S
+    # Its files were written just before they were read.
+    assert not remember(key, scene, basis, remarks=(), began_s=time.time())
+    # The basis is not there, or not with just these samples.
+    other = replace(basis, origin=replace(basis.origin, halves=(8, 8)))
+    assert not remember(key, scene, other, remarks=(), began_s=later_s)
+    # The parser reads a file that is no part of the scene later, or looks into another folder.
+    (folder / "blue.spd").write_text("400 1\n700 2\n")
+    spectrum = '<spectrum name="reflectance" filename="blue.spd"/>'
+    for more in (f'<bsdf type="diffuse" id="b">{spectrum}</bsdf>', '<path value="textures"/>'):
+        (folder / "hall.xml").write_text(SCENE.format(more=more))
+        scene = load_scene(folder / "hall.xml")
+        assert not remember(
+            key, scene, kept(scene, make_basis), remarks=(), began_s=time.time() + LATER_S
+        )
+    assert recall(key) is None
+
+
+def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
+    scene = load_scene(folder / "hall.xml")
+    key, later_s = asking(folder), time.time() + LATER_S
+    assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    [path] = cache.folder().glob("*.known.json")
+    text = path.read_text("utf-8")
+    for damage in ("", "[]", text[:-9], text.replace('"spp"', '"ssp"'), text.replace("lamp", "[")):
+        path.write_text(damage, "utf-8")
+        assert recall(key) is None
+
+
+def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> None:
+    place = tmp_path / "cache"
+    place.mkdir()
+    alone = place / f"{'0a' * 16}.clean.npz"
+    mine = place / "notes.clean.npz"
+    for path in (alone, mine):
+        path.write_bytes(b"data")
+    assert cache.sweep(3600) == 0
+    assert cache.sweep() == 4
+    assert not alone.exists()
+    assert mine.exists()

@@ -1,0 +1,125 @@
+"""A scene that is painted: open before it is loaded, and told apart from what it was."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from command import run
+from renderer import write_room
+
+import lightpaint as lp
+from lightpaint.basis import cache, known
+from lightpaint.basis.render.render import basis_lights
+from lightpaint.errors import ConstraintError, PaintError
+from lightpaint.images.denoise import Features
+from lightpaint.images.objects import Objects
+from lightpaint.paint.launch import identity_of, identity_of_scene, subject_of
+from lightpaint.paint.opening import Opening
+from lightpaint.paint.steps import Identity
+from lightpaint.paint.store import Store
+from lightpaint.paint.subject import Subject
+from lightpaint.settings import Settings
+from lightpaint.sources import SceneFile
+
+
+@pytest.fixture(autouse=True)
+def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty cache, and a process that has loaded no renderer."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(known, "sys", SimpleNamespace(modules={}, version="3"))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return write_room(tmp_path)
+
+
+def opened(path: Path, **settings: Any) -> Subject:
+    return subject_of(SceneFile(str(path)), path.parent / "s", settings=Settings(**settings))
+
+
+def kept(path: Path, make_basis: Any) -> lp.Basis:
+    """A made-up basis, kept as a first session leaves it, and what was known then."""
+    first = opened(path)
+    assert identity_of(first) is None
+    scene, opening = first.loaded, first.scene
+    assert isinstance(opening, Opening)
+    made = make_basis(len(scene.lights), scene.size)
+    origin = replace(
+        made.origin,
+        scene_identity=scene.identity,
+        sensor=scene.sensor_names[0],
+        scene=path.name,
+        halves=(scene.spp // 2, scene.spp // 2),
+    )
+    flat = np.zeros((*scene.size, 3), np.float32)
+    basis: lp.Basis = replace(
+        made,
+        lights=basis_lights(scene),
+        origin=origin,
+        features=Features(flat, flat),
+        objects=Objects(np.zeros(scene.size, np.int32), ("wall",)),
+    )
+    assert cache.keep(basis)
+    opening._began_s = time.time() + 60  # as if its files were older
+    opening.remarks = ("a remark",)
+    opening.remember(basis)
+    return basis
+
+
+def test_a_known_scene_is_painted_without_being_loaded(
+    path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    basis = kept(path, make_basis)
+    identity = identity_of_scene(opened(path).loaded)
+
+    def loads(**_: Any) -> None:
+        raise AssertionError("the scene is loaded")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("lightpaint.sources.load_scene", loads)
+        subject = opened(path)
+        assert identity_of(subject) == identity
+        assert subject.wanted == basis.origin.spp
+        assert isinstance(subject.scene, Opening)
+        assert subject.scene.remarks == ("a remark",)
+        [found] = subject.bases()
+        assert found.lights == basis.lights
+        np.testing.assert_array_equal(found.images, basis.images)
+        # Of more samples than there are it has to be loaded, as for what is asked of no light.
+        with pytest.raises(AssertionError):
+            next(opened(path, spp=4 * basis.origin.spp).bases())
+        asked = lp.Constraints.of({"nobody": {"lock": True}})
+        with pytest.raises(ConstraintError, match="nobody"):
+            subject_of(SceneFile(str(path)), path.parent / "s", constraints=asked)
+    # Whoever exports gets the scene that was painted, or is told.
+    assert subject.loaded.identity == basis.origin.scene_identity
+    other = opened(path)
+    path.write_text(path.read_text().replace("</scene>", "<!-- later --></scene>"))
+    with pytest.raises(PaintError, match="not what it was when this session was opened"):
+        _ = other.loaded
+
+
+def test_what_is_wrong_with_a_scene_ends_the_painter_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "scene.xml").write_text("<scene version='3.0.0'><bsdf type='no'/></scene>")
+    done = run(tmp_path, "paint", "scene.xml", "--no-browser", "--port", "0")
+    assert done.returncode == 2
+    [line] = done.stderr.strip().splitlines()
+    assert "scene.xml" in line
+    assert "http://127.0.0.1" in done.stdout  # the page was open by then
+    assert not list(tmp_path.glob("*.paint"))
+
+
+def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
+    path: Path, make_basis: Any
+) -> None:
+    folder = path.parent / "s"
+    Store.open(folder / "session.db", Identity.of([make_basis(2)])).close()
+    done = run(path.parent, "paint", path.name, "-o", "s", "--no-browser", "--port", "0")
+    assert done.returncode == 2
+    assert "session.db is a session of" in done.stderr
+    assert "(--new)" in done.stderr
