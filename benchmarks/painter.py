@@ -33,6 +33,7 @@ import lightpaint as lp
 from lightpaint.basis.basis import BasisLight, Origin
 from lightpaint.lighting.fit import meant_by
 from lightpaint.lighting.live import Live
+from lightpaint.lighting.live_view import LiveView
 from lightpaint.paint.server import Server
 from lightpaint.paint.store import MemoryStore
 from lightpaint.paint.studio import Studio
@@ -152,7 +153,8 @@ def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance:
     over = Target("", np.zeros((1, 1, 3), np.float32), one, False, transform=transform,
                   through_view=True, over_look=True)  # fmt: skip
     meant = meant_by(Settings(**fit), [over])
-    live = Live(basis, image, importance, fit=meant, constraints=lp.Constraints.of(asked))
+    view = LiveView(basis, image, importance)
+    live = Live([view], fit=meant, constraints=lp.Constraints.of(asked))
     weights, times = live.answer(basis.present_weights), []
     for k in range(40):
         region = slice(8 + 3 * k, 72 + 3 * k), slice(8 + 5 * k, 72 + 5 * k)
@@ -160,7 +162,7 @@ def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance:
         image[region] *= 1.05
         if with_importance:
             importance[region] = 0.5 + 0.01 * k
-        live.painted(region, with_importance=with_importance)
+        view.painted(region, with_importance=with_importance)
         weights = live.answer(weights)
         times.append(1e3 * (time.perf_counter() - begin))
     return float(np.median(times))
@@ -177,7 +179,7 @@ def serve(case: str, asked: str, space: str) -> None:
             settings=Settings(space=space or None),  # type: ignore[arg-type]
             constraints=lp.Constraints.of(json.loads(asked)),
         )
-        studio = Studio(subject, MemoryStore)
+        studio = Studio([subject], MemoryStore)
         server = Server(studio, port=0)
         studio.start()
         print(server.url, flush=True)

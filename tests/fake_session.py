@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.protocol import VERSION, Message, Paint, Said
+from lightpaint.paint.frames import Message
+from lightpaint.paint.protocol import VERSION, Paint, Said
 
 
 class FakeSession:
@@ -46,7 +47,8 @@ class FakeSession:
 
     def greet(self, *, is_back: bool) -> Message:
         names = dict.fromkeys(self.pictures, 1)
-        return Message("state", {"version": VERSION, "resources": names, "size": [2, 3]})
+        about = {"version": VERSION, "resources": names, "size": [2, 3], "is_back": is_back}
+        return Message("state", about)
 
     def resource(self, name: str) -> npt.NDArray[Any]:
         if name not in self.pictures:

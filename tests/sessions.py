@@ -1,14 +1,15 @@
 """Steps and looks to keep in sessions, each of its number, and all that a session holds."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
+from lightpaint.paint.steps import Identity, KeptLook, Patch, Seen, Step
 from lightpaint.paint.store import Store
 
 SIZE = (12, 10)
-IDENTITY = Identity("room.xml", "0f0f", SIZE, ("panel", "bulb"), "camera")
+IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (Seen("camera", SIZE),))
 
 
 def patch(rng: np.random.Generator, size: tuple[int, int] = SIZE) -> Patch:
@@ -29,7 +30,8 @@ def step(number: int) -> Step:
     """One of a kind of its own."""
     rng = np.random.default_rng(number)
     fields = {"before": {"n": number - 1}, "after": {"n": number, "é": [0.1, None, "\u202e"]}}
-    return Step("stroke", f"stroke {number}", fields, patch(rng) if number % 3 else None)
+    patches = tuple(replace(patch(rng), view=view) for view in range(number % 3))
+    return Step("stroke", f"stroke {number}", fields, patches)
 
 
 def look(number: int, of: int) -> KeptLook:
@@ -53,7 +55,7 @@ def content(store: Store) -> Any:
             one.kind,
             one.label,
             one.fields,
-            one.patch and (one.patch.region, told(one.patch.before), told(one.patch.after)),
+            [(x.view, x.region, told(x.before), told(x.after)) for x in one.patches],
         )
         for one in store.steps
     ]
@@ -67,7 +69,7 @@ def big(number: int) -> Step:
     """A step of some 30 kB."""
     rng = np.random.default_rng(number)
     light = rng.random((30, 40, 3)).astype(np.float32), np.ones((30, 40), np.float32)
-    return Step("stroke", f"big {number}", {}, Patch((0, 30, 0, 40), light, light))
+    return Step("stroke", f"big {number}", {}, (Patch((0, 30, 0, 40), light, light),))
 
 
 class Plain(Store):

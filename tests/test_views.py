@@ -1,9 +1,11 @@
 """One lighting for the paintings of several views."""
 
 import json
+import shlex
 import weakref
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -14,15 +16,25 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.call import paint_with_light
 from lightpaint.cli import main
+from lightpaint.cli.spelling import solve_command
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.uncertainty import error_bars
+from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
+from lightpaint.paint.frames import Message
+from lightpaint.paint.launch import identity_of_scene, subjects_of
+from lightpaint.paint.protocol import Ask, Export, Paint
+from lightpaint.paint.steps import Identity, Seen
+from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.studio import Studio
 from lightpaint.scene.scene import load_scene
+from lightpaint.settings import Settings
+from lightpaint.sources import SceneFile
 from lightpaint.target.target import Target
 
 CLOSE = """<sensor type="perspective" id="close"><float name="fov" value="40"/>
@@ -50,6 +62,50 @@ def bases(room: Path) -> list[Basis]:
 
 def painting(basis: Basis, weights: np.ndarray, name: str) -> Target:
     return Target(name, basis.mix(weights), np.ones(basis.size, np.float32), everything=False)
+
+
+def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path) -> None:
+    sources = [SceneFile(str(room), sensor=name) for name in ("camera", "close")]
+    options = ["--spp=16", "--resolution=1/2"]
+    subjects = subjects_of(
+        sources,
+        tmp_path,
+        settings=Settings(spp=16, resolution="1/2", verify=False),
+        command=lambda paintings, wishes: solve_command(str(room), paintings, options, wishes),
+    )
+    identity = Identity.joined([identity_of_scene(subject.loaded) for subject in subjects])
+    assert identity.views == (Seen("camera", (10, 12)), Seen("close", (5, 7)))
+    exported = Event()
+    told: list[Message] = []
+
+    def hear(message: Message) -> None:
+        told.append(message)
+        if message.kind in ("exported", "say"):
+            exported.set()
+
+    studio = Studio(subjects, MemoryStore)
+    studio.on_message = hear
+    studio._obtain()
+    for k, light in enumerate((0.9, 0.1)):
+        arrays = {"image": np.full((3, 4, 3), light), "importance": np.ones((3, 4))}
+        floats = {key: value.astype(np.float32) for key, value in arrays.items()}
+        studio.said(Paint(k, (1, 4, 2, 6), done=True, view=k), floats)
+    studio.said(Ask(1, {"lock": True}), {})
+    studio.said(Export(("target", "lighting", "relit", "report")), {})
+    assert exported.wait(60)
+    assert told[-1].kind == "exported", told[-1].fields
+    files = told[-1].fields["files"]
+    names = ["painting-camera.exr", "painting-close.exr", "lighting.json", "relit.xml"]
+    reports = [f"answer/{name}/report.html" for name in ("camera", "close")]
+    assert files == [str(tmp_path / name) for name in (*names, *reports)]
+    words = shlex.split(told[-1].fields["command"])[1:]
+    assert main([*words, "-o", str(tmp_path / "again")]) == 0
+    emission = read_lighting(tmp_path / "lighting.json").emission
+    for other in ("again", "answer"):
+        found = read_lighting(tmp_path / other / "lighting.json").emission
+        for name, expected in emission.items():
+            np.testing.assert_allclose(found[name], expected, rtol=1e-9)
+    studio.close()
 
 
 def test_a_lighting_that_both_views_show_comes_back(bases: list[Basis]) -> None:

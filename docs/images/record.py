@@ -1,15 +1,16 @@
-"""Records a session of the painter: the moving picture of the README, and one that stands still.
+"""Records sessions of the painter: the moving picture of the README, and two that stand still.
 
     pip install '.[test]'
-    python docs/images/record.py [--spp 64] [--port 8431]
+    python docs/images/record.py [--spp 64] [--port 8431] [--only painting|views]
 
 writes beside itself
 
     painting.webp   somebody paints the gallery: a warm wall, a cool one, light on a figure
     painter.jpg     the painter when that is done
+    painter-views.jpg   the stage, painted from the balcony and from a box
 
-The painter's own server, with a new session in a folder that is removed, and headless Chromium.
-The basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
+The painter's own server, with new sessions in folders that are removed, and headless Chromium.
+A basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import Page, sync_playwright
 
 HERE = Path(__file__).resolve().parent
-SCENE = HERE.parent.parent / "scenes" / "gallery" / "scene.xml"
+SCENES = HERE.parent.parent / "scenes"
 
 #: Of the page, and of the recording.
 WINDOW, SIZE = (1360, 800), (1020, 600)
@@ -134,13 +135,42 @@ def session(hand: Hand) -> None:
     hand.see(16)
 
 
+def from_two_seats(hand: Hand) -> None:
+    """The figure, from the balcony; then the wall behind her as it is seen from a box."""
+    on = hand.of_painting
+    hand.page.keyboard.press("a")
+    x, y = on(0.53, 0.66)
+    hand.drag((x, y), (x + 40, y - 90))
+    hand.wait()
+    hand.page.keyboard.press("n")
+    _load(hand.page)
+    hand.page.keyboard.press("b")
+    hand.page.keyboard.press("x")
+    hand.drag(on(0.44, 0.3), on(0.5, 0.2), on(0.58, 0.35))
+    hand.wait()
+
+
+def _load(page: Page) -> None:
+    """Until clean pictures of all lights are there: nothing that is published has grain."""
+    page.wait_for_function(
+        """() => {
+          const { work } = document.getElementById('lightpaint').painter.engine;
+          const there = [...work.loader.there.values()].filter((one) => one.includes(' clean/'));
+          return work.isReady && there.length === work.state.lights.length;
+        }""",
+        timeout=600_000,
+    )
+    page.wait_for_timeout(1500)
+
+
 @contextmanager
-def painter(spp: int, port: int) -> Iterator[str]:
+def painter(scene: str, spp: int, port: int, *more: str) -> Iterator[str]:
     """The address of a painter with a session of its own."""
     with tempfile.TemporaryDirectory() as folder:
         words = [
             "paint",
-            str(SCENE),
+            str(SCENES / scene / "scene.xml"),
+            *more,
             f"--spp={spp}",
             f"--port={port}",
             "--no-browser",
@@ -157,30 +187,40 @@ def painter(spp: int, port: int) -> Iterator[str]:
             server.wait(60)
 
 
+@contextmanager
+def using(url: str) -> Iterator[Hand]:
+    """A page at that address, with all pictures."""
+    with sync_playwright() as playwright:
+        path = shutil.which("chromium") or playwright.chromium.executable_path
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
+        page.goto(url)
+        page.locator("[data-light]").first.wait_for(timeout=600_000)
+        _load(page)
+        yield Hand(page)
+        browser.close()
+
+
 def main() -> None:
-    """Record it."""
+    """Record them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
+    parser.add_argument("--only", choices=("painting", "views"))
     asked = parser.parse_args()
-    with painter(asked.spp, asked.port) as url, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
-        )
-        page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
-        clean: list[str] = []
-        page.on("response", lambda it: clean.append(it.url) if "/data/clean/" in it.url else None)
-        page.goto(url)
-        lights = page.locator("[data-light]")
-        lights.first.wait_for(timeout=600_000)
-        # Nothing that is published has grain.
-        while len(clean) < lights.count():
-            page.wait_for_timeout(500)
-        page.wait_for_timeout(1500)
-        hand = Hand(page)
-        session(hand)
-        page.screenshot(path=HERE / "painter.jpg", type="jpeg", quality=88)
-        browser.close()
+    if asked.only != "painting":
+        seats = ("--sensor=balcony", "--sensor=box", "--resolution=1/2")
+        with painter("stage", asked.spp, asked.port, *seats) as url, using(url) as hand:
+            from_two_seats(hand)
+            hand.page.screenshot(path=HERE / "painter-views.jpg", type="jpeg", quality=88)
+    if asked.only != "views":
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            session(hand)
+            hand.page.screenshot(path=HERE / "painter.jpg", type="jpeg", quality=88)
+        _write(hand)
+
+
+def _write(hand: Hand) -> None:
     first, *others = (frame.resize(SIZE, Image.Resampling.LANCZOS) for frame in hand.frames)
     first.save(
         HERE / "painting.webp",

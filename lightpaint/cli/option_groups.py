@@ -11,11 +11,23 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     add_view(parser)
 
 
-def add_view(parser: argparse.ArgumentParser) -> None:
-    """What a scene is seen through, and loaded with."""
-    parser.add_argument(
-        "-s", "--sensor", metavar="SENSOR", help="sensor by index or id (default: the first)"
-    )
+def add_view(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """What a scene is seen through, and loaded with. several: whether by several sensors."""
+    if several:
+        parser.add_argument(
+            "-s",
+            "--sensor",
+            dest="sensors",
+            action="append",
+            default=[],
+            metavar="SENSOR",
+            help="sensor by index or id; give it once for each view that one lighting is to serve "
+            "(default: the first)",
+        )
+    else:
+        parser.add_argument(
+            "-s", "--sensor", metavar="SENSOR", help="sensor by index or id (default: the first)"
+        )
     parser.add_argument(
         "-D",
         dest="parameters",

@@ -230,7 +230,8 @@ def _to_do(options: Namespace) -> dict[str, Any]:
 
 def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:
     """What `paint` is asked for."""
-    source, asked = painted_of(options), constraints_of(options)
+    sources, asked = painted_of(options), constraints_of(options)
+    source = sources[0]
     if options.lights_file and not isinstance(source, SceneFile):
         asked = read_constraints(options.lights_file).and_then(asked)
     named = f"{called(Path(source.path))}.paint"
@@ -238,9 +239,9 @@ def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> d
     # Those that `solve` has too, for the command that answers what was exported.
     dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
     dropped += ["as_json", "is_quiet", "is_verbose"]
-    dropped += ["lights"] * isinstance(source, GroupsFile)
+    dropped += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
     return {
-        "source": source,
+        "sources": sources,
         "folder": folder,
         "settings": settings,
         "constraints": asked,
@@ -253,17 +254,31 @@ def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> d
     }
 
 
-def painted_of(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
-    """What `paint` paints: a scene, a basis, or light groups, also those that --lights names."""
+def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
+    """What `paint` paints: a scene, by each sensor that is named; bases of several views; or light
+    groups, also those that --lights names.
+    """
     given = ",".join(options.lights or ())
-    if options.source is None and not given:
+    paths = options.sources
+    if not paths and not given:
         raise BasisError("nothing to paint: give a scene, a basis, or light groups")
-    if options.source is None:
+    options.sensor = options.sensors[0] if options.sensors else None
+    if not paths:
         _check_light_groups(given)
-        options.source, options.lights = given, None
-    elif given and _is_file_to_be(given, Path(options.source)):
-        raise BasisError(f"{options.source} and --lights {given} at once: give one to paint")
-    return basis_of(options) or scene_of(options)
+        paths, options.lights = [given], None
+    elif given and _is_file_to_be(given, Path(paths[0])):
+        raise BasisError(f"{paths[0]} and --lights {given} at once: give one to paint")
+    made = []
+    for options.source in paths:
+        made.append(basis_of(options) or scene_of(options))
+    if len(paths) > 1 and not all(isinstance(one, BasisFile) for one in made):
+        raise BasisError(
+            f"{len(paths)} things to paint: several are bases of the views of one scene; views of "
+            "a scene are named with --sensor, once for each"
+        )
+    if len(options.sensors) > 1:
+        return [scene_of(options, sensor=sensor) for sensor in options.sensors]
+    return made
 
 
 def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server import Server
+    from lightpaint.paint.wishes import Wishes
 
 #: Said of a --host.
 OPEN = (
@@ -26,7 +28,7 @@ OPEN = (
 
 def paint(
     *,
-    source: SceneFile | BasisFile | GroupsFile,
+    sources: Sequence[SceneFile | BasisFile | GroupsFile],
     folder: Path,
     settings: Settings,
     constraints: Constraints,
@@ -37,22 +39,27 @@ def paint(
     port: int | None,
     with_browser: bool,
 ) -> Outcome:
-    """`lightpaint paint SCENE|BASIS|LIGHTS`"""
+    """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
     # The server and the session file bring much that no other command needs.
-    from lightpaint.paint.launch import paint_in_browser, subject_of
+    from lightpaint.paint.launch import paint_in_browser, subjects_of
     from lightpaint.paint.server import check_installed
 
     check_installed()
     from lightpaint.cli.spelling import solve_command
 
-    subject = subject_of(
-        source,
+    def command(paintings: Mapping[str, str], wishes: "Wishes") -> str:
+        return solve_command(sources[0].path, paintings, options, wishes)
+
+    subjects = subjects_of(
+        sources,
         folder,
         settings=settings,
         constraints=constraints,
         choice=choice,
-        command=lambda painting, wishes: solve_command(source.path, painting, options, wishes),
+        # A basis has one view only for `solve`.
+        **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )
+    subject = subjects[0]
     if subject.groups is not None:
         for remark in subject.groups.remarks:
             terminal.say(remark)
@@ -74,7 +81,7 @@ def paint(
 
     try:
         paint_in_browser(
-            subject, opened, new=new, host=host, port=port, say=lambda text: _say(text)
+            subjects, opened, new=new, host=host, port=port, say=lambda text: _say(text)
         )
     except KeyboardInterrupt:
         if not addresses:  # it had not begun

@@ -132,11 +132,11 @@ def _solve(parser: argparse.ArgumentParser) -> None:
 
 def _paint(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "source",
+        "sources",
         metavar="SCENE|BASIS|LIGHTS",
-        nargs="?",
-        help="scene XML, a *.basis.exr, or light groups of another renderer, which --lights may "
-        "name, too",
+        nargs="*",
+        help="scene XML, a *.basis.exr (or several, of the views of one scene), or light groups of "
+        "another renderer, which --lights may name, too",
     )
     add_output(
         parser,
@@ -151,7 +151,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_constraints(parser)
     add_budget(parser)
     add_cache(parser)
-    add_view(parser)
+    add_view(parser, several=True)
     # Options are kept for the command that answers what is exported.
     parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 

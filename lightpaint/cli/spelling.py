@@ -7,12 +7,17 @@ from typing import Any
 from lightpaint.paint.wishes import Wishes
 
 
-def solve_command(source: str, painting: str, options: Sequence[str], wishes: Wishes) -> str:
-    """The command that answers an exported painting as its session does.
+def solve_command(
+    source: str, paintings: Mapping[str, str], options: Sequence[str], wishes: Wishes
+) -> str:
+    """The command that answers exported paintings as their session does.
 
-    source, options: as they were given to the painter.
+    paintings: paths by sensor, "" for that of the only view. source, options: as they were given to
+    the painter.
     """
-    words = ["lightpaint solve", quote(source), quote(painting)]
+    words = ["lightpaint solve", quote(source)]
+    for sensor, path in paintings.items():
+        words.append(f"--target {quote(f'{sensor}={path}')}" if sensor else quote(path))
     return " ".join([*words, *options, *options_of(wishes)])
 
 

@@ -8,147 +8,133 @@ but no sum of theirs.
 In display space every answer changes the weight of every pixel. There the picture is averaged to
 a few thousand pixels, and a round from the answer before is enough to follow the brush;
 the answer of all pixels comes when it is lifted.
+
+Of several views those count in which something is painted. Each has sums of its own, so that a
+stroke in one costs no more than where there is no other.
 """
 
-import numpy as np
+from collections.abc import Sequence
+from functools import reduce
+from operator import add
 
-from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.arrays import Doubles
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.fit import Fit, Space
-from lightpaint.lighting.live_sums import PaintedTiles, Region, SmallFilm
+from lightpaint.lighting.live_sums import FILM, Films, SmallFilm
+from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import reduced_by
 from lightpaint.lighting.pull import pull_of, to_present
 
+#: Of which views, and what pulls to the present and to its colours.
+_Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
+
 
 class Live:
-    """A painting that changes under a brush, and the lighting for it. Updated in place.
+    """Paintings that change under a brush, and the lighting for them. Updated in place.
 
-    basis: of one view. image: (h, w, 3) linear; importance: (h, w): the painting, which whoever
-    paints writes to and then says `painted`. fit: with nothing left open, as `meant_by` makes it.
-    constraints: all that is asked of the lights.
+    views: of one lighting, each of which is told where it is painted. fit: with nothing left open,
+    as `meant_by` makes it. constraints: all that is asked of the lights.
     """
 
-    def __init__(
-        self,
-        basis: Basis,
-        image: Floats,
-        importance: Floats,
-        *,
-        fit: Fit,
-        constraints: Constraints,
-    ) -> None:
-        self._basis, self._image, self._importance = basis, image, importance
-        self._sums = np.zeros((len(importance), 2))
-        self._count_rows(slice(0, len(importance)))
-        self._light: PaintedTiles | None = None
-        self._display: SmallFilm | None = None
+    def __init__(self, views: Sequence[LiveView], *, fit: Fit, constraints: Constraints) -> None:
+        self._views = tuple(views)
+        self._basis = views[0].basis
+        self._films: tuple[tuple[LiveView, ...], Films] | None = None
         self.asks(fit, constraints)
 
     def asks(self, fit: Fit, constraints: Constraints) -> None:
         """Go on with these. Raises ConstraintError for what is impossible."""
         reduction = reduced_by(constraints, self._basis, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
-        self._pulls: tuple[NormalEquations | None, NormalEquations | None] | None = None
-        if self._display is not None:
-            self._display.see_through(fit.transform)
+        self._pulls: _Pulls | None = None
+        for view in self._views:
+            view.see_through(fit.transform)
 
     def prepare(self) -> None:
         """Do now what the first answer would wait for."""
-        if self.mode == "linear":
-            self._tiles()
-        else:
-            self._film()
+        for view in self._views:
+            if self.mode == "linear":
+                view.tiles()
+            else:
+                self._film_of(view)
 
     @property
     def mode(self) -> Space:
         """In which space answers are found."""
         return self._fit.space or "linear"
 
-    @property
-    def is_painted(self) -> bool:
-        """Whether anything is."""
-        return bool(self._sums[:, 0].any())
-
-    def painted(self, region: Region, *, with_importance: bool = True) -> None:
-        """A rectangle of the painting is another now. with_importance: also what counts there."""
-        if with_importance:
-            self._count_rows(region[0])
-        if self._light is not None:
-            self._light.painted(region, with_importance=with_importance)
-        if self._display is not None:
-            self._display.painted(region)
-
     def answer(self, start: Doubles) -> Doubles:
         """The weights (n, 3) that are best now, from those before.
 
         Before anything is painted, lights stay as they are but for what is asked of them.
         """
-        if not self.is_painted:
-            return untouched(self._basis, self._reduction)
-        pull = self._pull()
+        views = tuple(view for view in self._views if view.is_painted)
+        if not views:
+            return untouched(self._views, self._reduction)
+        pull, rest_weight = self._pull(views), self._rest_weight(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             asked = equations if pull is None else equations + pull
             return solve_reduced(asked, self._reduction, begin, method=self._fit.method).weights
 
         if self.mode == "linear":
-            return best(self._tiles().equations(self._rest_weight), start)
-        pixels = self._film().pixels(self._rest_weight, self._fit.transform)
-        return self._film().nearer(pixels, start, best, pull)
+            return best(reduce(add, (x.tiles().equations(rest_weight) for x in views)), start)
+        films = self._films_of(views)
+        return films.nearer(films.pixels(rest_weight, self._fit.transform), start, best, pull)
 
-    def _pull(self) -> NormalEquations | None:
+    def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
         """What pulls at the weights, as of `Problem.pull`: the colours' part is found once."""
-        if self._pulls is None:
-            keeps_color = self._reduction.is_free & self._basis.power.any(axis=1)
-            prefer = self._constraints.prefer_current
-            whole = (self._basis, self._fit)
-            self._pulls = (
-                pull_of(*whole, prefer, 0.0, keeps_color),
-                pull_of(*whole, 0.0, 1.0, keeps_color),
-            )
-        present, colors = self._pulls
-        if colors is None:
-            return present
-        colors = colors.times(self._painted_share)
-        return colors if present is None else present + colors
+        if self._pulls is None or self._pulls[0] != views:
+            power = _power(views)
+            keeps_color = self._reduction.is_free & power.any(axis=1)
+            present, prefer = self._basis.present_weights, self._constraints.prefer_current
 
-    @property
-    def _painted_share(self) -> float:
-        """Importance of all that is painted, beside the number of pixels."""
-        return float(self._sums[:, 0].sum()) / self._importance.size
+            def of(prefer: float, share: float) -> NormalEquations | None:
+                return pull_of(
+                    power,
+                    present,
+                    self._fit,
+                    prefer_current=prefer,
+                    painted_share=share,
+                    keeps_color=keeps_color,
+                )
 
-    @property
-    def _rest_weight(self) -> float:
+            self._pulls = views, of(prefer, 0.0), of(0.0, 1.0)
+        _, to_present, to_colors = self._pulls
+        if to_colors is None:
+            return to_present
+        # Importance of all that is painted, beside the number of pixels.
+        pixels = sum(view.pixels for view in views)
+        to_colors = to_colors.times(sum(float(view.counts[0]) for view in views) / pixels)
+        return to_colors if to_present is None else to_present + to_colors
+
+    def _rest_weight(self, views: tuple[LiveView, ...]) -> float:
         """What a pixel counts that is not painted."""
         fit = self._fit
-        painted, rest = self._sums.sum(axis=0)
         if fit.unpainted or not fit.hold:
             return fit.unpainted
-        return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
+        painted, rest = reduce(add, (view.counts for view in views))
+        return float(min(fit.hold * painted / rest, 1.0)) if rest > 0 else 0.0
 
-    def _count_rows(self, rows: slice) -> None:
-        a = self._importance[rows].astype(np.float64)
-        self._sums[rows, 0] = a.sum(axis=1)
-        left = np.where(self._basis.emitters_seen[rows], 0, np.maximum(1 - a, 0))
-        self._sums[rows, 1] = left.sum(axis=1)
+    def _films_of(self, views: tuple[LiveView, ...]) -> Films:
+        if self._films is None or self._films[0] != views:
+            self._films = views, Films([self._film_of(view) for view in views])
+        return self._films[1]
 
-    def _tiles(self) -> "PaintedTiles":
-        if self._light is None:
-            self._light = PaintedTiles(self._basis, self._image, self._importance)
-        return self._light
-
-    def _film(self) -> "SmallFilm":
-        if self._display is None:
-            self._display = SmallFilm(self._basis, self._image, self._importance)
-            self._display.see_through(self._fit.transform)
-        return self._display
+    def _film_of(self, view: LiveView) -> SmallFilm:
+        """All films together have as many pixels as that of one view."""
+        return view.film(self._fit.transform, max(1, FILM // len(self._views)))
 
 
-def untouched(basis: Basis, reduction: Reduction) -> Doubles:
+def _power(views: Sequence[LiveView]) -> Doubles:
+    """‖Φᵢ‖² of all views together, (n, 3)."""
+    return reduce(add, (view.basis.power for view in views))
+
+
+def untouched(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
     """The weights (n, 3) nearest to the present ones, of what constraints leave."""
-    present = to_present(basis, 1.0)
-    return solve_reduced(present, reduction, basis.present_weights).weights
+    weights = views[0].basis.present_weights
+    return solve_reduced(to_present(_power(views), weights), reduction, weights).weights

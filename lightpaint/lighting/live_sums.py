@@ -1,6 +1,6 @@
 """The sums behind answers under a brush: of light by tiles, and of a display over a small film."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from math import ceil
 
@@ -12,7 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.pixels import STRIP, Pixels
+from lightpaint.lighting.pixels import STRIP, Pixels, joined
 from lightpaint.lighting.reweighted import between
 from lightpaint.lighting.tiles import FEW_LIGHTS, TiledEquations
 from lightpaint.threads import one_thread
@@ -62,18 +62,18 @@ class PaintedTiles:
 
 
 class SmallFilm:
-    """The picture averaged to few pixels; what is painted of each, by its importance."""
+    """The picture averaged to `most` pixels; what is painted of each, by its importance."""
 
-    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+    def __init__(self, basis: Basis, image: Floats, importance: Floats, most: int = FILM) -> None:
         height, width = importance.shape
-        self._side = side = max(1, ceil((height * width / FILM) ** 0.5))
+        self._side = side = max(1, ceil((height * width / most) ** 0.5))
         self._image, self._importance, self._seen = image, importance, basis.emitters_seen
         rows, columns = -(-height // side), -(-width // side)
         self._size = rows, columns
         small = np.stack([_averaged(x, side) for x in basis.images])
         # Singles are enough for what is averaged, and sums of them take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
-        self._rows = np.ascontiguousarray(planes, np.float32)
+        self.rows = np.ascontiguousarray(planes, np.float32)
         self._current = _planes(_averaged(basis.present_look, side))
         self._painted = self._current.copy()
         self._transform: ViewTransform | None = None
@@ -125,6 +125,20 @@ class SmallFilm:
         share = np.where(weight > 0, rest / np.where(weight > 0, weight, 1), 0)
         seen = self._seen_painted, self._seen_current
         return Pixels(self._painted, weight, share, self._current, None, transform, seen)
+
+
+class Films:
+    """The films of several views as one: their pixels behind each other."""
+
+    def __init__(self, films: Sequence[SmallFilm]) -> None:
+        self._films = films
+        rows = [film.rows for film in films]
+        self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
+
+    def pixels(self, rest_weight: float, transform: ViewTransform | None) -> Pixels:
+        """The loss of all pixels, as of `SmallFilm`."""
+        each = [film.pixels(rest_weight, transform) for film in self._films]
+        return each[0] if len(each) == 1 else joined(each)
 
     def nearer(
         self,

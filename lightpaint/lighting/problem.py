@@ -195,8 +195,14 @@ class Problem:
     @cached_property
     def pull(self) -> NormalEquations | None:
         """What pulls to the present, or to the present colours, adds; None where none is asked."""
-        prefer, share = self.constraints.prefer_current, self.painted_share
-        return pull_of(self.basis, self.fit, prefer, share, self.keeps_color)
+        return pull_of(
+            self.basis.power,
+            self.basis.present_weights,
+            self.fit,
+            prefer_current=self.constraints.prefer_current,
+            painted_share=self.painted_share,
+            keeps_color=self.keeps_color,
+        )
 
     def pulled(self, equations: NormalEquations) -> NormalEquations:
         """`equations` with what pulls at the weights, if something does."""

@@ -8,17 +8,8 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.protocol import (
-    VERSION,
-    Hello,
-    Message,
-    Paint,
-    Said,
-    TakeOver,
-    of_frame,
-    said_of,
-    to_frame,
-)
+from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
+from lightpaint.paint.protocol import VERSION, Hello, Paint, Said, TakeOver
 
 #: Messages of a page that wait to be answered, before no more are taken from its socket.
 MOST_HEARD = 64
@@ -103,7 +94,9 @@ class Client:
         old, new = last.said, heard.said
         if not (isinstance(old, Paint) and isinstance(new, Paint)):
             return False
-        if old.done or old.stroke != new.stroke or not _is_within(old.region, new.region):
+        if old.done or (old.stroke, old.view) != (new.stroke, new.view):
+            return False
+        if not _is_within(old.region, new.region):
             return False
         heard.replies[:0] = last.replies
         self._heard[-1] = heard

@@ -14,12 +14,12 @@ from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
-from lightpaint.paint.steps import Identity
-from lightpaint.records import read_record, strict_json
+from lightpaint.paint.steps import Identity, Seen
+from lightpaint.records import strict_json
 from lightpaint.screen import some_names
 
 #: "lpnt", by which files know what they are, and which tables there are.
-APPLICATION, VERSION = 0x6C706E74, 1
+APPLICATION, VERSION = 0x6C706E74, 2
 
 #: Pages (of 16 KiB) of what was thrown away that are given back at a start: 64 MB, a moment.
 GIVEN_BACK = 4096
@@ -29,7 +29,7 @@ SYNCHRONOUS = "FULL"
 
 TABLES = """
 CREATE TABLE about (name TEXT PRIMARY KEY, value) WITHOUT ROWID;
-CREATE TABLE step (id INTEGER PRIMARY KEY, kind TEXT, label TEXT, fields TEXT, region TEXT);
+CREATE TABLE step (id INTEGER PRIMARY KEY, kind TEXT, label TEXT, fields TEXT, places TEXT);
 CREATE TABLE pixels (step INTEGER PRIMARY KEY, before BLOB, change BLOB);
 CREATE TABLE look (id INTEGER PRIMARY KEY, fields TEXT);
 CREATE TABLE look_array (look INTEGER, name TEXT, dtype TEXT, shape TEXT, data BLOB);
@@ -79,6 +79,8 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
             raise PaintError(f"{path} is no session of the painter: {AFRESH}")
+        elif version == 1:
+            _renew(database)
         elif version != VERSION:
             raise PaintError(
                 f"{path} was written by another version of lightpaint (format {version}, not "
@@ -90,6 +92,17 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
     with suppress(sqlite3.OperationalError):  # on a full disk
         # A row for each page, which only a script takes all of.
         database.executescript(f"PRAGMA incremental_vacuum({GIVEN_BACK})")
+
+
+def _renew(database: sqlite3.Connection) -> None:
+    """Of the first version, which knew one view: a region becomes a list of one place."""
+    database.execute("ALTER TABLE step RENAME COLUMN region TO places")
+    rows = database.execute("SELECT id, places FROM step").fetchall()
+    for number, region in rows:
+        where = strict_json(region)
+        places = json.dumps([] if where is None else [[0, *where]])
+        database.execute("UPDATE step SET places = ? WHERE id = ?", (places, number))
+    database.execute(f"PRAGMA user_version = {VERSION}")
 
 
 def identify(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
@@ -116,22 +129,33 @@ AFRESH = (
 def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
     """Raise PaintError for a session of something else."""
     for (said,) in database.execute("SELECT value FROM about WHERE name = 'identity'"):
-        its = read_record(Identity, strict_json(said))
-        if its.size != identity.size:
+        its = Identity.of_json(strict_json(said))
+        if len(its.views) > len(identity.views):
             raise PaintError(
-                f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {identity.scene} "
-                f"has {identity.size[1]}x{identity.size[0]}: {AFRESH}"
+                f"{path} is a session of {len(its.views)} views, and this is of "
+                f"{len(identity.views)}: {AFRESH}"
             )
-        if its.sensor != identity.sensor:
-            raise PaintError(
-                f"{path} is a session of the view through {its.sensor}, and this is through "
-                f"{identity.sensor}: {AFRESH}"
-            )
+        # Views may have come after those that it has.
+        for old, new in zip(its.views, identity.views, strict=False):
+            _check_view(path, identity.scene, old, new)
         if its.lights != identity.lights:
             raise PaintError(
                 f"{path} is a session of the lights {some_names(its.lights)}, and "
                 f"{identity.scene} has {some_names(identity.lights)}: {AFRESH}"
             )
+
+
+def _check_view(path: Path | None, scene: str, its: Seen, now: Seen) -> None:
+    if its.size != now.size:
+        raise PaintError(
+            f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {scene} has "
+            f"{now.size[1]}x{now.size[0]}: {AFRESH}"
+        )
+    if its.sensor and now.sensor and its.sensor != now.sensor:
+        raise PaintError(
+            f"{path} is a session of the view through {its.sensor}, and this is through "
+            f"{now.sensor}: {AFRESH}"
+        )
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -12,8 +13,8 @@ from lightpaint.images.denoise import denoised
 from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.paint.session import Moment
-from lightpaint.paint.subject import PAINTING, Subject
+from lightpaint.paint.moment import Moment
+from lightpaint.paint.subject import Subject, painting_of
 from lightpaint.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
@@ -22,12 +23,12 @@ from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.own import write_painting
 
-#: Files of an export beside the painting, and the folder of its report.
+#: Files of an export beside the paintings, and the folder of its report.
 LIGHTING, RELIT, ANSWER = "lighting.json", "relit.xml", "answer"
 
 
 def export(
-    subject: Subject,
+    subjects: Sequence[Subject],
     moment: Moment,
     lighting: Lighting,
     what: Sequence[str],
@@ -35,42 +36,56 @@ def export(
 ) -> list[Path]:
     """Write what is asked for into the folder of the session; returns the files.
 
-    Raises PaintError for what there is not, OutputError for what cannot be written.
+    subjects: of all views. Raises PaintError for what there is not, OutputError for what cannot be
+    written.
     """
-    folder = subject.folder
+    first, folder = subjects[0], subjects[0].folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make {folder}: {error.strerror}") from None
     written = []
     if "target" in what or "report" in what:
-        if moment.target is None:
+        if not moment.painted:
             raise PaintError("nothing is painted yet: there is no painting to write")
-        write_painting(folder / PAINTING, moment.target)
-        written.append(folder / PAINTING)
+        for sensor, target in zip(moment.sensors, moment.painted_targets, strict=True):
+            written.append(painting_of(folder, sensor))
+            write_painting(written[-1], target)
     if "lighting" in what:
         write_lighting(folder / LIGHTING, lighting)
         written.append(folder / LIGHTING)
     if "relit" in what:
-        if subject.scene is None:
+        if first.scene is None:
             raise PaintError("there is no scene to relight: it was opened from a saved basis")
-        relight(subject.loaded, lighting, folder / RELIT)
+        relight(first.loaded, lighting, folder / RELIT)
         written.append(folder / RELIT)
     if "report" in what:
-        written.append(_report(subject, moment, progress))
+        written += _report(subjects, moment, progress)
     return written
 
 
-def _report(subject: Subject, moment: Moment, progress: Progress) -> Path:
-    """All that `solve` leaves, for the painting as it is."""
-    assert moment.target is not None
-    answer = subject.folder / ANSWER
+def _report(subjects: Sequence[Subject], moment: Moment, progress: Progress) -> list[Path]:
+    """All that `solve` leaves, for the paintings as they are; the reports of it."""
+    answer = subjects[0].folder / ANSWER
     settings = replace(moment.settings, force=True)
-    scenes = () if subject.scene is None else (subject.loaded,)
-    basis = moment.basis if subject.groups is None else subject.groups
-    job = Job(scenes, (moment.target,), answer, basis, moment.constraints, settings)
-    run(job, progress)
-    return answer / "report.html"
+    painted = [subjects[k] for k in moment.painted]
+    scenes = tuple(subject.loaded for subject in painted if subject.scene is not None)
+    targets, asked = moment.painted_targets, moment.constraints
+    if len(subjects) == 1:
+        groups = subjects[0].groups
+        basis = moment.bases[0] if groups is None else groups
+        job, bases = Job(scenes, targets, answer, basis, asked, settings), None
+    elif scenes:
+        bases = [moment.bases[k] for k in moment.painted]
+        # They are on their film already, and have their samples.
+        spp = bases[0].origin.spp if settings.checks_as_basis else settings.spp
+        done: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
+        settings = replace(settings, **done)
+        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
+    else:
+        raise PaintError("a report of several saved bases needs their scene: open that instead")
+    run(job, progress, bases=bases)
+    return [view.folder / "report.html" for view in job.views]
 
 
 def verified(

@@ -14,6 +14,7 @@ import secrets
 import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
@@ -36,6 +37,10 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 #: Seconds in which a browser has to use the token that it was started with. Others who work on the
 #: machine can read that, as they can all command lines; it is good once.
 SOON_S = 120.0
+
+#: Said to who has no cookie, and to who has that of an earlier server.
+UNKNOWN = "open the painter by the address that its terminal shows, which has a token"
+EARLIER = f"this page is of an earlier start of the painter: {UNKNOWN}"
 
 _AGAIN = b"""<!doctype html><html lang="en"><meta charset="utf-8"><title>lightpaint</title>
 <meta http-equiv="refresh" content="0; url=/"><p><a href="/">Open the painter</a></p></html>"""
@@ -83,8 +88,9 @@ class Guard:
             more = [(b"set-cookie", said.encode()), (b"content-type", b"text/html; charset=utf-8")]
             await _answer(_headed(send, scope), 200, _AGAIN, more)
         elif not self._is_known(scope):
-            reason = "open the painter by the address that its terminal shows, which has a token"
-            await _answer(_headed(send, scope), 403, reason)
+            # Where somebody was known by an earlier start of it, that is what there is to say.
+            status, reason = (410, EARLIER) if self._secrets(scope) else (403, UNKNOWN)
+            await _answer(_headed(send, scope), status, reason)
         else:
             await self.app(scope, receive, _headed(send, scope))
 
@@ -110,14 +116,16 @@ class Guard:
         return self.is_open and _is_address(name.removeprefix("[").removesuffix("]"))
 
     def _is_known(self, scope: Scope) -> bool:
+        return any(_same(secret, self._secret) for secret in self._secrets(scope))
+
+    def _secrets(self, scope: Scope) -> list[str]:
+        """What somebody has been given at this port, by this server or an earlier one."""
+        given = []
         for said in _header(scope, b"cookie"):
-            try:
-                found = SimpleCookie(said).get(self.cookie)
-            except CookieError:
-                continue
-            if found is not None and _same(found.value, self._secret):
-                return True
-        return False
+            with suppress(CookieError):
+                if (found := SimpleCookie(said).get(self.cookie)) is not None:
+                    given.append(found.value)
+        return given
 
     def _has_token(self, scope: Scope) -> bool:
         try:

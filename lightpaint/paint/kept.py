@@ -1,7 +1,7 @@
 """What a session file holds and is read when somebody asks for it: pixels of steps and of looks."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.packed import packed, unpacked, unpacked_patch
-from lightpaint.paint.steps import Patch, Pixels, Region
+from lightpaint.paint.steps import Patch, Pixels
 from lightpaint.records import strict_json
 
 #: What looks are made of.
@@ -19,11 +19,22 @@ DTYPES = ("float32", "float64", "float16", "uint8", "int16")
 PackedArrays = dict[str, tuple[str, str, bytes]]
 
 
-class KeptPatch(Patch):
-    """A patch that is in a file. read: its pixels before, and how those after differ, packed."""
+#: View and region of a patch.
+Place = tuple[int, int, int, int, int]
 
-    def __init__(self, region: Region, read: Callable[[], tuple[bytes, bytes]]) -> None:
-        vars(self).update(region=region, _read=read)
+
+class KeptPatch(Patch):
+    """A patch that is in a file, the k-th of its step.
+
+    places: view and region of each. read: pixels of all of them before, and how those after differ,
+    packed.
+    """
+
+    def __init__(
+        self, places: Sequence[Place], k: int, read: Callable[[], tuple[bytes, bytes]]
+    ) -> None:
+        view, *region = places[k]
+        vars(self).update(view=view, region=tuple(region), _places=places, _k=k, _read=read)
 
     @property
     def before(self) -> Pixels:
@@ -34,7 +45,9 @@ class KeptPatch(Patch):
         return self._pixels()[1]
 
     def _pixels(self) -> tuple[Pixels, Pixels]:
-        return unpacked_patch(self.region, *vars(self)["_read"]())
+        its = vars(self)
+        regions = [(top, bottom, left, right) for _, top, bottom, left, right in its["_places"]]
+        return unpacked_patch(regions, its["_k"], *its["_read"]())
 
 
 class LookArrays(Mapping[str, npt.NDArray[Any]]):

@@ -21,7 +21,8 @@ import numpy.typing as npt
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.client import Client, Heard
-from lightpaint.paint.protocol import Message, Said
+from lightpaint.paint.frames import Message
+from lightpaint.paint.protocol import Said
 from lightpaint.paint.store import Store
 
 #: Pages that are told that another has the session, at most.

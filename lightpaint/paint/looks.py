@@ -1,29 +1,23 @@
 """Looks of a session: a painting and its answer, kept under a name."""
 
 import time
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.images.blocks import block_mean
-from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.protocol import (
-    CopyLook,
-    DropLook,
-    LoadLook,
-    Message,
-    MixLooks,
-    RenameLook,
-    SaveLook,
-)
+from lightpaint.paint.frames import Message
+from lightpaint.paint.pictures import Pictures, small_picture
+from lightpaint.paint.protocol import CopyLook, DropLook, LoadLook, MixLooks, RenameLook, SaveLook
 from lightpaint.paint.session import Session
-from lightpaint.paint.steps import KeptLook, Pixels
+from lightpaint.paint.steps import KeptLook, Pixels, of_view
 from lightpaint.paint.wishes import Wishes
 
-#: Pixels of a thumbnail's longer side, about, and characters of a name.
-THUMBNAIL, LONGEST = 192, 80
+#: Characters of a name, at most.
+LONGEST = 80
 
 Said = SaveLook | RenameLook | CopyLook | MixLooks | DropLook
 
@@ -68,59 +62,70 @@ class Looks:
                 self._put(self._between(message))
             case DropLook(number):
                 store.drop_look(self._look(number).id)
-                self._pictures.withdraw(f"look/{number}")
+                for k in range(len(self._session.views)):
+                    self._pictures.withdraw(of_view(f"look/{number}", k))
         return Message("looks", {"looks": self.listed(), "resources": self._pictures.named()})
 
-    def load(self, message: LoadLook) -> Message:
+    def load(self, message: LoadLook) -> list[Message]:
         """Go on from a look."""
         look = self._look(message.look)
-        image, importance = (np.asarray(look.arrays[x]) for x in ("image", "importance"))
+        paintings = dict(enumerate(self._paintings(look)))
         wishes = Wishes.of(look.fields["wishes"])
-        return self._session.load(image, importance, wishes, f"look {look.fields['name']}")
+        return self._session.load(paintings, wishes, f"look {look.fields['name']}")
+
+    def _paintings(self, look: KeptLook) -> list[Pixels]:
+        """Light and importance of each view; of one that came later as before it was painted."""
+        arrays, found = look.arrays, []
+        names = set(arrays)
+        for k, view in enumerate(self._session.views):
+            if of_view("image", k) in names:
+                found.append(
+                    (
+                        np.asarray(arrays[of_view("image", k)]),
+                        np.asarray(arrays[of_view("importance", k)]),
+                    )
+                )
+            else:
+                found.append((view.present, np.zeros(view.size, np.float32)))
+        return found
 
     def _now(self, name: str) -> KeptLook:
         session = self._session
-        painting = session.image.copy(), session.importance.copy()
-        return self._made(name, painting, session.wishes, session.weights.copy())
+        paintings = [(view.image.copy(), view.importance.copy()) for view in session.views]
+        return self._made(name, paintings, session.wishes, session.weights.copy())
 
     def _between(self, message: MixLooks) -> KeptLook:
         """Both paintings, each as far as it counts, and the lights held between the answers."""
         part, name = message.part, self._named(message.name)
         if not 0 <= part <= 1:
             raise PaintError(f"part is {part:g}: expected 0 for the first look to 1 for the second")
-        arrays = [self._look(k).arrays for k in (message.first, message.second)]
+        looks = [self._look(k) for k in (message.first, message.second)]
         shares = 1 - part, part
-        weights = sum(s * np.asarray(x["weights"]) for s, x in zip(shares, arrays, strict=True))
-        counts = [s * np.asarray(x["importance"]) for s, x in zip(shares, arrays, strict=True)]
-        total = counts[0] + counts[1]
-        whole = np.where(total > 0, total, 1)[..., None]
-        image = np.zeros((*total.shape, 3), np.float32)
-        for count, its in zip(counts, arrays, strict=True):
-            image += (count[..., None] / whole * np.asarray(its["image"])).astype(np.float32)
+        weights = sum(
+            s * np.asarray(x.arrays["weights"]) for s, x in zip(shares, looks, strict=True)
+        )
+        both = zip(*(self._paintings(look) for look in looks), strict=True)
+        paintings = [_mixed(pair, shares) for pair in both]
         lights = self._session.basis.lights
         held = {
             light.name: {"lock": float(w[0]) if light.is_scalar else w.tolist()}
             for light, w in zip(lights, np.asarray(weights), strict=True)
             if not light.is_fixed
         }
-        return self._made(
-            name, (image, total.astype(np.float32)), Wishes(held), np.asarray(weights)
-        )
+        return self._made(name, paintings, Wishes(held), np.asarray(weights))
 
     def _made(
-        self, name: str, painting: Pixels, wishes: Wishes, weights: npt.NDArray[Any]
+        self, name: str, paintings: Sequence[Pixels], wishes: Wishes, weights: npt.NDArray[Any]
     ) -> KeptLook:
         fields = {"name": name, "stamp": time.time(), "wishes": wishes.as_json()}
-        look = self._session.basis.mix(weights)
-        factor = max(1, round(max(look.shape[:2]) / THUMBNAIL))
-        rows, columns = (n // factor * factor for n in look.shape[:2])
-        shown = self._session.transform.encode(block_mean(look[:rows, :columns], factor))
-        arrays: dict[str, npt.NDArray[Any]] = {
-            "image": np.asarray(painting[0], np.float32),
-            "importance": np.asarray(painting[1], np.float32),
-            "weights": weights,
-            "thumbnail": np.round(shown * 255).astype(np.uint8),
-        }
+        arrays: dict[str, npt.NDArray[Any]] = {"weights": weights}
+        for view, (image, importance) in zip(self._session.views, paintings, strict=True):
+            its = {
+                "image": np.asarray(image, np.float32),
+                "importance": np.asarray(importance, np.float32),
+                "thumbnail": small_picture(view.basis.mix(weights), self._session.transform),
+            }
+            arrays |= {of_view(key, view.view): value for key, value in its.items()}
         return KeptLook(self._free(), fields, arrays)
 
     def _put(self, look: KeptLook) -> None:
@@ -128,7 +133,12 @@ class Looks:
         self._offer(look)
 
     def _offer(self, look: KeptLook) -> None:
-        self._pictures.offer(f"look/{look.id}", lambda: np.asarray(look.arrays["thumbnail"]))
+        views = len(self._session.views)
+        names = {"thumbnail"} if views == 1 else set(look.arrays)
+        for k in range(views):
+            if (name := of_view("thumbnail", k)) in names:
+                make = partial(look.arrays.__getitem__, name)
+                self._pictures.offer(of_view(f"look/{look.id}", k), make)
 
     def _free(self) -> int:
         return 1 + max((look.id for look in self._session.store.looks()), default=0)
@@ -145,3 +155,14 @@ class Looks:
         if not shown:
             raise PaintError("a look needs a name")
         return shown
+
+
+def _mixed(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
+    """Two paintings of a view, each as far as it counts."""
+    counts = [share * its[1] for share, its in zip(shares, pair, strict=True)]
+    total = counts[0] + counts[1]
+    whole = np.where(total > 0, total, 1)[..., None]
+    image = np.zeros((*total.shape, 3), np.float32)
+    for count, its in zip(counts, pair, strict=True):
+        image += (count[..., None] / whole * its[0]).astype(np.float32)
+    return image, total.astype(np.float32)

@@ -6,6 +6,7 @@ from pixel to pixel, and zlib does the rest: half the bytes of zlib alone, in ha
 
 import math
 import zlib
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -42,18 +43,32 @@ def unpacked(data: bytes, dtype: str, shape: tuple[int, ...]) -> npt.NDArray[np.
     return np.ascontiguousarray(rows.T).reshape(-1).view(kind).reshape(shape)
 
 
-def packed_patch(patch: Patch) -> tuple[bytes, bytes]:
+def packed_patches(patches: Sequence[Patch]) -> tuple[bytes, bytes]:
     """Pixels before a step, and how those after it differ: not at all where it left them."""
-    before, after = _bits(patch.before, patch.region), _bits(patch.after, patch.region)
+    before = np.concatenate([_bits(patch.before, patch.region) for patch in patches])
+    after = np.concatenate([_bits(patch.after, patch.region) for patch in patches])
     return packed(before), packed(before ^ after)
 
 
-def unpacked_patch(region: Region, before: bytes, change: bytes) -> tuple[Pixels, Pixels]:
-    """Pixels before and after, to the last bit. Raises PaintError for a damaged file."""
+def unpacked_patch(
+    regions: Sequence[Region], k: int, before: bytes, change: bytes
+) -> tuple[Pixels, Pixels]:
+    """Pixels before and after of patch k, to the last bit. regions: of all patches of the step.
+
+    Raises PaintError for a damaged file.
+    """
+    ends = np.cumsum([0, *(_values(region) for region in regions)]).tolist()
+    was, is_other = (
+        np.asarray(unpacked(x, "uint32", (ends[-1],)))[ends[k] : ends[k + 1]]
+        for x in (before, change)
+    )
+    return _pixels(was, regions[k]), _pixels(was ^ is_other, regions[k])
+
+
+def _values(region: Region) -> int:
+    """How many numbers a region has, of light and importance."""
     top, bottom, left, right = region
-    pixels = (bottom - top) * (right - left)
-    was = np.asarray(unpacked(before, "uint32", (4 * pixels,)))
-    return _pixels(was, region), _pixels(was ^ unpacked(change, "uint32", (4 * pixels,)), region)
+    return 4 * (bottom - top) * (right - left)
 
 
 def _bits(pixels: Pixels, region: Region) -> npt.NDArray[np.uint32]:

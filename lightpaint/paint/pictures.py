@@ -6,10 +6,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import PaintError
+from lightpaint.images.blocks import block_mean
 from lightpaint.report.figures import thumbnail
+
+#: Pixels of a thumbnail's longer side, about.
+THUMBNAIL = 192
 
 #: Points along each side of a lookup table, and the light, in stops, that its ends stand for.
 SIDE, LOW, HIGH = 64, -13.0, 7.0
@@ -23,7 +28,8 @@ Picture = npt.NDArray[Any]
 class Pictures:
     """Pictures by name, each with the number of its generation; made when they are first asked for.
 
-    Updated in place. Names are those of the protocol: `plane/3`, `lut/agx`, `painting`.
+    Updated in place. Names are those of the protocol: `plane/3`, `lut/agx`, `painting`, and of a
+    view that is not the first `painting@1`.
     """
 
     def __init__(self) -> None:
@@ -52,21 +58,34 @@ class Pictures:
         make = self._makers.get(name)
         if make is None:
             raise PaintError(f"there is no picture {name[:40]!r}")
-        if name in ("painting", "importance"):
-            return make()  # they change under the brush
+        if is_changing(name):
+            return make()
         if name not in self._made:
             self._made[name] = make()
         return self._made[name]
 
     def named(self) -> dict[str, int]:
-        """Generation of each, by name."""
-        return dict(self.generations)
+        """Generation of each, by name; of what changes under the brush there are none."""
+        return {name: k for name, k in self.generations.items() if not is_changing(name)}
+
+
+def is_changing(name: str) -> bool:
+    """Whether it is a picture that changes under the brush."""
+    return name.partition("@")[0] in ("painting", "importance")
 
 
 def small(basis: Basis, k: int) -> Picture:
     """A thumbnail of what light k does, as a display shows it."""
     picture, _ = thumbnail(basis.images[k], basis.emitters_seen)
     return np.round(picture * 255).astype(np.uint8)
+
+
+def small_picture(light: Floats, transform: ViewTransform) -> Picture:
+    """A thumbnail of a picture (h, w, 3), as a display shows it."""
+    factor = max(1, round(max(light.shape[:2]) / THUMBNAIL))
+    rows, columns = (n // factor * factor for n in light.shape[:2])
+    shown = transform.encode(block_mean(light[:rows, :columns], factor))
+    return np.round(shown * 255).astype(np.uint8)
 
 
 def table_of(transform: ViewTransform) -> Picture:

@@ -10,15 +10,14 @@ import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from importlib.util import find_spec
-from math import prod
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.client import Client
+from lightpaint.paint.frames import MAX_FRAME
 from lightpaint.paint.guard import App, Guard
 from lightpaint.paint.line import Line, Painted, pictured
 from lightpaint.paint.page_files import PageFile, page_files
-from lightpaint.paint.protocol import MAX_FRAME
 from lightpaint.paint.store import Store
 
 if TYPE_CHECKING:
@@ -160,7 +159,7 @@ class Server:
     def _largest(self) -> int:
         """Bytes of the longest message that a page may send."""
         store = self._line.store
-        pixels = MAX_FRAME if store is None or store.identity is None else prod(store.identity.size)
+        pixels = MAX_FRAME if store is None or store.identity is None else store.identity.largest
         return min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
 
     @property

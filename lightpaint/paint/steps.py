@@ -8,12 +8,14 @@ it, so that a long history costs no more than the patches that are still to be s
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import prod
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
+from lightpaint.records import read_record
 
 #: Light (rows, columns, 3) and importance (rows, columns) of one place, both float32.
 Pixels = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]
@@ -24,14 +26,16 @@ Region = tuple[int, int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The pixels of one region, before a step and after it.
+    """The pixels of one region of a view, before a step and after it.
 
-    region: (top, bottom, left, right). before, after: light and importance of its pixels.
+    region: (top, bottom, left, right). before, after: light and importance of its pixels. view: by
+    its place in the session.
     """
 
     region: Region
     before: Pixels
     after: Pixels
+    view: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,21 +44,21 @@ class Step:
 
     kind: "stroke", "asked", "ties", "settings", "look_loaded", ...; whoever makes it knows more.
     label: what undo calls it. fields: plain values before and after, as JSON has them.
-    patch: the pixels that it changed, or None.
+    patches: the pixels that it changed, of one view or several.
     """
 
     kind: str
     label: str
     fields: Mapping[str, Any] = field(default_factory=dict)
-    patch: Patch | None = None
+    patches: tuple[Patch, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class KeptLook:
     """A look under a name. id: a number that no other look of the session has.
 
-    fields: name, quality, time and the like, as JSON has them. arrays: image, importance, weights,
-    thumbnail.
+    fields: name, quality, time and the like, as JSON has them. arrays: weights, and image,
+    importance and thumbnail of each view, called as `of_view` says.
     """
 
     id: int
@@ -62,39 +66,72 @@ class KeptLook:
     arrays: Mapping[str, npt.NDArray[Any]]
 
 
+def of_view(name: str, view: int) -> str:
+    """What something of a view is called: by its name alone of the first, `name@1` of the next."""
+    return name if view == 0 else f"{name}@{view}"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a view is. sensor: that it is seen through, "" where nobody knows. size: (height, width)
+    of its picture.
+    """
+
+    sensor: str
+    size: tuple[int, int]
+
+
 @dataclass(frozen=True)
 class Identity:
-    """What a session is of: steps speak of its pixels, and of its lights by their names.
+    """What a session is of: steps speak of pixels of its views, and of its lights by their names.
 
     scene: name of the scene or basis, for people. basis: what the basis says it was made of, which
-    may change, as a scene does in which something was moved. size: (height, width). sensor: that
-    it is seen through.
+    may change, as a scene does in which something was moved.
     """
 
     scene: str
     basis: str
-    size: tuple[int, int]
     lights: tuple[str, ...]
-    sensor: str = ""
+    views: tuple[Seen, ...]
 
     @classmethod
-    def of(cls, basis: Basis) -> "Identity":
-        """That of a session which paints on `basis`."""
-        origin = basis.origin
-        return cls(
-            origin.scene, f"{origin.scene_identity} {origin.sensor}", basis.size, basis.names
-        )
+    def of(cls, bases: Sequence[Basis]) -> "Identity":
+        """That of a session which paints on `bases`, of one view each."""
+        origin, names = bases[0].origin, bases[0].names
+        views = tuple(Seen(basis.origin.sensor, basis.size) for basis in bases)
+        return cls(origin.scene, f"{origin.scene_identity} {origin.sensor}", names, views)
+
+    @classmethod
+    def of_json(cls, data: Mapping[str, Any]) -> "Identity":
+        """From what a session file says, also one of the first version. Raises ValueError."""
+        if "size" in data:
+            old = {"sensor": data.get("sensor", ""), "size": data["size"]}
+            rest = {k: v for k, v in data.items() if k not in ("size", "sensor")}
+            data = {**rest, "views": [old]}
+        return read_record(cls, data)
+
+    @classmethod
+    def joined(cls, alone: Sequence["Identity"]) -> "Identity":
+        """That of a session of several views, from those of each."""
+        first = alone[0]
+        views = tuple(view for its in alone for view in its.views)
+        return cls(first.scene, first.basis, first.lights, views)
+
+    @property
+    def largest(self) -> int:
+        """Pixels of its largest view."""
+        return max(prod(view.size) for view in self.views)
 
 
-def painted_by(steps: Sequence[Step], start: Pixels) -> Pixels:
-    """The canvas after `steps`, which began at `start`: light (h, w, 3), importance (h, w).
+def painted_by(steps: Sequence[Step], start: Pixels, view: int = 0) -> Pixels:
+    """The canvas of a view after `steps`, which began at `start`: light (h, w, 3), importance.
 
     The same as every patch put down in order; looks only at those that show.
     """
     image, importance = start[0].copy(), start[1].copy()
     is_open = np.ones(importance.shape, dtype=bool)
-    for patch in (step.patch for step in reversed(steps)):
-        if patch is None:
+    for patch in (patch for step in reversed(steps) for patch in step.patches):
+        if patch.view != view:
             continue
         top, bottom, left, right = patch.region
         here = np.s_[top:bottom, left:right]

@@ -25,9 +25,9 @@ from typing import Any
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.database import damaged, identify, opened, transaction
-from lightpaint.paint.kept import KeptPatch, LookArrays, PackedArrays, packed_arrays
-from lightpaint.paint.packed import packed_patch
-from lightpaint.paint.steps import Identity, KeptLook, Step
+from lightpaint.paint.kept import KeptPatch, LookArrays, PackedArrays, Place, packed_arrays
+from lightpaint.paint.packed import packed_patches
+from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
 from lightpaint.records import strict_json
 
 _Write = Callable[[sqlite3.Connection], object]
@@ -87,22 +87,22 @@ class Store:
     def append(self, step: Step) -> None:
         """Do `step`, after what is done; what was taken back is cut off."""
         with self._lock:
-            region = None if step.patch is None else tuple(map(int, step.patch.region))
-            fields, shape = _text(step.fields), json.dumps(region)
-            blobs = None if step.patch is None else packed_patch(step.patch)
+            patches = step.patches
+            fields, places = _text(step.fields), json.dumps([_place(one) for one in patches])
+            blobs = packed_patches(patches) if patches else None
             del self.steps[self.position :], self._ids[self.position :]
             kept = self._ids[-1] if self._ids else 0
             self._last = number = self._last + 1
             if blobs is not None:
                 self._blobs[number] = blobs
-            self.steps.append(self._step(number, step.kind, step.label, fields, shape))
+            self.steps.append(self._step(number, step.kind, step.label, fields, places))
             self._ids.append(number)
             self.position += 1
 
             def write(database: sqlite3.Connection) -> None:
                 database.execute("DELETE FROM step WHERE id > ?", (kept,))
                 database.execute("DELETE FROM pixels WHERE step > ?", (kept,))
-                values = (number, step.kind, step.label, fields, shape)
+                values = (number, step.kind, step.label, fields, places)
                 database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", values)
                 if blobs is not None:
                     database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (number, *blobs))
@@ -207,7 +207,7 @@ class Store:
     def _read(self) -> None:
         """All but pixels, of the file."""
         ask = self._database.execute
-        rows = ask("SELECT id, kind, label, fields, region FROM step ORDER BY id").fetchall()
+        rows = ask("SELECT id, kind, label, fields, places FROM step ORDER BY id").fetchall()
         for row in rows:
             self.steps.append(self._step(*row))
             self._ids.append(row[0])
@@ -220,12 +220,13 @@ class Store:
                 number, strict_json(fields), LookArrays(self._look_arrays, number)
             )
 
-    def _step(self, number: int, kind: str, label: str, fields: str, region: str) -> Step:
-        where, patch = strict_json(region), None
-        if where is not None:
-            top, bottom, left, right = (int(edge) for edge in where)
-            patch = KeptPatch((top, bottom, left, right), partial(self._pixels, number))
-        return Step(str(kind), str(label), strict_json(fields), patch)
+    def _step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
+        places: list[Place] = []
+        for view, top, bottom, left, right in strict_json(where):
+            places.append((int(view), int(top), int(bottom), int(left), int(right)))
+        read = partial(self._pixels, number)
+        patches = tuple(KeptPatch(places, k, read) for k in range(len(places)))
+        return Step(str(kind), str(label), strict_json(fields), patches)
 
     def _pixels(self, number: int) -> tuple[bytes, bytes]:
         with self._lock:
@@ -251,6 +252,12 @@ class MemoryStore(Store):
 
     def __init__(self, identity: Identity | None = None) -> None:
         super().__init__(None, identity)
+
+
+def _place(patch: Patch) -> Place:
+    """View and region, as they are kept."""
+    top, bottom, left, right = map(int, patch.region)
+    return int(patch.view), top, bottom, left, right
 
 
 def _text(fields: Mapping[str, Any]) -> str:

@@ -5,61 +5,42 @@ rendered, exact answers, clean planes, exports and the verifying render have thr
 which say what has come of them through `on_message`.
 """
 
-import os
-import sys
-import time
-import traceback
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from threading import Condition, Lock, RLock, Thread, get_native_id
+from collections.abc import Callable, Mapping, Sequence
+from threading import RLock, Thread
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import (
-    CleanPlanes,
-    as_halves,
-    clean_plane,
-    keep_planes,
-    kept_planes,
-    scale_of,
-)
-from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.files import first_line
+from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_planes
+from lightpaint.errors import PaintError
 from lightpaint.images.denoise import denoised
-from lightpaint.lighting.analysis.analyse import analyse, with_findings
+from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
+from lightpaint.paint.beside import Settling, StoppedError, give_way, told
+from lightpaint.paint.canvas import Canvas
+from lightpaint.paint.errands import Errands
+from lightpaint.paint.frames import Message
 from lightpaint.paint.looks import Looks
-from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.protocol import Message
-from lightpaint.paint.session import Moment, Session
-from lightpaint.paint.steps import Identity
+from lightpaint.paint.moment import Moment
+from lightpaint.paint.offered import fields_of_views, offer_transforms, offer_view
+from lightpaint.paint.pictures import Picture, Pictures
+from lightpaint.paint.session import Session
+from lightpaint.paint.steps import Identity, Pixels, of_view
 from lightpaint.paint.store import Store
-from lightpaint.paint.subject import PAINTING, Subject
-from lightpaint.paint.told import analysis_fields, light_fields, lights_fields
+from lightpaint.paint.subject import Subject, bases_of, transform_of
+from lightpaint.paint.told import analysis_fields, answer_fields
 from lightpaint.paint.wishes import Wishes
-
-#: Seconds of rest after a stroke before the exact answer is looked for.
-REST_S = 0.2
-
-#: How much less urgent than strokes all else is, where threads can be told apart: on Linux.
-NICE = 10
-
-
-class StoppedError(Exception):
-    """Somebody does not want it any more."""
 
 
 class Studio:
-    """A subject under the brush.
+    """Views under the brush.
 
     Args:
-        subject: What is painted.
-        open_store: The store of a session of it, opened when its lights are known.
+        subjects: What is painted: views of one lighting.
+        open_store: The store of a session of them, opened when their lights are known.
 
     Attributes:
         on_message: Hears what is said unasked, from other threads.
@@ -67,8 +48,10 @@ class Studio:
         failure: The same, afterwards.
     """
 
-    def __init__(self, subject: Subject, open_store: Callable[[Identity], Store]) -> None:
-        self.subject, self._open_store = subject, open_store
+    def __init__(
+        self, subjects: Sequence[Subject], open_store: Callable[[Identity], Store]
+    ) -> None:
+        self.subjects, self._open_store = tuple(subjects), open_store
         self.on_message: Callable[[Message], None] | None = None
         self.on_failure: Callable[[Exception], None] | None = None
         self.failure: Exception | None = None
@@ -77,12 +60,13 @@ class Studio:
         self._looks: Looks | None = None
         self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
         self._progress: Mapping[str, Any] | None = None  # of the first picture
-        self._lock, self._bell = RLock(), Condition()
-        self._unsettled, self._is_open, self._failed = False, True, ""
-        self._render, self._renders = Lock(), False
+        self._lock, self._is_open, self._failed = RLock(), True, ""
+        self._settling = Settling(self._find, self.tell)
+        self._errands = Errands(self)
+        works = {"obtain": self._obtain, "settle": self._settling.settle}
         self._threads = [
-            Thread(target=work, name=f"lightpaint-{work.__name__}", daemon=True)
-            for work in (self._obtain, self._settle)
+            Thread(target=work, name=f"lightpaint-{name}", daemon=True)
+            for name, work in works.items()
         ]
 
     @property
@@ -97,16 +81,20 @@ class Studio:
         """Where it is kept; None before there is a basis."""
         return None if self._session is None else self._session.store
 
+    @property
+    def renders(self) -> bool:
+        """Whether there are scenes, and not only bases of them."""
+        return self.subjects[0].scene is not None
+
     def start(self) -> None:
-        """Begin to obtain the basis."""
+        """Begin to obtain the bases."""
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
         """End; all that was done is kept."""
-        with self._bell:
-            self._is_open = False
-            self._bell.notify_all()
+        self._is_open = False
+        self._settling.end()
         with self._lock:
             if self._session is not None:
                 self._session.store.close()
@@ -115,34 +103,38 @@ class Studio:
 
     def state(self) -> Message:
         """All there is, for a page that opens."""
+        first = self.subjects[0]
         with self._lock:
             session = self._session
             about: dict[str, Any] = {
                 "version": protocol.VERSION,
-                "scene": self.subject.name,
-                "folder": str(self.subject.folder),
-                "can_render": self.subject.scene is not None,
+                "scene": first.name,
+                "folder": str(first.folder),
+                "can_render": self.renders,
+                "can_report": self.renders or len(self.subjects) == 1,
             }
             if session is None:
                 return Message(
                     "waiting", {**about, "text": self._failed, "progress": self._progress}
                 )
-            basis = session.basis
-            about |= self._of_basis(basis, session)
+            about |= self._of_session(session)
             known = self._known if self._known.get("version") == session.version else {}
-            answer = {"lights": lights_fields(basis, session.weights), **known}
+            bases = [view.basis for view in session.views]
+            answer = {**answer_fields(bases, session.weights), **known}
             arrays = session.weights_array
             return Message("state", {**about, **session.about, "answer": answer}, arrays)
 
     def greet(self, *, is_back: bool) -> Message:
-        """The state, for a page that begins; is_back: it was there before, and will send what it
-        has of a stroke again. What another one had begun is kept as it was left.
+        """The state, for a page that begins. What another one had begun is kept as it was left.
+
+        is_back: it was there before, and nobody since: it sends what it has of a stroke again.
         """
         with self._lock:
             if self._session is not None and self._session.is_open:
                 self._session.left(with_stroke=not is_back)
-                self._ring()
-            return self.state()
+                self._settling.ring()
+            state = self.state()
+            return Message(state.kind, {**state.fields, "is_back": is_back}, state.arrays)
 
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
         """What comes of a message at once. Raises LightpaintError for what cannot be done."""
@@ -160,17 +152,13 @@ class Studio:
                     return [looks.said(message)]
                 case protocol.MixLooks() | protocol.DropLook():
                     return [looks.said(message)]
+                case protocol.Export() | protocol.Verify() | protocol.Explain():
+                    return self._errands.said(message)
                 case protocol.LoadLook():
-                    made = [looks.load(message)]
-                case protocol.Export():
-                    return self._later(self._export, message)
-                case protocol.Verify():
-                    return self._verify(message)
-                case protocol.Explain():
-                    return self._later(self._explain, message)
+                    made = looks.load(message)
                 case _:
                     made = session.said(message, arrays)
-        self._ring()
+        self._settling.ring()
         return made
 
     def moment(self) -> Moment:
@@ -178,14 +166,20 @@ class Studio:
         with self._lock:
             return self.session.moment()
 
-    def load(self, image: Floats, importance: Floats, wishes: Wishes, label: str) -> Message:
-        """Go on from another painting and what was asked with it: one step, a `patch`.
+    def now(self) -> tuple[Moment, Lighting]:
+        """The same, and the last answer."""
+        with self._lock:
+            moment, weights = self.session.moment(), self.session.weights
+        return moment, Lighting.of_weights(moment.bases[0], weights)
+
+    def load(self, paintings: Mapping[int, Pixels], wishes: Wishes, label: str) -> list[Message]:
+        """Go on from other paintings, by view, and what was asked with them: one step, `patch`.
 
         Raises LightpaintError for what cannot be asked, and has changed nothing then.
         """
         with self._lock:
-            made = self.session.load(image, importance, wishes, label)
-        self._ring()
+            made = self.session.load(paintings, wishes, label)
+        self._settling.ring()
         return made
 
     def resource(self, name: str) -> npt.NDArray[Any]:
@@ -195,121 +189,94 @@ class Studio:
 
     # Beside it
 
-    def _say(self, message: Message | None) -> None:
+    def tell(self, message: Message | None) -> None:
+        """Say it to the page, if there is one."""
         if message is not None and self.on_message is not None and self._is_open:
             self.on_message(message)
 
-    def _hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+    def put(self, name: str, picture: Picture) -> None:
+        """A picture from now on, of which the page is told."""
+        with self._lock:
+            self.pictures.put(name, picture)
+            new = {name: self.pictures.generations[name]}
+        self.tell(Message("renewed", {"resources": new}))
+
+    def hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """How far something is. Raises StoppedError where it has ended."""
         if not self._is_open:
             raise StoppedError
         about = {"what": label, "done": done, "total": total, "unit": unit}
         if self._session is None:
             self._progress = about
-        self._say(Message("progress", about))
-
-    def _later(self, work: Callable[[Any], None], message: Any) -> list[Message]:
-        """Do it in a thread of its own; what fails is said."""
-
-        def run() -> None:
-            give_way()
-            try:
-                work(message)
-            except StoppedError:
-                self._say(Message("progress", {"what": "", "done": 1, "total": 1}))
-            except Exception as error:
-                self._say(Message("say", {"text": _told(error), "tone": "warn"}))
-
-        Thread(target=run, name=f"lightpaint-{work.__name__}", daemon=True).start()
-        return [Message("started", {"what": type(message).__name__.lower()})]
+        self.tell(Message("progress", about))
 
     def _obtain(self) -> None:
-        """The basis, better and better."""
+        """The bases, better and better."""
         give_way()
         try:
-            for basis in self.subject.bases(self._hears):
-                self._take(basis)
-            self._say(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
+            for bases in bases_of(self.subjects, self.hears):
+                self._take(bases)
+            self.tell(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
             self._clean()
         except StoppedError:
             pass
         except Exception as error:
             is_told = self._session is None and self.on_failure is not None
-            self._failed = _told(error, at_length=not is_told)
-            self._say(Message("say", {"text": self._failed, "tone": "warn"}))
+            self._failed = told(error, at_length=not is_told)
+            self.tell(Message("say", {"text": self._failed, "tone": "warn"}))
             if self._session is None:
                 self.failure = error
-                self._say(self.state())
+                self.tell(self.state())
             if is_told and self._is_open:
                 self.on_failure(error)  # type: ignore[misc]
 
-    def _take(self, basis: Basis) -> None:
-        """Paint on with this basis."""
-        clean = kept_planes(basis) if self.subject.settings.use_cache else None
-        present = denoised(basis.present_look, basis.features) if clean is None else clean.present
+    def _take(self, bases: Sequence[Basis]) -> None:
+        """Paint on with these bases."""
+        first = self.subjects[0]
+        is_kept = first.settings.use_cache
+        clean = [kept_planes(basis) if is_kept else None for basis in bases]
+        presents = [
+            denoised(basis.present_look, basis.features) if planes is None else planes.present
+            for basis, planes in zip(bases, clean, strict=True)
+        ]
         with self._lock:
             if not self._is_open:
                 raise StoppedError
             if self._session is None:
-                store = self._open_store(Identity.of(basis))
+                store = self._open_store(Identity.of(bases))
                 self._session = Session(
-                    basis,
-                    present,
+                    bases,
+                    presents,
                     store,
-                    settings=self.subject.settings,
-                    transform=self.subject.transform(basis),
-                    constraints=self.subject.constraints,
+                    settings=first.settings,
+                    transform=transform_of(self.subjects, bases),
+                    constraints=first.constraints,
                 )
                 self._looks = Looks(self._session, self.pictures)
             else:
-                self._session.improve(basis, present)
-            self._offer(self._session, clean)
-        self._say(self.state())
-        self._ring()
-
-    def _offer(self, session: Session, clean: CleanPlanes | None) -> None:
-        basis, offer = session.basis, self.pictures.offer
-        for k, plane in enumerate(basis.images):
-            offer(f"plane/{k}", lambda p=plane: as_halves(p, scale_of(p)))  # type: ignore[misc]
-            offer(f"thumb/{k}", lambda k=k: pictures.small(basis, k))  # type: ignore[misc]
-            if clean is None:
-                self.pictures.withdraw(f"clean/{k}")
-            else:
-                self.pictures.put(f"clean/{k}", clean.halves[k])
-        offer("present", lambda: as_halves(session.present))
-        offer("painting", lambda: session.image.copy())
-        offer("importance", lambda: session.importance.copy())
-        if basis.features is not None:
-            albedo = basis.features.albedo
-            offer("albedo", lambda: as_halves(albedo))
-        if basis.objects is not None:
-            index = basis.objects.index
-            offer("objects", lambda: index.astype(np.int16))
-        for transform in self._transforms(session):
-            offer(f"lut/{transform.name}", lambda t=transform: pictures.table_of(t))  # type: ignore[misc]
+                self._session.improve(bases, presents)
+            session = self._session
+            for view, planes in zip(session.views, clean, strict=True):
+                offer_view(self.pictures, view, session.transform, planes)
+            offer_transforms(self.pictures, self._transforms(session))
+        self.tell(self.state())
+        self._settling.ring()
 
     def _transforms(self, session: Session) -> list[Any]:
         own = session.transform.name
         names = [*pictures.TRANSFORMS, *([own] if own not in pictures.TRANSFORMS else [])]
         return [type(session.transform)(name) for name in names]
 
-    def _of_basis(self, basis: Basis, session: Session) -> dict[str, Any]:
-        wanted = self.subject.wanted
-        looks = self._looks.listed() if self._looks is not None else []
-        scales = [scale_of(plane) for plane in basis.images]
-        return {
-            "size": list(basis.size),
-            "lights": [
-                {**light_fields(light), "scale": scale}
-                for light, scale in zip(basis.lights, scales, strict=True)
-            ],
-            "objects": [] if basis.objects is None else list(basis.objects.names),
+    def _of_session(self, session: Session) -> dict[str, Any]:
+        wanted, basis = self.subjects[0].wanted, session.basis
+        painted = [view.name for view in session.views if view.is_painted]
+        sensors = [""] if len(session.views) == 1 else painted
+        return fields_of_views(session.views) | {
             "transforms": [x.name for x in self._transforms(session)],
             "transform": {"name": session.transform.name, "stops": session.transform.stops},
             "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
-            # These two change under the brush.
-            "resources": self.pictures.named()
-            | dict.fromkeys(("painting", "importance"), session.version),
-            "looks": looks,
+            "resources": self.pictures.named(),
+            "looks": self._looks.listed() if self._looks is not None else [],
             "basis": {
                 "spp": basis.origin.spp,
                 "wanted": wanted or basis.origin.spp,
@@ -318,156 +285,47 @@ class Studio:
             "has_noise": basis.knows_noise,
             "first": not session.store.steps,
             "stroke": session.stroke,
-            "command": self._command(session.wishes),
+            "command": self._errands.command(sensors, session.wishes),
         }
-
-    def _command(self, wishes: Wishes) -> str:
-        """The command that answers the exported painting alike, where there are commands."""
-        subject = self.subject
-        return subject.command(str(subject.folder / PAINTING), wishes)
 
     def _clean(self) -> None:
         """Planes without their grain, one after the other."""
-        session = self._session
-        assert session is not None
-        basis = session.basis
-        if not basis.knows_noise or "clean/0" in self.pictures.generations:
-            return
-        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
-        planes = CleanPlanes(halves, scales, session.present)
-        for k in range(len(basis.lights)):
-            if not self._is_open or session.basis is not basis:
+        session = self.session
+        bases = [view.basis for view in session.views]
+        for view, basis in zip(session.views, bases, strict=True):
+            is_there = of_view("clean/0", view.view) in self.pictures.generations
+            if basis.knows_noise and not is_there and not self._clean_view(view, basis):
                 return
-            planes.halves[k], planes.scales[k] = clean_plane(basis, k)
-            with self._lock:
-                self.pictures.put(f"clean/{k}", planes.halves[k])
-                new = {f"clean/{k}": self.pictures.generations[f"clean/{k}"]}
-            self._say(Message("renewed", {"resources": new}))
-        if self.subject.settings.use_cache:
-            keep_planes(basis, planes)
 
-    def _ring(self) -> None:
-        with self._bell:
-            self._unsettled = True
-            self._bell.notify_all()
-
-    def _settle(self) -> None:
-        """The exact answer, whenever the brush rests; then what is known of it."""
-        give_way()
-        while True:
-            with self._bell:
-                self._bell.wait_for(lambda: self._unsettled or not self._is_open)
-                if not self._is_open:
-                    return
-                self._unsettled = False
-            time.sleep(REST_S)
-            with self._bell:
-                if self._unsettled:
-                    continue
-            try:
-                self._find()
-            except Exception as error:
-                # A mistake of our own ends no session: the next stroke is answered again.
-                self._say(Message("say", {"text": _told(error), "tone": "warn"}))
+    def _clean_view(self, view: Canvas, basis: Basis) -> bool:
+        """Those of one view, which are kept. Returns whether they are wanted to the end."""
+        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        for k in range(len(basis.lights)):
+            if not self._is_open or view.basis is not basis:
+                return False
+            halves[k], scales[k] = clean_plane(basis, k)
+            self.put(of_view(f"clean/{k}", view.view), halves[k])
+        if self.subjects[0].settings.use_cache:
+            keep_planes(basis, CleanPlanes(halves, scales, view.present))
+        return True
 
     def _find(self) -> None:
+        """The exact answer, then what is known of it."""
         with self._lock:
             session = self._session
             if session is None or session.is_open:
                 return
             moment = session.moment()
         solution = moment.solution()
-        self._tell(lambda: session.settled(moment, solution))
+        self._tell_answer(lambda: session.settled(moment, solution))
         if solution is None or moment.version != session.version:
             return
-        [analysis] = analyse(solution)
-        self._tell(lambda: session.settled(moment, solution, **analysis_fields(analysis)))
+        analyses = analyse(solution)
+        known = analysis_fields(analyses, moment.painted)
+        self._tell_answer(lambda: session.settled(moment, solution, **known))
 
-    def _tell(self, make: Callable[[], Message | None]) -> None:
+    def _tell_answer(self, make: Callable[[], Message | None]) -> None:
         with self._lock:
             message = make()
             self._known = message.fields if message is not None else self._known
-        self._say(message)
-
-    # Long work
-
-    def _answer(self) -> tuple[Moment, Lighting]:
-        """What is painted now, and the exact answer to it."""
-        with self._lock:
-            session = self._session
-            assert session is not None
-            moment, weights = session.moment(), session.weights
-        solution = moment.solution()
-        if solution is None:
-            return moment, Lighting.of_weights(moment.basis, weights)
-        solution = with_findings(solution, analyse(solution))
-        return moment, solution.lighting
-
-    def _export(self, message: protocol.Export) -> None:
-        # It brings all rooms, of which painting needs a few.
-        from lightpaint.paint.exports import export
-
-        moment, lighting = self._answer()
-
-        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
-            del label  # what it is at within an export is no news to a page
-            self._hears("export", done, total, unit)
-
-        with self._render:
-            files = export(self.subject, moment, lighting, message.what, hears)
-        command = self._command(moment.wishes)
-        self._say(Message("exported", {"files": [str(x) for x in files], "command": command}))
-
-    def _verify(self, message: protocol.Verify) -> list[Message]:
-        if not message.run:
-            self._renders = False
-            return [Message("started", {"what": "stop"})]
-        if self.subject.scene is None:
-            raise PaintError("there is no scene to render: it was opened from a saved basis")
-        return self._later(self._verified, message)
-
-    def _verified(self, _asked: protocol.Verify) -> None:
-        from lightpaint.paint.exports import verified
-
-        moment, lighting = self._answer()
-
-        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
-            if not self._renders:
-                raise StoppedError
-            self._hears(label, done, total, unit)
-
-        self._renders = True
-        with self._render:
-            picture, said, agrees = verified(self.subject, moment.basis, lighting, hears)
-        with self._lock:
-            self.pictures.put("verified", as_halves(picture))
-            new = {"verified": self.pictures.generations["verified"]}
-        self._say(Message("renewed", {"resources": new}))
-        self._say(Message("verified", {"agrees": agrees, "text": said}))
-
-    def _explain(self, _: protocol.Explain) -> None:
-        with self._lock:
-            assert self._session is not None
-            moment = self._session.moment()
-        said, beyond = moment.beyond()
-        with self._lock:
-            self.pictures.put("beyond", beyond)
-            new = {"beyond": self.pictures.generations["beyond"]}
-        self._say(Message("renewed", {"resources": new}))
-        self._say(Message("explained", {"sentences": said}))
-
-
-def _told(error: Exception, *, at_length: bool = True) -> str:
-    """What to say of it; a mistake of lightpaint's own is told at length where it was started."""
-    if isinstance(error, LightpaintError):
-        return str(error)
-    if at_length:
-        traceback.print_exception(error)
-    return f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
-
-
-def give_way() -> None:
-    """Let this thread, and those that it starts, leave the processors to more urgent ones."""
-    if sys.platform == "linux":
-        with suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, get_native_id(), NICE)
+        self.tell(message)

@@ -1,8 +1,10 @@
 """What is painted: a scene, a saved basis, or light groups; and how its lights come to be known."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
@@ -19,23 +21,21 @@ from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
 
-#: The painting among the files of an export.
-PAINTING = "painting.exr"
-
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
 FIRST = (2, 8, 32, 128)
 
 
 @dataclass(frozen=True)
 class Subject:
-    """One view to be painted.
+    """One view to be painted, alone or among others.
 
     source: as it was named, for people and for command lines. scene: on the film of the basis, or
     one that is loaded when it is needed; None without a renderer. basis: where there is one
     already, as of light groups. settings, constraints: how paintings are answered. choice: of a
-    view transform, to paint through. folder: receives what is exported. command: that answers an
-    exported painting, by its path, as a session does in which this is wished; "" where there are
-    no commands.
+    view transform, to paint through. folder: receives what is exported. command: that answers
+    exported paintings as a session does in which this is wished; their paths by sensor, "" for that
+    of the only view; "" where there are no commands. among: how many views the time is for in which
+    bases are rendered.
     """
 
     source: str
@@ -46,7 +46,8 @@ class Subject:
     settings: Settings = field(default_factory=Settings)
     constraints: Constraints = field(default_factory=Constraints)
     choice: TransformChoice = field(default_factory=TransformChoice)
-    command: Callable[[str, Wishes], str] = lambda painting, wishes: ""
+    command: Callable[[Mapping[str, str], Wishes], str] = lambda paintings, wishes: ""
+    among: int = 1
 
     @property
     def name(self) -> str:
@@ -92,7 +93,7 @@ class Subject:
             for spp in FIRST:
                 if has < spp < wanted:
                     yield self._obtained(spp, progress)
-        basis = obtain(scene, settings, progress)
+        basis = obtain(scene, settings, progress, views=self.among)
         if isinstance(self.scene, Opening):
             self.scene.remember(basis)
         yield basis.asking(scene.asked)
@@ -117,7 +118,27 @@ class Subject:
         basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
         return basis.asking(scene.asked)
 
-    def transform(self, basis: Basis) -> ViewTransform:
-        """What it is painted through: as asked, else sRGB at an exposure that shows something."""
-        stops = choose_exposure(basis.present_look)
-        return self.choice.over(ViewTransform("srgb", stops))
+
+def painting_of(folder: Path, sensor: str) -> Path:
+    """Where the painting of a view is exported to. sensor: "" of the only one."""
+    return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
+
+
+def bases_of(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
+    """Bases of several views; where they are still to be rendered, all of few samples first."""
+    each = [subject.bases(progress) for subject in subjects]
+    found = [next(bases) for bases in each]
+    yield list(found)
+    while True:
+        more = [next(bases, None) for bases in each]
+        if all(basis is None for basis in more):
+            return
+        found = [basis or before for basis, before in zip(more, found, strict=True)]
+        yield list(found)
+
+
+def transform_of(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTransform:
+    """What is painted through: as asked, else sRGB at an exposure that shows something of all."""
+    looks = [basis.present_look for basis in bases]
+    whole = looks[0] if len(looks) == 1 else np.concatenate([x.reshape(1, -1, 3) for x in looks], 1)
+    return subjects[0].choice.over(ViewTransform("srgb", choose_exposure(whole)))

@@ -1,5 +1,7 @@
 """What a page is told of an answer: short sentences, and of each light what people go by."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,12 +11,30 @@ from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analyse import Analysis
-from lightpaint.report.sentences import spoken_errors, what_holds
-from lightpaint.report.verdict import headline
+from lightpaint.lighting.analysis.held_back import Held
+from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.report.sentences import spoken_errors, spoken_percent, what_holds
+from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
 #: Distance from Planck's locus up to which a colour is called white, and part of the present light
 #: under which one is off.
 WHITE, OFF = 0.02, 1e-4
+
+
+#: How far what was asked has come about, from which share of it on.
+WAYS = (
+    (0.85, "Nearly there"),
+    (0.6, "Most of the way"),
+    (0.4, "About half of the way"),
+    (0.15, "A part of the way"),
+    (0.0, "A first step"),
+)
+
+#: What to do about what holds the lights.
+HELP: dict[Held, str] = {
+    "hold": "Paint what may change too, or let it go.",
+    "colors": "The settings give them any colour.",
+}
 
 
 def light_fields(light: BasisLight) -> dict[str, Any]:
@@ -35,14 +55,22 @@ def light_fields(light: BasisLight) -> dict[str, Any]:
     }
 
 
-def lights_fields(basis: Basis, weights: Doubles) -> list[dict[str, Any]]:
-    """Of each light as it is answered: emission, change, colour, part of the picture."""
-    lit = (basis.totals * weights) @ LUMINANCE
-    whole = float(lit.sum())
-    return [
-        _light(light, weight, float(lit[k]) / whole if whole > 0 else 0.0)
-        for k, (light, weight) in enumerate(zip(basis.lights, weights, strict=True))
+def answer_fields(bases: Sequence[Basis], weights: Doubles) -> dict[str, Any]:
+    """Of each light as it is answered: emission, change, colour, part of the picture.
+
+    Of several views `shares` has its part of each, too.
+    """
+    lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
+    lights = [
+        _light(light, weight, share)
+        for light, weight, share in zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
     ]
+    return {"lights": lights} | ({"shares": [_shares(x) for x in lit]} if len(bases) > 1 else {})
+
+
+def _shares(lit: Doubles) -> list[float]:
+    whole = float(lit.sum())
+    return [float(x) / whole if whole > 0 else 0.0 for x in lit]
 
 
 def _light(light: BasisLight, weight: Doubles, share: float) -> dict[str, Any]:
@@ -59,18 +87,49 @@ def _light(light: BasisLight, weight: Doubles, share: float) -> dict[str, Any]:
     }
 
 
-def analysis_fields(analysis: Analysis) -> dict[str, Any]:
-    """The headline, what holds the lights, and of each light how sure it is and whether held."""
-    solution, seen = analysis.solution, analysis.seen
-    errors = spoken_errors(analysis.uncertainty, len(solution.basis.names))
+def analysis_fields(analyses: Sequence[Analysis], painted: Sequence[int]) -> dict[str, Any]:
+    """The headline, what holds the lights, and of each light how sure it is and whether held.
+
+    painted: the view of each analysis. What is said of the whole is of the view missed most.
+    """
+    solution = analyses[0].solution
+    errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings = solution.lighting.lights
+    of_views = {view: _seen_fields(its) for view, its in zip(painted, analyses, strict=True)}
+    worst = max(of_views.values(), key=lambda its: float(its["delta_e"]))
     return {
-        "headline": headline(seen),
-        "delta_e": seen.delta_e,
-        "delta_e_asked": seen.asked,
-        "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],
+        **worst,
+        "of_views": [of_views.get(k) for k in range(max(painted) + 1)],
         "of_lights": [
             {"error": error, "held": its.is_active, "unreached": not any(its.reached)}
             for error, its in zip(errors, settings, strict=True)
         ],
+    }
+
+
+def sketched(seen: Seen) -> str:
+    """How far a painting in progress has come, and what would bring it further: no judgement yet.
+
+    A sketch begins with a stroke, of which little can come about before more is said.
+    """
+    if seen.is_close:
+        return headline(seen)
+    far = next(words for least, words in WAYS if seen.share_met >= least)
+    said = f"{far}, {spoken_percent(seen.share_met)}"
+    if seen.place is None:
+        return f"{said}. Paint what matters most, or give it more importance."
+    # One reason at a time: the next one is told when that has been seen to.
+    first = replace(seen, held=seen.held[:1])
+    told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
+    return " ".join([told, *(HELP[its] for its in first.held if its in HELP)])
+
+
+def _seen_fields(analysis: Analysis) -> dict[str, Any]:
+    """How close one view is, and why not closer."""
+    seen = analysis.seen
+    return {
+        "headline": sketched(seen),
+        "delta_e": seen.delta_e,
+        "delta_e_asked": seen.asked,
+        "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],
     }

@@ -7,36 +7,30 @@ its event loop, where there is one. Without one, as in a script, they say it the
 import asyncio
 import atexit
 import contextvars
-import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, RLock
 from typing import Any
 
-import numpy as np
-
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
-from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.errors import PaintError
 from lightpaint.files import first_line
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
+from lightpaint.paint import cells
 from lightpaint.paint.bundle import widget_script, widget_style
+from lightpaint.paint.frames import Message
 from lightpaint.paint.launch import wait_for_renders
-from lightpaint.paint.protocol import VERSION, Hello, Message, TakeOver, said_of
-from lightpaint.paint.session import Moment
+from lightpaint.paint.moment import Moment
+from lightpaint.paint.places import Places
+from lightpaint.paint.session import Session
 from lightpaint.paint.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
-from lightpaint.paint.subject import Subject
-from lightpaint.paint.wishes import Wishes
-from lightpaint.scene.quality import on_film
-from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.settings import Settings
 from lightpaint.target.own import write_painting
 from lightpaint.target.target import Target
@@ -47,11 +41,16 @@ try:
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
-#: Numbers of messages that one place has at which the painter is shown: `seq // MESSAGES`.
-MESSAGES = 2**32
-
 #: What can be set from a cell, and is told of.
-LIVE = ("target", "lighting", "constraints")
+LIVE = ("target", "targets", "lighting", "constraints")
+
+#: What setting them means.
+ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
+    "target": cells.of_target,
+    "targets": cells.of_targets,
+    "lighting": cells.of_lighting,
+    "constraints": cells.of_constraints,
+}
 
 
 class Live(traitlets.Any):  # type: ignore[misc]
@@ -66,8 +65,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     Args:
         scene: What is painted: a basis, a scene (its basis is rendered meanwhile), light groups,
-            or the path of a scene.
-        target: To begin with.
+            or the path of a scene. Of several views a list of bases or of scenes, for one lighting.
+        target: To begin with; of several views a list of them.
         constraints: What is asked of the lights, beside what is asked in the painter.
         transform: To paint through; what is open of it follows from the scene.
         store: A file to keep the session in, which is gone on with if it is there. Without one
@@ -77,7 +76,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         settings: Fields of `lp.Settings`, by name.
 
     Attributes:
-        target: The painting, a `Target`; None where nothing is painted.
+        target: The painting, a `Target`; None where nothing is painted. Of several views, the first
+            one's.
+        targets: The paintings of all views, in order.
         lighting: The `Lighting` that answers it. Setting it holds every light there.
         constraints: The `Constraints` that were asked in the painter.
 
@@ -101,13 +102,14 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
     height = traitlets.Int(720).tag(sync=True)
     target = Live(None)
+    targets = Live(())
     lighting = Live(None)
     constraints = Live(None)
 
     def __init__(
         self,
-        scene: Basis | Scene | LightGroups | str | Path,
-        target: Target | None = None,
+        scene: cells.Paintable | Sequence[cells.Paintable],
+        target: Target | Sequence[Target | None] | None = None,
         *,
         constraints: Constraints | None = None,
         transform: ViewTransform | TransformChoice | None = None,
@@ -117,33 +119,35 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         **settings: Any,
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
-        self._page, self._waiting = 0, list[Callable[[], None]]()
+        self._waiting = list[Callable[[], None]]()
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
-        subject = _subject(scene, folder, Settings(**settings), constraints, transform)
+        asked = {"settings": Settings(**settings), "constraints": constraints}
+        subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
         place = None if store is None else Path(store)
         self._studio = Studio(
-            subject, lambda its: MemoryStore(its) if place is None else Store.open(place, its)
+            subjects, lambda its: MemoryStore(its) if place is None else Store.open(place, its)
         )
+        self._places = Places(self._studio, self._lock, self._carry)
         self._failed = ""
         super().__init__(height=height)
         self.on_msg(self._said)
         self._studio.on_message = self._hears
         self._studio.start()
-        if subject.scene is not None:
+        if self._studio.renders:
             atexit.register(self.close)  # what renders cannot be left alone at the end
-        if subject.basis is not None:
+        else:
             self._is_there.wait()
             if self._failed:
                 raise PaintError(self._failed)
             self._follow()
         if target is not None:
-            self._when_there(lambda: setattr(self, "target", target))
+            name = "target" if isinstance(target, Target) else "targets"
+            self._when_there(lambda: setattr(self, name, target))
 
     def __repr__(self) -> str:
-        subject = self._studio.subject
-        return f"Painter({subject.name})"
+        return f"Painter({self._studio.subjects[0].name})"
 
     @property
     def solution(self) -> Solution | None:
@@ -158,8 +162,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._solved = moment.version, found
         return self._solved[1]
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, *, view: int = 0) -> None:
         """Keep the painting (`.exr`) or its lighting (`.json`), as `lightpaint solve` reads them.
+
+        view: of which view, in the order in which they were given.
 
         Raises PaintError where nothing is painted yet, or for another kind of file.
         """
@@ -168,10 +174,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             write_lighting(path, self._lighting(moment))
         elif path.suffix != ".exr":
             raise PaintError(f"{path}: expected .exr for the painting, .json for the lighting")
-        elif moment.target is None:
+        elif (target := moment.targets[view]) is None:
             raise PaintError("nothing is painted yet: there is no painting to keep")
         else:
-            write_painting(path, moment.target)
+            write_painting(path, target)
 
     def close(self) -> None:
         """End it; a session with a file can be gone on with."""
@@ -179,7 +185,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._studio.on_message = None
             self._studio.close()
             super().close()
-            if self._studio.subject.scene is not None:
+            if self._studio.renders:
                 wait_for_renders()
 
     # What is set from a cell
@@ -190,52 +196,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         name, value = proposal.trait.name, proposal.value
         if self._is_telling:
             return value
-        acts: dict[str, Callable[[Any], None]] = {
-            "target": self._paint,
-            "lighting": self._hold,
-            "constraints": self._ask,
-        }
         with self._lock:
-            acts[name](value)
+            for message in self._studio.load(*ACTS[name](self._studio.session, value)):
+                self._places.tell(message)
             new = self._now()
             self._follow({key: its for key, its in new.items() if key != name})
         return new[name]
-
-    def _paint(self, target: Target | None) -> None:
-        session = self._studio.session
-        if not isinstance(target, Target | None):
-            raise PaintError(f"painter.target is a lp.Target or None, not {type(target).__name__}")
-        if target is None:
-            image, importance = session.present, np.zeros(session.size, np.float32)
-        else:
-            target = target.fitted_to(session.size, resize=False)
-            image, importance = target.image, target.importance
-        self._load(image, importance, session.wishes, "painting from a cell")
-
-    def _hold(self, lighting: Lighting) -> None:
-        session = self._studio.session
-        if not isinstance(lighting, Lighting):
-            raise PaintError(f"painter.lighting is a lp.Lighting, not {type(lighting).__name__}")
-        weights = lighting.weights_for(session.basis)
-        lights = {
-            light.name: {"lock": weight.tolist()}
-            for light, weight in zip(session.basis.lights, weights, strict=True)
-            if not light.is_fixed
-        }
-        wishes = Wishes(lights, session.wishes.ties, session.wishes.values)
-        self._load(session.image, session.importance, wishes, "lighting from a cell")
-
-    def _ask(self, constraints: Constraints | None) -> None:
-        session = self._studio.session
-        if not isinstance(constraints, Constraints | None):
-            kind = type(constraints).__name__
-            raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")
-        lights, values = session.basis.lights, session.wishes.values
-        wishes = Wishes.asking(constraints or Constraints(), lights, values)
-        self._load(session.image, session.importance, wishes, "constraints from a cell")
-
-    def _load(self, image: Any, importance: Any, wishes: Wishes, label: str) -> None:
-        self._tell(self._studio.load(image, importance, wishes, label))
 
     # What is told
 
@@ -250,16 +216,19 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             traceback.print_exc()
             said = f"{type(error).__name__}: {first_line(error)}"
             text = f"a callback of painter.{change['name']} failed: {said}"
-            self._tell(Message("say", {"text": text, "tone": "warn"}))
+            self._places.tell(Message("say", {"text": text, "tone": "warn"}))
 
     def _now(self) -> dict[str, Any]:
         """What the session has, by name of what says so."""
         moment = self._studio.moment()
-        target = moment.target
-        weights, name = self._studio.session.weights, "" if target is None else target.name
+        weights, targets = self._studio.session.weights, moment.targets
+        name = " + ".join(target.name for target in moment.painted_targets)
+        if cells.same_paintings(targets, self.targets):
+            targets = self.targets
         return {
-            "target": self.target if _same_painting(target, self.target) else target,
-            "lighting": Lighting.of_weights(moment.basis, weights, target=name),
+            "target": targets[0],
+            "targets": targets,
+            "lighting": Lighting.of_weights(moment.bases[0], weights, target=name),
             "constraints": moment.wishes.constraints(),
         }
 
@@ -282,52 +251,16 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         solution = self.solution
         if solution is not None:
             return solution.lighting
-        return Lighting.of_weights(moment.basis, self._studio.session.weights)
+        return Lighting.of_weights(moment.bases[0], self._studio.session.weights)
 
     # What page and session say
 
     def _said(self, _: Any, content: Any, buffers: Any) -> None:
-        """Answer the page, whatever it says."""
-        seq = content.get("seq") if isinstance(content, dict) else None
-        try:
-            seq, said, arrays = said_of(content, [bytes(x) for x in buffers or ()])
-            page = seq // MESSAGES
-            with self._lock:
-                if isinstance(said, Hello | TakeOver):
-                    self._give(page)
-                if isinstance(said, Hello) and said.version != VERSION:
-                    text = "lightpaint has been updated: run the cell again"
-                    answers = [Message("closed", {"reason": "version", "text": text})]
-                elif page != self._page:
-                    self._tell_taken(page, seq)
-                    return
-                else:
-                    answers = self._studio.said(said, arrays)
-        except LightpaintError as error:
-            answers = [Message("failed", {"text": str(error)})]
-        except Exception as error:
-            # A mistake of lightpaint's own, which anywidget would say nothing of.
-            traceback.print_exc(file=sys.stderr)
-            text = f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
-            answers = [Message("failed", {"text": text})]
-        for k, message in enumerate(answers):
-            self._tell(message, seq if k == 0 else None)
+        self._places.hear(content, buffers)
 
-    def _give(self, page: int) -> None:
-        """Who was shown last has the session; who had it is told."""
-        before, self._page = self._page, page
-        if before not in (0, page):
-            self._tell_taken(before)
-
-    def _tell_taken(self, page: int, reply: int | None = None) -> None:
-        text = "the painter is open at another place of this notebook"
-        self._tell(Message("closed", {"reason": "taken", "text": text}), reply, page=page)
-
-    def _tell(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
-        if self.comm is None:
-            return
-        content = message.content(reply) | {"page": self._page if page is None else page}
-        self.send(content, message.buffers())
+    def _carry(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+        if self.comm is not None:
+            self.send(content, buffers)
 
     def _hears(self, message: Message) -> None:
         """What the studio says by itself, from a thread of its own."""
@@ -345,7 +278,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._loop.call_soon_threadsafe(act, context=self._context)
 
     def _heard(self, message: Message) -> None:
-        self._tell(message)
+        self._places.tell(message)
         if message.kind == "state":
             waiting, self._waiting = self._waiting, []
             for act in waiting:
@@ -361,46 +294,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._waiting.append(act)
 
 
-def _same_painting(new: Target | None, old: Target | None) -> bool:
-    if new is None or old is None:
-        return new is old
-    return np.array_equal(new.image, old.image) and np.array_equal(new.importance, old.importance)
-
-
 def _running_loop() -> asyncio.AbstractEventLoop | None:
     try:
         return asyncio.get_running_loop()
     except RuntimeError:
         return None
-
-
-def _subject(
-    given: Any,
-    folder: str | Path | None,
-    settings: Settings,
-    constraints: Constraints | None,
-    transform: ViewTransform | TransformChoice | None,
-) -> Subject:
-    """What is painted. Raises LightpaintError for what cannot be."""
-    about: dict[str, Any] = {
-        "settings": settings,
-        "constraints": constraints or Constraints(),
-        "choice": TransformChoice.of(transform),
-    }
-    if isinstance(given, str | Path):
-        given = load_scene(given)
-    if isinstance(given, Scene):
-        scene = on_film(given, settings.quality, settings.resolution)
-        name = str(scene.path)
-        about |= {"scene": scene}
-    elif isinstance(given, LightGroups):
-        name = given.basis.origin.scene
-        about |= {"basis": given.basis, "groups": given}
-    elif isinstance(given, Basis):
-        name = given.origin.scene
-        about |= {"basis": given}
-    else:
-        kind = type(given).__name__
-        raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
-    place = Path(f"{Path(name).stem}.paint") if folder is None else Path(folder)
-    return Subject(source=name, folder=place.absolute(), **about)

@@ -58,13 +58,12 @@ def headline(seen: Seen) -> str:
         return "Close: it looks as painted."
     if seen.place is None:
         return f"{_manner(seen)}: too much of what was painted is out of reach."
-    where = spoken_where(seen.place)
-    change = spoken_difference(seen.place.painted, seen.place.reached)
     if seen.is_far:
-        return f"{_manner(seen)}: {where} it is painted {change} than they make it; {_why(seen)}."
-    change = change.replace("a little", "slightly")
-    light = f"the {change} {'shade' if _is_darker(seen) else 'light'} {where}"
-    return f"{_manner(seen)} {light} is out of reach: {_why(seen)}."
+        where = spoken_where(seen.place)
+        change = spoken_difference(seen.place.painted, seen.place.reached)
+        painted = f"{where} it is painted {change} than they make it"
+        return f"{_manner(seen)}: {painted}; {spoken_reason(seen)}."
+    return f"{_manner(seen)} the {spoken_missing(seen)} is out of reach: {spoken_reason(seen)}."
 
 
 def _manner(seen: Seen) -> str:
@@ -80,7 +79,15 @@ def _manner(seen: Seen) -> str:
     )
 
 
-def _why(seen: Seen) -> str:
+def spoken_missing(seen: Seen) -> str:
+    """`brighter light on the floor`: what is missed most. Of an answer that has such a place."""
+    assert seen.place is not None
+    change = spoken_difference(seen.place.painted, seen.place.reached)
+    light = "shade" if is_darker(seen) else "light"
+    return f"{change.replace('a little', 'slightly')} {light} {spoken_where(seen.place)}"
+
+
+def spoken_reason(seen: Seen) -> str:
     """What keeps the lights from the place where most is missed."""
     assert seen.place is not None
     if seen.held:
@@ -90,7 +97,7 @@ def _why(seen: Seen) -> str:
     if not seen.there:
         return "no light gets there"
     some, is_one = some_names(seen.there[:2], joint=" and "), len(seen.there) == 1
-    if _is_darker(seen):
+    if is_darker(seen):
         return f"{some} {'lights' if is_one else 'light'} it too"
     if not seen.does_much:
         return f"{some} {'does' if is_one else 'do'} little there"
@@ -106,7 +113,8 @@ def _spoken_views(names: tuple[str, ...]) -> str:
     )
 
 
-def _is_darker(seen: Seen) -> bool:
+def is_darker(seen: Seen) -> bool:
+    """Whether it is painted darker, where most is missed, than the lights make it."""
     assert seen.place is not None
     painted, reached = (luminance(np.array(x)) for x in (seen.place.painted, seen.place.reached))
     return bool(painted < reached)

@@ -10,6 +10,7 @@ import urllib.request
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +25,13 @@ from websockets.typing import Origin
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
-from lightpaint.paint.launch import subject_of
-from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
+from lightpaint.cli.spelling import solve_command
+from lightpaint.paint.frames import Message, of_frame, to_frame
+from lightpaint.paint.launch import subject_of, subjects_of
+from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.steps import Identity, Step
 from lightpaint.paint.store import Store
+from lightpaint.paint.wishes import Wishes
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 
@@ -64,8 +68,9 @@ def test_what_is_painted_and_where_it_is_kept(
     line: str, kind: type, path: str, folder: str | None
 ) -> None:
     values = asked(line)
-    assert type(values["source"]) is kind
-    assert values["source"].path == path
+    [source] = values["sources"]
+    assert type(source) is kind
+    assert source.path == path
     # Scenes that are called alike go by their folders.
     assert values["folder"] == Path(folder or f"{Path.cwd().name}.paint")
 
@@ -83,9 +88,35 @@ def test_the_command_for_what_is_exported_has_the_options_that_solve_has() -> No
     assert (values["new"], values["port"], values["host"]) == (True, 0, "127.0.0.1")
 
 
+@pytest.mark.usefixtures("here")
+def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> None:
+    values = asked("scene.xml --spp 8 -s a --sensor b")
+    assert [(one.path, one.sensor) for one in values["sources"]] == [
+        ("scene.xml", "a"),
+        ("scene.xml", "b"),
+    ]
+    assert values["options"] == ("--spp=8",)
+    paintings = {"a": "x/painting-a.exr", "b c": "x/painting-b c.exr"}
+    command = solve_command("scene.xml", paintings, values["options"], Wishes())
+    words = shlex.split(command)[1:]
+    options = command_parser().parse_args(words)
+    assert options.views == list(paintings.items())
+    basis = make_basis(2)
+    write_basis("side.basis.exr", replace(basis, origin=replace(basis.origin, sensor="side")))
+    values = asked("room.basis.exr side.basis.exr")
+    assert values["folder"] == Path("room.paint")
+    subjects = subjects_of(values["sources"], Path("x"))
+    found = [(subject.basis.origin.sensor, subject.among) for subject in subjects if subject.basis]
+    assert found == [(basis.origin.sensor, 2), ("side", 2)]
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
+        ("room.basis.exr room.basis.exr", "a view is there twice"),
+        ("room.basis.exr groups.exr", "several are bases of the views of one scene"),
+        ("scene.xml room.basis.exr", "named with --sensor, once for each"),
+        ("room.basis.exr -s a", "-s cannot change a saved basis|--sensor"),
         ("", "nothing to paint: give a scene, a basis, or light groups"),
         ("--lights key,fill", "no such file or folder of light groups: --lights key,fill"),
         ("scene.xml --lights groups.exr", "at once: give one to paint"),
@@ -104,12 +135,12 @@ def test_what_cannot_be_painted_is_said_in_one_line(here: Path, line: str, said:
 
 @pytest.mark.usefixtures("here")
 def test_a_subject_of_light_groups_knows_them() -> None:
-    subject = subject_of(asked("groups.exr")["source"], Path("x"))
+    subject = subject_of(asked("groups.exr")["sources"][0], Path("x"))
     assert subject.groups is not None
     assert subject.basis is subject.groups.basis
     assert subject.scene is None
     options = command_parser().parse_args(["paint", "groups.exr"])
-    assert isinstance(painted_of(options), GroupsFile)
+    assert isinstance(painted_of(options)[0], GroupsFile)
 
 
 #: `lightpaint …` where no renderer is installed.
@@ -161,7 +192,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         said = process.stderr.read()
         assert "Traceback" not in said
         assert said.endswith("what was painted is kept in room.paint\n")
-    identity = Identity.of(make_basis(2))
+    identity = Identity.of([make_basis(2)])
     with Store.open(path, identity) as store:
         store.append(Step("stroke", "mine"))
     with painting(here, "room.basis.exr", "--new") as (process, _):
@@ -240,7 +271,7 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(here: Path) 
 
 def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:
     folder = here / "room.paint"
-    Store.open(folder / "session.db", Identity.of(make_basis(2, (6, 5)))).close()
+    Store.open(folder / "session.db", Identity.of([make_basis(2, (6, 5))])).close()
     said = refused(here, "paint", "room.basis.exr", "--no-browser")
     assert "is a session of 5x6 pixels, and scene.xml has 10x12" in said
     assert "(-o)" in said

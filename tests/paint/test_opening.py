@@ -118,7 +118,7 @@ def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
     path: Path, make_basis: Any
 ) -> None:
     folder = path.parent / "s"
-    Store.open(folder / "session.db", Identity.of(make_basis(2))).close()
+    Store.open(folder / "session.db", Identity.of([make_basis(2)])).close()
     done = run(path.parent, "paint", path.name, "-o", "s", "--no-browser", "--port", "0")
     assert done.returncode == 2
     assert "session.db is a session of" in done.stderr

@@ -12,19 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.protocol import (
-    DTYPES,
-    KINDS,
-    MAX_TEXT,
-    Message,
-    Paint,
-    Set,
-    TakeOver,
-    Tie,
-    of_frame,
-    said_of,
-    to_frame,
-)
+from lightpaint.paint.frames import DTYPES, MAX_TEXT, Message, of_frame, said_of, to_frame
+from lightpaint.paint.protocol import KINDS, Paint, Set, TakeOver, Tie
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 PLAIN = st.recursive(

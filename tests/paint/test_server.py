@@ -17,10 +17,11 @@ from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
 from lightpaint.paint import client, line, server
+from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.guard import Guard
 from lightpaint.paint.line import Line
 from lightpaint.paint.page_files import page_files
-from lightpaint.paint.protocol import VERSION, Message, of_frame, to_frame
+from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.server import Server, listening, page_app
 
 PORT = 8421
@@ -123,7 +124,25 @@ def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
 def test_a_cookie_of_another_launch_is_worth_nothing(stranger: Served) -> None:
     for value in ("", "wrong", "é", '"'):
         headers = {"cookie": f"lightpaint_{PORT}={value}".encode()}
-        assert stranger.browser.get("/", headers=headers).status_code == 403
+        assert stranger.browser.get("/", headers=headers).status_code in (403, 410)
+
+
+def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path: Path) -> None:
+    other = Served(tmp_path / "later")
+    other.browser.cookies = served.browser.cookies
+    with other.browser:
+        for path in ("/", "/data/", "/data/present"):
+            answer = other.browser.get(path)
+            assert answer.status_code == 410
+            assert "of an earlier start of the painter: open" in answer.text
+            assert other.guard.token not in answer.text
+        with pytest.raises(REFUSED), other.socket():
+            pass
+        # Elsewhere it is told no more than anybody.
+        for headers in ({"host": "evil.example"}, {"origin": "http://evil.example"}):
+            assert other.browser.get("/", headers=headers).status_code == 403
+        other.enter()
+        assert other.browser.get("/").status_code == 200
 
 
 @pytest.mark.parametrize(
@@ -275,7 +294,9 @@ def test_a_picture_is_kept_by_its_generation_only(served: Served) -> None:
 
 def test_each_message_is_answered_by_its_number(served: Served) -> None:
     with served.socket() as socket:
-        assert greet(socket, 7) | {"reply": 7, "kind": "state"} == greet(socket, 7)
+        told = greet(socket, 7)
+        assert (told["reply"], told["kind"], told["is_back"]) == (7, "state", False)
+        assert greet(socket, 7) == told | {"is_back": True}
         socket.send_bytes(paint(8))
         content, [weights] = of_frame(socket.receive_bytes())
         assert (content["kind"], content["reply"]) == ("answer", 8)
@@ -409,7 +430,10 @@ def test_the_second_tab_is_told_and_may_take_over(served: Served) -> None:
         second.send_bytes(paint(7))
         assert heard(second)["kind"] == "answer"
         first.send_bytes(frame("take_over", 8))
-        assert heard(first)["kind"] == "state"
+        told = heard(first)
+        # What it has not said yet is of before the other one.
+        assert (told["kind"], told["is_back"]) == ("state", False)
+        assert greet(first, 9)["is_back"]
 
 
 def test_the_session_is_free_when_its_tab_has_gone(served: Served) -> None:

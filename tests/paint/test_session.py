@@ -20,7 +20,7 @@ from lightpaint.settings import Settings
 SIZE = (18, 32)
 
 
-def made_of(images: Any) -> lp.Basis:
+def made_of(images: Any, sensor: str = "camera") -> lp.Basis:
     """A basis without noise."""
     images = np.asarray(images, np.float32)
     names = [f"lamp {k}" for k in range(len(images))]
@@ -29,7 +29,7 @@ def made_of(images: Any) -> lp.Basis:
         images,
         np.zeros_like(images),
         np.zeros(images.shape[1:3], bool),
-        Origin("made", "made", "camera", 0, "separate", (0, 0), (0, 0)),
+        Origin("made", "made", sensor, 0, "separate", (0, 0), (0, 0)),
     )
 
 
@@ -46,6 +46,13 @@ def overlapping() -> lp.Basis:
     )
 
 
+def two_views() -> list[lp.Basis]:
+    """The same lights, seen from another place, too: smaller, and each otherwise."""
+    first = overlapping()
+    colors = np.random.default_rng(6).uniform(0.3, 1, (3, 1, 1, 3))
+    return [first, made_of(colors * first.images[[1, 2, 0], 3:13, 4:18], "side")]
+
+
 @pytest.fixture
 def basis() -> lp.Basis:
     """Three soft lights of different colours."""
@@ -54,23 +61,33 @@ def basis() -> lp.Basis:
 
 def session_of(basis: lp.Basis, store: MemoryStore | None = None, **how: Any) -> Session:
     """A session as the command line makes it."""
+    return several([basis], store, **how)
+
+
+def several(bases: list[lp.Basis], store: MemoryStore | None = None, **how: Any) -> Session:
+    """The same, of several views."""
     return Session(
-        basis,
-        basis.present_look,
-        store or MemoryStore(Identity.of(basis)),
+        bases,
+        [basis.present_look for basis in bases],
+        store or MemoryStore(Identity.of(bases)),
         settings=Settings(**how),
         transform=lp.ViewTransform(),
     )
 
 
 def paint(
-    stroke: int, region: tuple[int, int, int, int], light: float, *, done: bool = True
+    stroke: int,
+    region: tuple[int, int, int, int],
+    light: float,
+    *,
+    done: bool = True,
+    view: int = 0,
 ) -> tuple[protocol.Paint, dict[str, Any]]:
     """A message as the page sends it."""
     top, bottom, left, right = region
     shape = bottom - top, right - left
     image = np.full((*shape, 3), light, np.float32)
-    return protocol.Paint(stroke, region, done), {
+    return protocol.Paint(stroke, region, done, view=view), {
         "image": image,
         "importance": np.ones(shape, np.float32),
     }
@@ -83,9 +100,10 @@ def test_an_answer_is_that_of_solve(basis: lp.Basis):
     moment = session.moment()
     solution = moment.solution()
     assert solution is not None
-    assert moment.target is not None
+    [target] = moment.targets
+    assert target is not None
     asked = Constraints.of({basis.names[2]: {"lock": "80%"}})
-    expected = lp.solve(basis, moment.target, constraints=asked)
+    expected = lp.solve(basis, target, constraints=asked)
     np.testing.assert_array_equal(solution.weights, expected.weights)
     assert solution.space == "display"
     assert solution.problem.fit.hold == HOLD
@@ -112,6 +130,60 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
     assert apart.max() < (1e-6 if space == "linear" else 2e-2) * size.max()
 
 
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_several_views_have_one_answer_that_of_solve(space: Any):
+    bases = two_views()
+    session = several(bases, space=space)
+    session.said(*paint(1, (2, 9, 3, 12), 0.9))
+    alone = session.moment().solution()
+    assert alone is not None
+    # A view counts as soon as something is painted in it.
+    first = session.moment().targets[0]
+    assert first is not None
+    expected = lp.solve(bases[0], first, space=space)
+    np.testing.assert_array_equal(alone.weights, expected.weights)
+    answer = None
+    for k in range(4):
+        [answer] = session.said(*paint(2, (1, 6, 2, 4 + 2 * k), 0.3, done=k == 3, view=1))
+    assert answer is not None
+    moment = session.moment()
+    solution = moment.solution()
+    assert solution is not None
+    targets = [target for target in moment.targets if target is not None]
+    assert [target.name for target in targets] == ["painting camera", "painting side"]
+    together = lp.solve(bases, targets, space=space)
+    np.testing.assert_array_equal(solution.weights, together.weights)
+    size = np.sqrt(bases[0].power + bases[1].power)
+    apart = size * np.abs(answer.arrays["weights"] - together.weights)
+    # As of one view: sums are exact, and a film of few pixels is as near as its averages.
+    limit = 1e-6 if space == "linear" else 2e-2
+    assert apart.max() < limit * (size * together.weights).max()
+    assert np.abs(size * (together.weights - alone.weights)).max() > 4 * apart.max()
+
+
+def test_undo_goes_through_views_in_order():
+    session = several(two_views())
+    session.said(*paint(1, (2, 9, 3, 12), 0.9))
+    session.said(*paint(2, (1, 6, 2, 9), 0.3, view=1))
+    [patch] = session.said(protocol.Undo(), {})
+    assert (patch.fields["view"], patch.fields["views"]) == (1, [1])
+    assert patch.arrays["image"].shape == (5, 7, 3)
+    assert [view.is_painted for view in session.views] == [True, False]
+    [patch] = session.said(protocol.Undo(), {})
+    assert (patch.fields["view"], patch.fields["region"]) == (0, [2, 9, 3, 12])
+    assert not session.is_painted
+    paintings = {
+        view.view: (np.full((*view.size, 3), 0.5), np.ones(view.size)) for view in session.views
+    }
+    made = session.load(paintings, session.wishes, "look")
+    assert [message.fields["view"] for message in made] == [0, 1]
+    assert len(session.store.steps) == 1
+    session.said(protocol.Undo(), {})
+    assert not session.is_painted
+    with pytest.raises(lp.LightpaintError, match="no view 2: there are 2"):
+        session.said(*paint(3, (1, 6, 2, 9), 0.3, view=2))
+
+
 def test_nothing_painted_leaves_lights_as_they_are(basis: lp.Basis):
     session = session_of(basis)
     np.testing.assert_allclose(session.weights, basis.present_weights)
@@ -128,7 +200,9 @@ REGION = st.tuples(
     st.integers(0, SIZE[1]),
 ).map(lambda r: (min(r[:2]), max(r[:2]), min(r[2:]), max(r[2:])))
 DONE = st.one_of(
-    st.tuples(st.just("paint"), REGION, st.floats(0, 2, width=16), st.booleans()),
+    st.tuples(
+        st.just("paint"), REGION, st.floats(0, 2, width=16), st.booleans(), st.integers(0, 1)
+    ),
     st.tuples(
         st.just("ask"), st.integers(0, 2), st.sampled_from([{}, {"lock": True}, {"off": True}])
     ),
@@ -141,15 +215,15 @@ DONE = st.one_of(
 @settings(max_examples=60, deadline=None)
 @given(actions=st.lists(DONE, max_size=14))
 def test_any_sequence_equals_a_rebuild(actions: list[Any]):
-    basis = overlapping()
-    store = MemoryStore(Identity.of(basis))
-    session, stroke = session_of(basis, store), 0
+    bases = two_views()
+    store = MemoryStore(Identity.of(bases))
+    session, stroke = several(bases, store), 0
     for what, *its in actions:
         try:
             match what:
                 case "paint":
                     stroke += 1
-                    message, arrays = paint(stroke, its[0], its[1], done=its[2])
+                    message, arrays = paint(stroke, its[0], its[1], done=its[2], view=its[3])
                     session.said(message, arrays)
                 case "ask":
                     session.said(protocol.Ask(its[0], its[1]), {})
@@ -167,22 +241,23 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
         except lp.LightpaintError:
             pass
     session.said(protocol.Drop(stroke), {})
-    again = session_of(basis, store)
-    np.testing.assert_array_equal(session.image, again.image)
-    np.testing.assert_array_equal(session.importance, again.importance)
+    again = several(bases, store)
+    for one, other, basis in zip(session.views, again.views, bases, strict=True):
+        np.testing.assert_array_equal(one.image, other.image)
+        np.testing.assert_array_equal(one.importance, other.importance)
+        unpainted = one.importance == 0
+        assert (one.image[unpainted] == basis.present_look[unpainted]).all()
     assert session.wishes == again.wishes
-    assert (
-        session.image[session.importance == 0] == basis.present_look[session.importance == 0]
-    ).all()
     assert session.moment().constraints == again.moment().constraints
     assert session.moment().settings == again.moment().settings
     assert session.is_painted == again.is_painted
     # All the way back is the beginning.
     while store.position:
         session.said(protocol.Undo(), {})
-    np.testing.assert_array_equal(session.image, basis.present_look)
-    assert not session.importance.any()
-    np.testing.assert_allclose(session.weights, basis.present_weights, rtol=1e-9)
+    for view, basis in zip(session.views, bases, strict=True):
+        np.testing.assert_array_equal(view.image, basis.present_look)
+        assert not view.importance.any()
+    np.testing.assert_allclose(session.weights, bases[0].present_weights, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -206,10 +281,10 @@ def test_what_cannot_be_is_said_and_changes_nothing(
     basis: lp.Basis, message: Any, arrays: Any, said: str
 ):
     session = session_of(basis)
-    before = session.image.copy(), session.wishes, session.version
+    before = session.views[0].image.copy(), session.wishes, session.version
     with pytest.raises(lp.LightpaintError, match=said):
         session.said(message, arrays)
-    np.testing.assert_array_equal(session.image, before[0])
+    np.testing.assert_array_equal(session.views[0].image, before[0])
     assert (session.wishes, session.version) == before[1:]
     session.said(*paint(1, (2, 9, 3, 12), 0.9))
 

@@ -1,5 +1,6 @@
 """The session file: what was done is there again, whatever ended the process that did it."""
 
+import json
 import os
 import random
 import shutil
@@ -8,7 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from contextlib import closing
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,7 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint import database
 from lightpaint.paint.database import set_aside
 from lightpaint.paint.packed import packed, unpacked
-from lightpaint.paint.steps import Identity, KeptLook, Patch, Step, painted_by
+from lightpaint.paint.steps import Identity, KeptLook, Patch, Seen, Step, painted_by
 from lightpaint.paint.store import MemoryStore, Store
 
 ACTIONS = st.lists(
@@ -89,17 +91,18 @@ def test_any_sequence_is_there_again(
     memory.close()
 
 
-@given(st.lists(st.integers(0, 10**6), max_size=30))
-def test_the_canvas_is_every_patch_put_down_in_order(seeds: list[int]) -> None:
+@given(st.lists(st.integers(0, 10**6), max_size=30), st.integers(0, 1))
+def test_the_canvas_is_every_patch_put_down_in_order(seeds: list[int], view: int) -> None:
     steps = [step(seed) for seed in seeds]
     rng = np.random.default_rng(0)
     start = rng.random((*SIZE, 3)).astype(np.float32), np.zeros(SIZE, np.float32)
     image, importance = (x.copy() for x in start)
     for one in steps:
-        if one.patch is not None:
-            top, bottom, left, right = one.patch.region
-            image[top:bottom, left:right], importance[top:bottom, left:right] = one.patch.after
-    got = painted_by(steps, start)
+        for its in one.patches:
+            if its.view == view:
+                top, bottom, left, right = its.region
+                image[top:bottom, left:right], importance[top:bottom, left:right] = its.after
+    got = painted_by(steps, start, view)
     np.testing.assert_array_equal(got[0], image)
     np.testing.assert_array_equal(got[1], importance)
 
@@ -108,12 +111,12 @@ def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
     odd = np.array([np.nan, -0.0, np.inf, 1e-45, 3.4e38, 1], np.float32).reshape(1, 2, 3)
     amount = np.array([[0, 1e-45]], np.float32)
     with Store.open(tmp_path / "session.db", IDENTITY) as store:
-        store.append(Step("stroke", "odd", {}, Patch((0, 1, 0, 2), (odd, amount), (-odd, amount))))
-        [kept] = store.steps
-        assert kept.patch is not None
-        assert told(kept.patch.before) == told((odd, amount))
-        assert told(kept.patch.after) == told((-odd, amount))
-        assert not kept.patch.after[0].flags.writeable
+        change = Patch((0, 1, 0, 2), (odd, amount), (-odd, amount))
+        store.append(Step("stroke", "odd", {}, (change,)))
+        [kept] = store.steps[0].patches
+        assert told(kept.before) == told((odd, amount))
+        assert told(kept.after) == told((-odd, amount))
+        assert not kept.after[0].flags.writeable
 
 
 def test_what_is_unpacked_is_no_longer_than_it_says() -> None:
@@ -296,11 +299,15 @@ def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
 # What is no session of this picture
 
 
+def seen(*views: Seen) -> Identity:
+    return replace(IDENTITY, views=views)
+
+
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (replace(IDENTITY, size=(12, 20)), "of 10x12 pixels, and room.xml has 20x12"),
-        (replace(IDENTITY, sensor="side"), "through camera, and this is through side"),
+        (seen(Seen("camera", (12, 20))), "of 10x12 pixels, and room.xml has 20x12"),
+        (seen(Seen("side", SIZE)), "through camera, and this is through side"),
         (replace(IDENTITY, lights=("panel", "sun")), "lights panel, bulb, and room.xml has"),
     ],
 )
@@ -330,6 +337,40 @@ def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
         assert len(store.steps) == 1
 
 
+def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
+    path, both = tmp_path / "session.db", seen(*IDENTITY.views, Seen("side", (4, 6)))
+    with Store.open(path, IDENTITY) as store:
+        store.append(step(1))
+    with Store.open(path, both) as store:
+        assert len(store.steps) == 1
+    with pytest.raises(PaintError, match="a session of 2 views, and this is of 1"):
+        Store.open(path, IDENTITY)
+
+
+def test_a_session_of_the_first_version_goes_on(tmp_path: Path) -> None:
+    path, steps = tmp_path / "session.db", [step(1), step(3), step(4)]
+    with Store.open(path, IDENTITY) as store:
+        for one in steps:
+            store.append(one)
+        store.put_look(look(1, of=2))
+        store.move_to(2)
+        was = content(store)
+    [view] = IDENTITY.views
+    about = {key: value for key, value in asdict(IDENTITY).items() if key != "views"}
+    first = {**about, "size": view.size, "sensor": view.sensor}
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("ALTER TABLE step RENAME COLUMN places TO region")
+        for number, places in database.execute("SELECT id, region FROM step").fetchall():
+            region = [where[1:] for where in json.loads(places)] or [None]
+            values = (json.dumps(region[0]), number)
+            database.execute("UPDATE step SET region = ? WHERE id = ?", values)
+        database.execute("UPDATE about SET value = ? WHERE name = 'identity'", (json.dumps(first),))
+        database.execute("PRAGMA user_version = 1")
+    for _ in range(2):
+        with Store.open(path, IDENTITY) as store:
+            assert content(store) == was
+
+
 def _done(path: Path, statement: str) -> None:
     other = sqlite3.connect(path)
     other.execute(statement)
@@ -346,7 +387,7 @@ def _done(path: Path, statement: str) -> None:
         lambda path: _done(path, "PRAGMA user_version=9"),
         lambda path: _done(path, "PRAGMA application_id=9"),
         lambda path: _done(path, "UPDATE step SET fields='{'"),
-        lambda path: _done(path, "UPDATE step SET region='[1]'"),
+        lambda path: _done(path, "UPDATE step SET places='[1]'"),
         lambda path: _done(path, "UPDATE about SET value='x'"),
     ],
 )
@@ -403,7 +444,9 @@ def test_what_nobody_should_keep_is_refused_before_anything_changes() -> None:
         for wrong in (
             Step("asked", "", {"x": float("nan")}),
             Step("asked", "", {"x": object()}),
-            Step("stroke", "", {}, replace(patch(np.random.default_rng(0)), region=(0, 1, 0, 1))),
+            Step(
+                "stroke", "", {}, (replace(patch(np.random.default_rng(0)), region=(0, 1, 0, 1)),)
+            ),
         ):
             with pytest.raises(PaintError):
                 store.append(wrong)

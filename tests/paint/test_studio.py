@@ -14,9 +14,10 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
+from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint import protocol
-from lightpaint.paint.protocol import Message
-from lightpaint.paint.session import Moment
+from lightpaint.paint.frames import Message
+from lightpaint.paint.moment import Moment
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -25,14 +26,14 @@ SIZE = (18, 32)
 
 
 class Heard:
-    """A studio of a saved basis, and all that it says."""
+    """A studio of saved bases, and all that it says."""
 
-    def __init__(self, basis: lp.Basis, folder: Path) -> None:
+    def __init__(self, folder: Path, *bases: lp.Basis) -> None:
         command = partial(solve_command, "room.basis.exr")
-        how = {"basis": basis, "command": lambda path, wishes: command(path, (), wishes)}
-        subject = Subject("room.basis.exr", folder, **how)
+        how = {"command": lambda paths, wishes: command(paths, (), wishes)}
+        subjects = [Subject("room.basis.exr", folder, basis=basis, **how) for basis in bases]
         self.messages: list[Message] = []
-        self.studio = Studio(subject, lambda its: Store.open(folder / "session.db", its))
+        self.studio = Studio(subjects, lambda its: Store.open(folder / "session.db", its))
         self.studio.on_message = self.messages.append
         self.studio.start()
         self.wait(lambda m: m.kind == "state")
@@ -56,14 +57,16 @@ class Heard:
             )
         )
 
-    def paint(self, stroke: int, light: float, region: Any = (3, 12, 4, 15)) -> Message:
+    def paint(
+        self, stroke: int, light: float, region: Any = (3, 12, 4, 15), *, view: int = 0
+    ) -> Message:
         """A stroke, whole."""
         shape = region[1] - region[0], region[3] - region[2]
         arrays = {
             "image": np.full((*shape, 3), light, np.float32),
             "importance": np.ones(shape, np.float32),
         }
-        [answer] = self.studio.said(protocol.Paint(stroke, region, True), arrays)
+        [answer] = self.studio.said(protocol.Paint(stroke, region, True, view=view), arrays)
         return answer
 
 
@@ -88,7 +91,7 @@ def basis(make_basis: Any) -> lp.Basis:
 @pytest.fixture
 def heard(basis: lp.Basis, tmp_path: Path) -> Iterator[Heard]:
     """A studio that is open."""
-    made = Heard(basis, tmp_path)
+    made = Heard(tmp_path, basis)
     yield made
     made.studio.close()
 
@@ -137,7 +140,7 @@ def test_clean_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    heard = Heard(basis, tmp_path / "first")
+    heard = Heard(tmp_path / "first", basis)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     state = heard.studio.state().fields
     for k, light in enumerate(state["lights"]):
@@ -148,18 +151,19 @@ def test_clean_planes_come_later_and_keep_the_light(
         # Half floats have 11 bits; a denoiser may move light, and not make any.
         np.testing.assert_allclose(raw, basis.images[k], rtol=2**-11, atol=1e-7)
         assert clean.mean() == pytest.approx(raw.mean(), rel=0.1)
-    np.testing.assert_allclose(heard.studio.resource("painting"), heard.studio.session.image)
+    [view] = heard.studio.session.views
+    np.testing.assert_allclose(heard.studio.resource("painting"), view.image)
     until = time.monotonic() + 30
     while not kept_planes(basis) and time.monotonic() < until:
         time.sleep(0.01)
     # The next session has the same at once, and one of other pixels has not.
-    again = Heard(basis, tmp_path / "again")
+    again = Heard(tmp_path / "again", basis)
     first = again.wait(lambda m: m.kind == "state").fields
     for k in range(len(basis.lights)):
         assert f"clean/{k}" in first["resources"]
         same = (one.studio.resource(f"clean/{k}") for one in (heard, again))
         np.testing.assert_array_equal(*same)
-    np.testing.assert_array_equal(again.studio.session.present, heard.studio.session.present)
+    np.testing.assert_array_equal(again.studio.session.views[0].present, view.present)
     assert kept_planes(replace(basis, images=2 * basis.images)) is None
     for one in (heard, again):
         one.studio.close()
@@ -191,13 +195,13 @@ def test_a_look_is_gone_back_to_and_undone(heard: Heard):
     [looks] = heard.studio.said(protocol.SaveLook("  bright \n day "), {})
     [look] = looks.fields["looks"]
     assert look["name"] == "bright day"
-    first = heard.studio.session.image.copy()
+    first = heard.studio.session.views[0].image.copy()
     heard.paint(2, 0.1)
-    second = heard.studio.session.image.copy()
+    second = heard.studio.session.views[0].image.copy()
     heard.studio.said(protocol.LoadLook(look["id"]), {})
-    np.testing.assert_array_equal(heard.studio.session.image, first)
+    np.testing.assert_array_equal(heard.studio.session.views[0].image, first)
     heard.studio.said(protocol.Undo(), {})
-    np.testing.assert_array_equal(heard.studio.session.image, second)
+    np.testing.assert_array_equal(heard.studio.session.views[0].image, second)
     heard.studio.said(protocol.CopyLook(look["id"]), {})
     heard.studio.said(protocol.RenameLook(look["id"], "noon"), {})
     [message] = heard.studio.said(protocol.DropLook(look["id"]), {})
@@ -228,15 +232,15 @@ def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: P
     heard.studio.said(protocol.SaveLook("a"), {})
     session = heard.studio.session
     heard.studio.close()
-    again = Heard(basis, tmp_path)
-    np.testing.assert_array_equal(again.studio.session.image, session.image)
+    again = Heard(tmp_path, basis)
+    np.testing.assert_array_equal(again.studio.session.views[0].image, session.views[0].image)
     assert again.studio.session.wishes == session.wishes
     state = again.studio.state().fields
     assert len(state["history"]["undo"]) == 3
     assert [look["name"] for look in state["looks"]] == ["a"]
     again.studio.said(protocol.Undo(), {})
     again.studio.said(protocol.Undo(), {})
-    assert again.studio.session.importance[2, 20] == 0
+    assert again.studio.session.views[0].importance[2, 20] == 0
     again.studio.close()
 
 
@@ -247,7 +251,7 @@ def test_why_it_is_not_closer(heard: Heard):
     assert message.fields["sentences"]
     beyond = heard.studio.resource("beyond")
     assert beyond[4:11, 5:14].max() == 0 or beyond.max() <= 255
-    assert not beyond[heard.studio.session.importance == 0].any()
+    assert not beyond[heard.studio.session.views[0].importance == 0].any()
 
 
 def test_without_a_scene_there_is_nothing_to_render(heard: Heard):
@@ -273,7 +277,7 @@ def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
     heard.studio.said(protocol.Export(("target", "lighting")), {})
     begun.wait(30)
     time.sleep(0.05)  # the export, too, has begun with what there was
-    painted = heard.studio.session.image.copy()
+    painted = heard.studio.session.views[0].image.copy()
     answer = heard.paint(2, 0.1, (3, 12, 16, 30))
     assert answer.fields["stroke"] == 2  # at once
     goes_on.set()
@@ -284,6 +288,84 @@ def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
     np.testing.assert_allclose(written.image[10, 20], painted[10, 20], rtol=1e-3)
 
 
+@pytest.fixture
+def both(basis: lp.Basis) -> list[lp.Basis]:
+    """The same lights, from another place, too."""
+    part = {
+        "images": np.ascontiguousarray(basis.images[:, 2:12, 4:20]),
+        "half_differences": np.ascontiguousarray(basis.half_differences[:, 2:12, 4:20]),
+        "emitters_seen": basis.emitters_seen[2:12, 4:20],
+    }
+    return [basis, replace(basis, **part, origin=replace(basis.origin, sensor="side"))]
+
+
+def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_path: Path):
+    heard = Heard(tmp_path, *both)
+    studio = heard.studio
+    names = [basis.origin.sensor for basis in both]
+    state = studio.state().fields
+    assert [view["name"] for view in state["views"]] == names
+    assert [view["size"] for view in state["views"]] == [list(basis.size) for basis in both]
+    assert studio.resource("plane/2@1").shape == (10, 16, 3)
+    heard.paint(1, 0.8)
+    assert heard.exact().fields["of_views"][0]["delta_e"] >= 0
+    heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
+    exact = heard.exact()
+    assert [one["delta_e"] >= 0 for one in exact.fields["of_views"]] == [True, True]
+    assert exact.fields["delta_e"] == max(one["delta_e"] for one in exact.fields["of_views"])
+    for shares in exact.fields["shares"]:
+        assert sum(shares) == pytest.approx(1)
+    [looks] = studio.said(protocol.SaveLook("two"), {})
+    studio.said(protocol.Undo(), {})
+    assert not studio.session.views[1].is_painted
+    made = studio.said(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
+    assert [message.fields["view"] for message in made] == [0, 1]
+    assert studio.resource("look/1@1").dtype == np.uint8
+    again = heard.exact()
+    np.testing.assert_allclose(again.arrays["weights"], exact.arrays["weights"], rtol=1e-9)
+    studio.said(protocol.Explain(1), {})
+    assert heard.wait(lambda m: m.kind == "explained").fields["view"] == 1
+    assert studio.resource("beyond@1").shape == (10, 16)
+    studio.said(protocol.Export(("target", "lighting")), {})
+    exported = heard.wait(lambda m: m.kind == "exported").fields
+    files = [tmp_path / f"painting-{name}.exr" for name in names]
+    assert exported["files"] == [*map(str, files), str(tmp_path / "lighting.json")]
+    targets = [f"--target {name}={file}" for name, file in zip(names, files, strict=True)]
+    assert " ".join(targets) in exported["command"]
+    solution = correct_noise(lp.solve(both, [lp.read_target(file) for file in files]))
+    np.testing.assert_allclose(solution.weights, exact.arrays["weights"], rtol=1e-9)
+    studio.said(protocol.Export(("report",)), {})
+    heard.wait(lambda m: m.kind == "say" and "needs their scene" in m.fields["text"])
+    with pytest.raises(lp.LightpaintError, match="no view 2"):
+        studio.said(protocol.Explain(2), {})
+    studio.close()
+
+
+def test_a_view_that_comes_later_finds_the_session(both: list[lp.Basis], tmp_path: Path):
+    heard = Heard(tmp_path, both[0])
+    heard.paint(1, 0.8)
+    heard.studio.said(protocol.SaveLook("alone"), {})
+    painted = heard.studio.session.views[0].image.copy()
+    heard.studio.close()
+    heard = Heard(tmp_path, *both)
+    studio = heard.studio
+    heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
+    heard.paint(3, 0.4, (0, 6, 2, 9))
+    told = studio.state().fields["history"]["undo"]
+    assert told == [f"stroke, {name}" for name in ("sensor", "side", "sensor")]
+    # The look knows nothing of the view, and leaves it as it was before it was painted.
+    studio.said(protocol.LoadLook(1), {})
+    np.testing.assert_array_equal(studio.session.views[0].image, painted)
+    assert [view.is_painted for view in studio.session.views] == [True, False]
+    [looks] = studio.said(protocol.SaveLook("both"), {})
+    [looks] = studio.said(protocol.MixLooks(1, 2, 0.5, "between"), {})
+    assert len(looks.fields["looks"]) == 3
+    studio.said(protocol.DropLook(2), {})
+    with pytest.raises(lp.LightpaintError, match="no picture"):
+        studio.resource("look/2@1")
+    studio.close()
+
+
 def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
     class Broken(Subject):
         def bases(self, progress: Any = None) -> Any:
@@ -292,7 +374,7 @@ def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
             yield
 
     heard: list[Message] = []
-    studio = Studio(Broken("room.xml", tmp_path), lambda _: Store.open(tmp_path / "x.db", _))
+    studio = Studio([Broken("room.xml", tmp_path)], lambda _: Store.open(tmp_path / "x.db", _))
     studio.on_message = heard.append
     studio._obtain()
     assert heard[0].fields["done"] == studio.state().fields["progress"]["done"] == 1

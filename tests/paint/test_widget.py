@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -145,7 +146,7 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Pa
     told: list[str] = []
     painter.observe(lambda change: told.append(change.name))
     painter.target = lp.Target("cell", image, np.ones(SIZE, np.float32), everything=True)
-    assert sorted(set(told)) == ["lighting", "target"]
+    assert sorted(set(told)) == ["lighting", "target", "targets"]
     patch, buffers = next(x for x in page.heard() if x[0]["kind"] == "patch")
     np.testing.assert_array_equal(_arrays(patch, buffers)["image"], image)
     assert patch["history"]["undo"] == ["painting from a cell"]
@@ -168,6 +169,37 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Pa
     painter.target = None
     assert painter.target is None
     assert painter.solution is None
+
+
+def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> None:
+    side = replace(basis, images=basis.images[::-1], origin=replace(basis.origin, sensor="side"))
+    painter = lp.Painter([basis, side], folder=tmp_path, **HOW)
+    painter.comm.messages = []
+    page = Page(painter)
+    state = page.say("hello", version=protocol.VERSION)
+    names = [basis.origin.sensor, "side"]
+    assert [view["name"] for view in state["views"]] == names
+    weights = np.array([[1, 0.5, 0.2], [0.1, 0.7, 0.3], [0.4, 0.2, 0.9]])
+    images = [view.mix(weights).astype(np.float32) for view in (basis, side)]
+    whole = np.ones(SIZE, np.float32)
+    painter.targets = [None, lp.Target("side", images[1], whole, everything=True)]
+    assert painter.target is None
+    [patch] = [x for x, _ in page.heard() if x["kind"] == "patch" and x["view"] == 1]
+    assert patch["views"] == [0, 1]
+    # One view is as good as both where it shows all lights.
+    np.testing.assert_allclose(painter.lighting.weights_for(basis), weights, atol=1e-5)
+    painter.target = lp.Target("front", images[0], whole, everything=True)
+    assert [target.name for target in painter.targets] == [f"painting {name}" for name in names]
+    expected = lp.solve([basis, side], painter.targets, **HOW)
+    np.testing.assert_allclose(painter.solution.weights, expected.weights, rtol=1e-12)
+    painter.save(tmp_path / "side.exr", view=1)
+    np.testing.assert_array_equal(lp.read_target(tmp_path / "side.exr").image, images[1])
+    with pytest.raises(lp.LightpaintError, match=r"painter.targets is a list of 2"):
+        painter.targets = [None]
+    painter.close()
+    for views, said in (([basis, basis], "a view is there twice"), ([], "at least one view")):
+        with pytest.raises(lp.LightpaintError, match=said):
+            lp.Painter(views)
 
 
 def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_: Any) -> None:

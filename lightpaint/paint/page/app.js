@@ -4,6 +4,7 @@ import { html, render, useEffect, useState } from './vendor/preact.js';
 import { ColourPanel } from './ui/colour.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
+import { counted } from './ui/format.js';
 import { press } from './ui/keys.js';
 import { LightsPanel } from './ui/lights.js';
 import { Looks } from './ui/looks.js';
@@ -15,6 +16,7 @@ import { Store } from './ui/store.js';
 import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
 import { TopBar } from './ui/topbar.js';
 import { AnswerLine, Here, TruthPanel } from './ui/truth.js';
+import { Views, see } from './ui/views.js';
 
 /** @typedef {import("./ui/engine.js").Host} Host */
 /** @typedef {import("./ui/engine.js").Engine} Engine */
@@ -58,10 +60,13 @@ export async function mount(element, host, { global = false, readonly = false, e
 }
 
 /** @param {Hands} hands */
-function listen({ engine, session, store }) {
+function listen(hands) {
+  const { engine, session, store } = hands;
   engine.on('message', (message) => session.receive(message));
   engine.on('loading', (loading) => store.set({ loading }));
   engine.on('asking', (asking) => store.set({ asking }));
+  engine.on('view', ({ view }) => see(hands, view));
+  engine.on('lost', ({ count }) => session.toast(given(count), 'warn'));
   engine.on('trouble', ({ text }) => session.toast(text, 'warn'));
   let isSized = false;
   let kept = store.value.open;
@@ -81,6 +86,13 @@ function listen({ engine, session, store }) {
   });
 }
 
+/** @param {number} count */
+function given(count) {
+  const strokes = count === 1 ? 'A stroke of this tab' : `${counted(count, 'stroke')} of this tab`;
+  return `${strokes} had not been heard before another one took over, and would lie over what was
+    painted there: given up.`.replace(/\s+/g, ' ');
+}
+
 /** @param {{hands: Hands, root: () => HTMLElement}} props */
 function Painter({ hands, root }) {
   const { store } = hands;
@@ -94,6 +106,7 @@ function Painter({ hands, root }) {
     ${!ui.readonly && html`<${ToolBar} ui=${ui} hands=${hands} />`}
     <main class=${`middle ${ui.side ? '' : 'is-wide'}`} aria-label="Painter">
       ${!ui.readonly && html`<${ToolOptions} ui=${ui} hands=${hands} />`}
+      <${Views} ui=${ui} hands=${hands} />
       <div class="view"><${Stage} ui=${ui} hands=${hands} />
         <${Banner} ui=${ui} hands=${hands} />
         <${Toasts} ui=${ui} hands=${hands} /></div>

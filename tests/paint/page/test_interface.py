@@ -315,6 +315,11 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert painter.said("ask")[-1]["asked"] == {"lock": True}
     painter.choose("On one dimmer with", "cove")
     assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
+    group = painter.page.get_by_role("group", name="key and cove, on one dimmer")
+    assert group.locator(".light").count() == 2
+    group.get_by_role("button", name="key and cove, on one dimmer").first.click()  # it folds
+    assert group.locator(".light").count() == 0
+    group.get_by_role("button", name="key and cove, on one dimmer").first.click()
     painter.button("Untie").click()
     assert painter.said("tie")[-1]["ties"] == []
 

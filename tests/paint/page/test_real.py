@@ -22,8 +22,10 @@ import lightpaint as lp
 from lightpaint.cli.spelling import solve_command
 from lightpaint.colour.display import to_8_bit
 from lightpaint.images.objects import Objects
+from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint.launch import subject_of
 from lightpaint.paint.server import Server
+from lightpaint.paint.steps import of_view
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -53,11 +55,11 @@ FIRM = ("0", *["Shift+]"] * 8)
 class Served:
     """A painter on a port of its own, in threads of this process."""
 
-    def __init__(self, subject: Subject) -> None:
-        self.folder = subject.folder
+    def __init__(self, *subjects: Subject, port: int = 0) -> None:
+        self.folder = subjects[0].folder
         self.store: Store | None = None
-        self.studio = Studio(subject, self._opened)
-        self.server = Server(self.studio, port=0)
+        self.studio = Studio(subjects, self._opened)
+        self.server = Server(self.studio, port=port)
         self.thread = threading.Thread(target=self.server.run, daemon=True)
         self.thread.start()
         self.studio.start()
@@ -174,12 +176,12 @@ class Person:
         shown = self.served.studio.session.transform.encode(np.asarray(light, float).reshape(1, 3))
         return to_8_bit(shown)[0].astype(int)
 
-    def answered(self, x: int, y: int) -> Any:
+    def answered(self, x: int, y: int, view: int = 0) -> Any:
         """Codes of the answer at a pixel, from the planes that the page is given."""
         studio = self.served.studio
         planes = [
-            studio.resource(f"clean/{k}")[y, x].astype(float) * light["scale"]
-            for k, light in enumerate(studio.state().fields["lights"])
+            studio.resource(of_view(f"clean/{k}", view))[y, x].astype(float) * scale
+            for k, scale in enumerate(studio.state().fields["views"][view]["scales"])
         ]
         return self.code((studio.session.weights * planes).sum(axis=0))
 
@@ -205,15 +207,20 @@ def basis(make_basis: Any) -> lp.Basis:
 
 
 @pytest.fixture
-def served(basis: lp.Basis, tmp_path: Path) -> Iterator[Served]:
-    """A painter of a basis that was saved."""
+def subject(basis: lp.Basis, tmp_path: Path) -> Subject:
+    """A basis that was saved."""
     path = tmp_path / "room.basis.exr"
     lp.write_basis(path, basis)
-    subject = subject_of(
+    return subject_of(
         BasisFile(str(path)),
         tmp_path / "room",
-        command=lambda painting, wishes: solve_command(str(path), painting, (), wishes),
+        command=lambda paintings, wishes: solve_command(str(path), paintings, (), wishes),
     )
+
+
+@pytest.fixture
+def served(subject: Subject) -> Iterator[Served]:
+    """A painter of it."""
     made = Served(subject)
     yield made
     made.close()
@@ -272,7 +279,7 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me.drag(me.at(60, 10), me.at(70, 10), hold=True)
     me.press("Control+z").page.mouse.up()
     me.still()
-    assert me.seen(70, 10) == me.code(served.studio.session.present[10, 70]).tolist()
+    assert me.seen(70, 10) == me.code(served.studio.session.views[0].present[10, 70]).tolist()
     me.press("Control+Shift+Z").still("brush")
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
     fill_and_ask(me)
@@ -291,7 +298,7 @@ def fill_and_ask(me: Person) -> None:
     me.press("g").stroke((50, 40)).still("brush", "fill")
     np.testing.assert_allclose(me.seen(3, H // 2), me.code(me.paint), atol=1)
     assert me.seen(10, H // 2 - 1) == wall
-    light = me.served.studio.session.image[15, 80] / 4
+    light = me.served.studio.session.views[0].image[15, 80] / 4
     me.press("a")
     x, y = me.at(80, 15)
     me.drag((x, y), (x, y + 160), hold=True)
@@ -350,7 +357,7 @@ def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
     pen(10, 1.0)
     pen(45, 0.25)
     me.still("brush", "brush")
-    hard, soft = (served.studio.session.importance[y, 30] for y in (10, 45))
+    hard, soft = (served.studio.session.views[0].importance[y, 30] for y in (10, 45))
     assert 0 < soft < 0.8 * hard
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
     assert me.seen(30, 45) not in (before, me.seen(30, 10))
@@ -384,7 +391,7 @@ def test_strokes_outlive_their_connection(served: Served, opened: Any) -> None:
     me.still("brush")
     for x in (20, 30, 40):
         np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
-        np.testing.assert_allclose(served.studio.session.image[20, x], me.paint, rtol=1e-6)
+        np.testing.assert_allclose(served.studio.session.views[0].image[20, x], me.paint, rtol=1e-6)
     # A stroke that was kept, and whose answer never came, comes again and is kept once.
     me.look(
         "const receive = host.receive.bind(host);"
@@ -454,6 +461,113 @@ def test_a_second_tab_takes_over_and_the_first_takes_back(served: Served, opened
     second.page.get_by_text("another tab has taken this session over").wait_for(state="attached")
     first.ready()
     np.testing.assert_allclose(first.seen(70, 40), first.code(first.paint), atol=1)
+    now = served.studio.session.views[0].present[5, 15]
+    np.testing.assert_allclose(first.seen(15, 5), first.code(now), atol=1)
+
+
+def test_a_stroke_that_was_taken_over_lies_over_nothing(served: Served, opened: Any) -> None:
+    first = opened(served).ready()
+    first.press(*FIRM).drag(first.at(10, 5), first.at(20, 5), hold=True)
+    until(lambda: served.studio.session.is_open, "the stroke is not heard")
+    second = opened(served, beside=first)
+    second.button("Take over").click()
+    second.ready()
+    # What was heard of it is kept; what the second tab paints there lies over it.
+    second.press(*FIRM, "x").stroke((10, 5), (40, 5)).still("stroke", "brush")
+    first.page.bring_to_front()
+    first.page.mouse.move(*first.at(60, 5), steps=3)
+    first.page.mouse.up()
+    first.button("Take over").click()
+    first.page.get_by_text("A stroke of this tab had not been heard").wait_for()
+    first.ready()
+    assert served.steps == ["stroke", "brush"]
+    np.testing.assert_allclose(first.seen(15, 5), first.code(second.paint), atol=1)
+    now = served.studio.session.views[0].present[5, 58]
+    np.testing.assert_allclose(first.seen(58, 5), first.code(now), atol=1)
+
+
+def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: Any) -> None:
+    """Its errors on the console are what a server that is not there, or refuses it, makes."""
+    served = Served(subject)
+    context = browser.new_context()
+    try:
+        page = context.new_page()
+        page.goto(served.server.url)
+        Person(page, served).ready()
+    finally:
+        served.close()
+    again = Served(subject, port=served.server.port)
+    try:
+        page.get_by_text("This page is of an earlier start of the painter").wait_for()
+        beside = context.new_page()
+        beside.goto(again.server.url)
+        # The browser has the new cookie now, and the old tab does not take the session by it.
+        Person(beside, again).ready()
+        assert page.get_by_text("This page is of an earlier start of the painter").is_visible()
+    finally:
+        context.close()
+        again.close()
+
+
+@pytest.fixture
+def two(subject: Subject, basis: lp.Basis) -> Iterator[Served]:
+    """A painter of two views: the second one is smaller, and sees a part of the first."""
+    half = {
+        "images": np.ascontiguousarray(basis.images[:, 10:, :48]),
+        "half_differences": np.ascontiguousarray(basis.half_differences[:, 10:, :48]),
+        "emitters_seen": basis.emitters_seen[10:, :48],
+        "objects": Objects(basis.objects.index[10:, :48], ("wall", "floor")),
+        "origin": replace(basis.origin, sensor="side"),
+    }
+    made = Served(subject, replace(subject, basis=replace(basis, **half)))
+    yield made
+    made.close()
+
+
+def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> None:
+    me = opened(two).ready()
+    views = two.studio.session.views
+    me.press(*FIRM).stroke((20, 10), (40, 10)).still("brush")
+    before = me.answered(10, 30, 1)
+    me.press("n").ready()
+    assert me.look("return [engine.work.view, ...screen.size]") == [1, 44, 48]
+    assert me.button("side not painted").get_attribute("aria-pressed") == "true"
+    np.testing.assert_allclose(me.seen(10, 30, 1), before, atol=1)
+    me.page.get_by_text("Nothing is painted in this view").wait_for()
+    me.press("x").stroke((10, 30), (30, 30)).still("brush", "brush")
+    paint = me.paint
+    np.testing.assert_allclose(me.seen(20, 30), me.code(paint), atol=1)
+    np.testing.assert_allclose(views[1].image[30, 20], paint, rtol=1e-6)
+    np.testing.assert_allclose(me.seen(10, 30, 1), me.answered(10, 30, 1), atol=1)
+    assert not views[0].importance[30].any()
+    # Fill takes the object of this view.
+    me.press("g").stroke((40, 40)).still("brush", "brush", "fill")
+    np.testing.assert_allclose(me.seen(3, 40), me.code(paint), atol=1)
+    me.page.reload()
+    me.ready()
+    np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
+    # What is undone is seen.
+    me.press("Control+z")
+    until(lambda: me.look("return engine.work.view") == 1, "the other view is shown")
+    me.ready().still("brush", "brush")
+    np.testing.assert_allclose(me.seen(20, 30), me.code(paint), atol=1)
+    me.press("Control+z").still("brush")
+    me.press("Control+z")
+    until(lambda: me.look("return engine.work.view") == 0, "the first view is shown")
+    me.ready().still()
+    np.testing.assert_allclose(me.seen(30, 10), me.code(views[0].present[10, 30]), atol=1)
+    me.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
+    until(lambda: me.look("return engine.work.view") == 1, "the other view is shown")
+    me.ready()
+    me.button("Write files").click()
+    assert not me.page.get_by_label("Report").is_visible()  # of bases without their scene
+    me.button("Write", exact=True).click()
+    me.page.locator(".exported li", has_text="painting-side.exr").wait_for()
+    paintings = [two.folder / f"painting-{view.name}.exr" for view in views]
+    bases = [view.basis for view in views]
+    solution = correct_noise(lp.solve(bases, [lp.read_target(path) for path in paintings]))
+    found = lp.read_lighting(two.folder / "lighting.json").weights_for(bases[0])
+    np.testing.assert_allclose(found, solution.weights, rtol=1e-9)
 
 
 class Rendering(Subject):
@@ -504,10 +618,12 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         session = served.studio.session
         for x in (20, 30, 40):
             np.testing.assert_allclose(me.seen(x, 20), me.code(me.paint), atol=1)
-            np.testing.assert_allclose(session.image[20, x], me.paint, rtol=1e-6)
+            np.testing.assert_allclose(session.views[0].image[20, x], me.paint, rtol=1e-6)
         np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
         me.press("Control+z").still()
-        np.testing.assert_allclose(me.seen(30, 20), me.code(session.present[20, 30]), atol=1)
+        np.testing.assert_allclose(
+            me.seen(30, 20), me.code(session.views[0].present[20, 30]), atol=1
+        )
     finally:
         for event in folder.events:
             event.set()

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.paint.protocol import Message, of_frame, said_of, to_frame
+from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
+from lightpaint.paint.protocol import VERSION
 
 
 @pytest.fixture
@@ -19,7 +20,9 @@ def told(page: Any) -> Any:
                 const {{ Strokes }} = await import("/engine/strokes.js");
                 const canvas = bench.plain(20, 30, 0);
                 const host = new SlowHost();
-                const strokes = new Strokes(host, canvas, () => host.refused = true);
+                const strokes = new Strokes(
+                    host, () => host.refused = true, (count) => host.lost = count);
+                strokes.paintOn(canvas, 0);
                 {script}
             }}"""
         )
@@ -100,6 +103,29 @@ def test_a_lost_connection_loses_no_stroke(told: Any):
         (1, [0, 6, 0, 6], True),  # whole, whatever was heard of it
         (2, [8, 9, 8, 9], True),
         (3, [1, 4, 1, 4], False),
+    ]
+
+
+def test_what_another_page_has_not_let_through_is_given_up(told: Any):
+    said = told(
+        """
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
+        host.tell("closed", { kind: "closed", reason: "taken" });
+        await host.lose();
+        strokes.begin(); strokes.touch([8, 9, 8, 9]);
+        host.said.length = 0;
+        host.tell("state", { kind: "state", stroke: 7, is_back: false });
+        await host.find(7);
+        const lost = host.lost;
+        strokes.begin(); strokes.touch([1, 2, 1, 2]); strokes.end("b");
+        await host.answer(); await host.answer();
+        return [lost, host.told];
+        """
+    )
+    assert said[0] == 2
+    assert [(one["stroke"], one["region"], one["done"]) for one in said[1]] == [
+        (8, [1, 2, 1, 2], False),
+        (8, [1, 1, 1, 1], True),
     ]
 
 
@@ -260,7 +286,7 @@ def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any,
     )
     assert heard["heard"] == ["open", "answer 2", "lost", "open"]
     assert heard["sent"] == [["hello", 1], ["undo", 2], ["redo", 3]]
-    assert (heard["reply"], heard["again"]) == (2, [["hello", 1]])
+    assert (heard["reply"], heard["again"]) == (2, [["hello", VERSION]])
     assert "no connection" in heard["early"]
     assert "lost" in heard["lost"]
     assert heard["urls"] == [f"{site.url.replace('http', 'ws')}/live?page"] * 2

@@ -12,7 +12,8 @@ import { VERSION, frame, pictureOf, unframe } from './protocol.js';
 
 /**
  * What the page knows of its session. `on` hears messages of a kind, asked for or not, and
- * `connection` with {state: 'open' | 'lost'}. `send` is answered by the reply, which may be
+ * `connection` with {state: 'open' | 'lost' | 'stale'}; stale: it is there, and does not know this
+ * page. `send` is answered by the reply, which may be
  * `failed`, and rejects where there is no connection. `fetch` is the newest picture of a name.
  * @typedef {object} Host
  * @property {(kind: string, fields?: Record<string, unknown>, arrays?: Arrays) =>
@@ -55,6 +56,9 @@ export class Hearers {
 /** Milliseconds before a lost connection is tried again: at first, and at most. */
 const WAITS = { first: 250, most: 5000 };
 
+/** How a server answers a page of an earlier start, or of nobody that it knows. */
+const REFUSALS = [403, 410];
+
 /** @implements {Host} */
 export class SocketHost extends Hearers {
   /** Where the page came from. @param {string | URL} [base] */
@@ -83,11 +87,17 @@ export class SocketHost extends Hearers {
     const socket = new WebSocket(url);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
+    let wasOpen = false;
     socket.onopen = () => {
+      wasOpen = true;
       this.send('hello', { version: VERSION }).catch(() => {});
     };
     socket.onmessage = ({ data }) => this.receive(unframe(data));
-    socket.onclose = () => this.dropped(socket);
+    socket.onclose = () => {
+      this.dropped(socket);
+      // Of a socket that was refused a page is not told why.
+      if (!wasOpen && !this.isOver) void this.askWhy();
+    };
   }
 
   /** @param {WebSocket} socket */
@@ -101,6 +111,20 @@ export class SocketHost extends Hearers {
     this.tell('connection', { kind: 'connection', state: 'lost' });
     this.timer = setTimeout(() => this.open(), this.wait);
     this.wait = Math.min(WAITS.most, 2 * this.wait);
+  }
+
+  /** Whether a server is there that does not know this page; then it is not asked again, since the
+   * page of the new address would find the session taken. */
+  async askWhy() {
+    try {
+      const url = new URL('data/', this.base);
+      const { status } = await fetch(url, { credentials: 'same-origin', cache: 'no-store' });
+      if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
+      this.close();
+      this.tell('connection', { kind: 'connection', state: 'stale' });
+    } catch {
+      // It is not there.
+    }
   }
 
   /** @param {Message} message */

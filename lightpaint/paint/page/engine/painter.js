@@ -43,6 +43,7 @@ export class Painter extends Hearers {
     this.element.className = 'pictures';
     this.screen = new Screen(this.element, { view, refill: () => this.work.refill() });
     this.work = new Work(host, this.screen, (kind, event) => this.tell(kind, event));
+    this.on('lost', () => this.given());
     /** @type {Stroke | null} */
     this.stroke = null;
     /** @type {Use} */
@@ -114,6 +115,12 @@ export class Painter extends Hearers {
     return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
   }
 
+  /** Show, and paint, another view of the session. @param {number} view */
+  see(view) {
+    if (this.stroke) this.end();
+    this.work.see(view);
+  }
+
   // What the hand does
 
   /** @param {Use} use */
@@ -131,7 +138,7 @@ export class Painter extends Hearers {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || this.hand.tool === 'pick') return;
+    if (!place || place.strokes.isTaken || this.hand.tool === 'pick') return;
     const scale = this.panes()[0]?.scale ?? 1;
     this.stroke = new Stroke(place.canvas, this.hand, point, scale);
     this.work.isPainting = true;
@@ -167,6 +174,14 @@ export class Painter extends Hearers {
     return true;
   }
 
+  /** The stroke in the hand is given up: it would lie over what another page has painted. */
+  given() {
+    if (!this.stroke) return;
+    this.ended();
+    const region = this.work.canvas?.drop();
+    if (region) this.work.redraw([region]);
+  }
+
   ended() {
     this.stroke = null;
     this.work.isPainting = false;
@@ -184,7 +199,7 @@ export class Painter extends Hearers {
   ask(asked) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place) return;
+    if (!place || place.strokes.isTaken) return;
     place.strokes.begin();
     this.touched([askFor(place.canvas, asked)]);
     place.canvas.end();

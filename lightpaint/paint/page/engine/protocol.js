@@ -6,7 +6,7 @@
  */
 
 /** Of this protocol. */
-export const VERSION = 1;
+export const VERSION = 2;
 
 /** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
 /** An array; float16 is the bits of halves in a Uint16Array (see half.js).
@@ -31,6 +31,24 @@ export const VERSION = 1;
 /** @typedef {{side: number, low: number, high: number}} Shaper */
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */
+
+/** What something of a view is called: by its name alone of the first, `name@1` of the next.
+ * @param {string} name @param {number} view */
+export function inView(name, view) {
+  return view ? `${name}@${view}` : name;
+}
+
+/** A state as it is of one view: its size, its objects, and how its planes are scaled.
+ * @param {Message} state @param {number} view @returns {Message} */
+export function stateOfView(state, view) {
+  const its = state.views?.[view];
+  if (!its) return state;
+  const lights = state.lights.map((/** @type {Light} */ light, /** @type {number} */ k) => ({
+    ...light,
+    scale: its.scales[k],
+  }));
+  return { ...state, lights, size: its.size, objects: its.objects };
+}
 
 /** @type {Record<string, {new (buffer: ArrayBuffer, at: number, length: number): Data,
  *   BYTES_PER_ELEMENT: number}>} */

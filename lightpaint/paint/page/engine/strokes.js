@@ -12,18 +12,24 @@ import { union } from './layer.js';
 /** @typedef {import("./canvas.js").PaintCanvas} PaintCanvas */
 
 /** The stroke in progress. dirty: what is not sent. whole: where it has been.
- * @typedef {{stroke: number, dirty: Region | null, whole: Region | null, isKnown: boolean}} Live */
+ * @typedef {{stroke: number, view: number, dirty: Region | null, whole: Region | null,
+ *   isKnown: boolean}} Live */
 /** A stroke that is done, or dropped, and not yet answered. cut: what of it has to be sent.
- * @typedef {{stroke: number, cut: Region, whole: Region, arrays: Arrays, label: string} |
- *   {stroke: number, isDropped: true}} Left */
+ * @typedef {{stroke: number, view: number, cut: Region, whole: Region, arrays: Arrays,
+ *   label: string} | {stroke: number, isDropped: true}} Left */
 
 export class Strokes {
-  /** @param {import("./host.js").Host} host @param {PaintCanvas} canvas
-   * @param {() => void} [refused] hears that the session has not taken a stroke */
-  constructor(host, canvas, refused = () => {}) {
+  /** @param {import("./host.js").Host} host
+   * @param {() => void} [refused] hears that the session has not taken a stroke
+   * @param {(count: number) => void} [lost] hears how many strokes are not sent any more, since
+   * another page had the session in between */
+  constructor(host, refused = () => {}, lost = () => {}) {
     this.host = host;
-    this.canvas = canvas;
+    /** @type {PaintCanvas | null} */
+    this.canvas = null;
+    this.view = 0;
     this.refused = refused;
+    this.lost = lost;
     this.count = 0;
     /** @type {Live | null} */
     this.live = null;
@@ -32,14 +38,23 @@ export class Strokes {
     this.isBusy = false;
     this.isOpen = true;
     this.isOver = false;
+    /** Whether nothing can be painted, since another page has the session. */
+    this.isTaken = false;
     /** @type {(() => void)[]} */
     this.waiting = [];
     /** Whether the next patch is of a stroke that the canvas has dropped already. */
     this.isDropping = false;
     host.gate = () => this.settled();
     host.on('connection', ({ state }) => this.connected(state === 'open'));
-    // Another page has the session: what it has not heard waits until this one has it again.
-    host.on('closed', () => this.connected(false));
+    // Another page has the session: nothing is said to it.
+    host.on('closed', () => {
+      this.isTaken = true;
+      this.connected(false);
+    });
+    host.on('state', ({ is_back: isBack }) => {
+      this.isTaken = false;
+      if (isBack === false) this.forget();
+    });
     // With another basis, a session begins anew with what is done.
     host.on('renewed', () => {
       if (this.live) this.live.dirty = this.live.whole;
@@ -47,6 +62,21 @@ export class Strokes {
     host.on('state', ({ stroke }) => {
       this.count = Math.max(this.count, Number(stroke) || 0);
     });
+  }
+
+  /** Strokes are of this picture from now on. @param {PaintCanvas} canvas @param {number} view */
+  paintOn(canvas, view) {
+    this.canvas = canvas;
+    this.view = view;
+  }
+
+  /** Another page has painted meanwhile: what the session has not heard would lie over that. */
+  forget() {
+    const count = this.left.length + (this.live?.whole ? 1 : 0);
+    this.left = [];
+    this.live = null;
+    this.tell();
+    if (count) this.lost(count);
   }
 
   /** Say nothing any more. */
@@ -74,7 +104,8 @@ export class Strokes {
   }
 
   begin() {
-    this.live = { stroke: ++this.count, dirty: null, whole: null, isKnown: false };
+    const { view } = this;
+    this.live = { stroke: ++this.count, view, dirty: null, whole: null, isKnown: false };
   }
 
   /** Pixels of the stroke have changed. @param {Region} region */
@@ -89,10 +120,10 @@ export class Strokes {
   end(label) {
     const { live } = this;
     this.live = null;
-    if (live?.whole) {
-      const { stroke, whole } = live;
+    if (live?.whole && this.canvas) {
+      const { stroke, view, whole } = live;
       const cut = live.dirty ?? /** @type {Region} */ ([whole[0], whole[0], whole[2], whole[2]]);
-      this.left.push({ stroke, cut, whole, arrays: this.canvas.copy(whole), label });
+      this.left.push({ stroke, view, cut, whole, arrays: this.canvas.copy(whole), label });
     }
     this.pump();
   }
@@ -122,13 +153,14 @@ export class Strokes {
     const [next] = this.left;
     if (next && 'isDropped' in next) this.send('drop', { stroke: next.stroke }, {}, next);
     else if (next) {
-      const { stroke, cut, label } = next;
-      this.send('paint', { stroke, region: cut, done: true, label }, cutOf(next), next);
-    } else if (this.live?.dirty) {
-      const { stroke, dirty } = this.live;
+      const { stroke, view, cut, label } = next;
+      this.send('paint', { stroke, view, region: cut, done: true, label }, cutOf(next), next);
+    } else if (this.live?.dirty && this.canvas) {
+      const { stroke, view, dirty } = this.live;
       this.live.dirty = null;
       this.live.isKnown = true;
-      this.send('paint', { stroke, region: dirty, done: false }, this.canvas.copy(dirty), null);
+      const fields = { stroke, view, region: dirty, done: false };
+      this.send('paint', fields, this.canvas.copy(dirty), null);
     }
   }
 

@@ -5,7 +5,7 @@ import { PaintCanvas } from './canvas.js';
 import { union } from './layer.js';
 import { Loader } from './loader.js';
 import { SRGB, lutOf } from './lut.js';
-import { VERSION } from './protocol.js';
+import { VERSION, inView, stateOfView } from './protocol.js';
 import { Strokes } from './strokes.js';
 
 /** @typedef {import("./host.js").Host} Host */
@@ -37,8 +37,12 @@ export class Work {
       (slot, name, picture) => this.loaded(slot, name, picture),
       (done, total) => tell('loading', { done, total }),
     );
+    /** As the session said it last, and as it is of the view. @type {Message | null} */
+    this.said = null;
     /** @type {Message | null} */
     this.state = null;
+    /** Which view is shown, and painted. */
+    this.view = 0;
     /** @type {PaintCanvas | null} */
     this.canvas = null;
     /** @type {Strokes | null} */
@@ -65,35 +69,54 @@ export class Work {
       this.loader.know(resources);
       this.want();
     });
-    host.on('verified', () => this.loader.renew('verified'));
-    host.on('explained', () => this.loader.renew('beyond'));
+    host.on('verified', ({ view = 0 }) => this.loader.renew(inView('verified', view)));
+    host.on('explained', ({ view = 0 }) => this.loader.renew(inView('beyond', view)));
   }
 
   /** @param {Message} state */
   begin(state) {
-    const before = this.state;
-    const [height, width] = /** @type {[number, number]} */ (state.size);
-    this.state = state;
     this.version = -1;
-    if (
-      !before ||
-      String(before.size) !== String(state.size) ||
-      before.lights.length !== state.lights.length
-    ) {
-      this.screen.begin([height, width], state.lights.length);
-      this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
-      const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
-      this.strokes?.close();
-      this.strokes = new Strokes(this.host, this.canvas, refused);
-      this.strokes.count = Math.max(0, Number(state.stroke) || 0);
-      this.isReady = false;
-      this.knowsPresent = false;
-      this.loader.forget();
-    }
+    this.open(state, this.view);
     this.answered(state);
     this.loader.begin(state.resources);
     this.want();
     if (this.loader.there.has('present')) this.sync();
+  }
+
+  /** Show another view. @param {number} view */
+  see(view) {
+    const { said } = this;
+    if (!said?.views?.[view] || view === this.view) return;
+    // Whatever was done since is to be asked for.
+    this.open({ ...said, first: false }, view);
+    this.weigh();
+    this.want();
+  }
+
+  /** @param {Message} said @param {number} view */
+  open(said, view) {
+    const before = this.state;
+    const state = stateOfView(said, view);
+    const isOther = !before || !this.said || sizes(this.said) !== sizes(said);
+    const isSame = !isOther && this.view === view;
+    this.said = said;
+    this.state = state;
+    this.view = view;
+    if (isSame) return;
+    const [height, width] = /** @type {[number, number]} */ (state.size);
+    this.screen.begin([height, width], state.lights.length, this.screen.view?.name);
+    this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
+    if (isOther || !this.strokes) {
+      const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
+      this.strokes?.close();
+      this.strokes = new Strokes(this.host, refused, (count) => this.tell('lost', { count }));
+      this.strokes.count = Math.max(0, Number(state.stroke) || 0);
+    }
+    this.strokes.paintOn(this.canvas, view);
+    this.isReady = false;
+    this.knowsPresent = false;
+    this.loader.forget();
+    this.setLut(this.lut);
   }
 
   /** Weights that come with a message. @param {Message} message */
@@ -116,6 +139,12 @@ export class Work {
     const isOwn = strokes?.isDropping;
     if (strokes) strokes.isDropping = false;
     if (!canvas || !image || !importance || isOwn) return;
+    const { view = 0, views = [] } = message;
+    if (view !== this.view) {
+      // What is undone is seen.
+      if (views.length && !views.includes(this.view)) this.tell('view', { view });
+      return;
+    }
     const region = /** @type {Region} */ (message.region);
     this.patches++;
     canvas.set(
@@ -135,7 +164,7 @@ export class Work {
     const [{ count }, { patches }] = [strokes, this];
     try {
       const [image, importance] = await Promise.all(
-        ['painting', 'importance'].map((name) => this.host.fetch(name)),
+        ['painting', 'importance'].map((name) => this.host.fetch(inView(name, this.view))),
       );
       // What has been painted or undone since then is newer.
       if (strokes.isPending || canvas !== this.canvas) return;
@@ -160,11 +189,11 @@ export class Work {
     const { state, shown, loader } = this;
     if (!state) return;
     const isClean = shown?.clean ?? true;
-    for (const name of WANTED) loader.want(name, name);
+    for (const name of WANTED) loader.want(name, inView(name, this.view));
     for (let k = 0; k < state.lights.length; k++) {
-      const clean = `clean/${k}`;
+      const clean = inView(`clean/${k}`, this.view);
       const isThere = isClean && clean in loader.resources;
-      loader.want(`plane ${k}`, isThere ? clean : `plane/${k}`);
+      loader.want(`plane ${k}`, isThere ? clean : inView(`plane/${k}`, this.view));
     }
     const transform = shown?.transform ?? 'srgb';
     loader.want('lut', transform === 'srgb' ? null : `lut/${transform}`);
@@ -271,6 +300,11 @@ export class Work {
     this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
     this.screen.request(this.isPainting);
   }
+}
+
+/** How many lights there are, and how large each view is. @param {Message} state */
+function sizes({ lights, size, views = [{ size }] }) {
+  return String([lights.length, ...views.map((/** @type {any} */ view) => view.size)]);
 }
 
 /** @param {Show | null} show */

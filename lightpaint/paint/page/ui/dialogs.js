@@ -48,7 +48,11 @@ const FILES = [
 
 /** @param {{ui: Ui, hands: Hands, close: () => void}} props */
 function ExportDialog({ ui, hands, close }) {
-  const can = FILES.filter(({ key }) => key !== 'relit' || ui.state?.can_render);
+  const can = FILES.filter(
+    ({ key }) =>
+      (key !== 'relit' || ui.state?.can_render) &&
+      (key !== 'report' || ui.state?.can_report !== false),
+  );
   const [what, setWhat] = useState(can.map(({ key }) => key));
   const isBusy = ui.isWriting;
   const write = () => {

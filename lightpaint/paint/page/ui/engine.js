@@ -10,7 +10,7 @@
 /**
  * The session, wherever it is: behind a socket, a notebook's model, or a report that only reads.
  * `on` hears messages of a kind, asked for or not, and "connection" with
- * {state: "open" | "lost"}. `send` is answered by the reply.
+ * {state: "open" | "lost" | "stale"}. `send` is answered by the reply.
  * @typedef {object} Host
  * @property {(kind: string, fields?: Record<string, any>, arrays?: Record<string, Picture>)
  *   => Promise<Message>} send
@@ -68,6 +68,7 @@
  * @property {(show: Show) => void} show
  * @property {(use: Use) => void} use
  * @property {() => Pane[]} panes
+ * @property {(view: number) => void} see another view: what is shown, and painted
  * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
  * @property {(point: Point) => void} begin a stroke of the tool in the hand
  * @property {(points: Point[]) => void} move
@@ -81,7 +82,8 @@
  *   what is seen there, and the share of each light in the answer's light
  * @property {(name: string, hear: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total} planes; "asking": {stops, mired} while a drag asks;
- *   "trouble": {text}
+ *   "view": {view} in which something was undone; "lost": {count} strokes that another page, which
+ *   has painted meanwhile, has kept from being sent; "trouble": {text}
  * @property {() => void} close
  */
 

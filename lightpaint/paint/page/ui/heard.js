@@ -4,12 +4,18 @@
 /** @typedef {import('./engine.js').RGB} RGB */
 /** @typedef {import('./model.js').Ui} Ui */
 
+import { stateOfView } from '../engine/protocol.js';
+
 /** @param {any} message @returns {Partial<Ui>} */
 export function stateOf(message, /** @type {import('./model.js').Ui} */ before) {
+  const views = message.views ?? [];
+  const view = before.view < views.length ? before.view : 0;
   const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
   return {
     ready: true,
-    state: message,
+    state: stateOfView(message, view),
+    view,
+    views,
     lights,
     asked: asked ?? {},
     ties: ties ?? [],
@@ -27,7 +33,7 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
         : null,
     // A scene is first shown as it is painted.
     ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
-    ...answerFields(message.answer ?? {}, []),
+    ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
     ...weightsOf(message),
   };
 }
@@ -40,21 +46,70 @@ function shownAs(transform) {
 /**
  * What an exact answer says. The sentences come after the lights, when they have been found; until
  * then those of the last answer stay.
- * @param {any} answer @param {import('./model.js').Lit[]} before @returns {Partial<Ui>}
+ * @param {any} answer @param {Ui} before @returns {Partial<Ui>}
  */
-function answerFields({ headline, delta_e: deltaE, sentences, lights }, before) {
+function answerFields(answer, before) {
+  const { headline, lights, shares = null, of_views: ofViews = null } = answer;
   /** @type {Partial<Ui>} */
   const made = { isLive: false };
-  if (headline !== undefined) {
-    Object.assign(made, { headline, deltaE: deltaE ?? null, sentences: sentences ?? [] });
-  }
+  if (headline !== undefined)
+    Object.assign(made, { ofViews }, seenOf({ ...answer, ofViews }, before));
   if (lights) {
+    made.shares = shares;
     made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
-      ...before[k],
+      ...before.lit[k],
       ...one,
+      share: shares?.[before.view]?.[k] ?? one.share,
     }));
   }
   return made;
+}
+
+/** How close the view is that is shown. @param {any} answer @param {Ui} ui @returns {Partial<Ui>} */
+function seenOf(answer, { view, views }) {
+  const isOne = views.length < 2;
+  const its = isOne ? answer : answer.ofViews?.[view];
+  if (!its) return { headline: UNPAINTED, deltaE: null, deltaAsked: null, sentences: [] };
+  return {
+    headline: its.headline,
+    deltaE: its.delta_e ?? null,
+    deltaAsked: its.delta_e_asked ?? null,
+    sentences: its.sentences ?? [],
+  };
+}
+
+const UNPAINTED = 'Nothing is painted in this view: it goes with the others.';
+
+/** What changes with the view that is shown. @param {Ui} ui @param {number} view
+ * @returns {Partial<Ui>} */
+export function viewOf(ui, view) {
+  const verified = ui.verifiedOf[view] ?? null;
+  const isRender = ui.show.right === 'verified' && !verified;
+  const isAsLarge = String(ui.views[view].size) === String(ui.views[ui.view].size);
+  /** @type {Ui['show']} */
+  const show = {
+    ...ui.show,
+    ...(isRender ? { left: 'painting', right: 'solution' } : {}),
+    ...(isAsLarge ? {} : { zoom: 1, pan: [0, 0] }),
+  };
+  const { ofViews, shares } = ui;
+  return {
+    view,
+    state: stateOfView(ui.state, view),
+    verified,
+    explained: [],
+    pointed: null,
+    show,
+    ...(ofViews ? seenOf({ ofViews }, { ...ui, view }) : {}),
+    lit: ui.lit.map((one, k) => ({ ...one, share: shares?.[view]?.[k] ?? one.share })),
+  };
+}
+
+/** A render of a view has come. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+export function verifiedOf(message, ui) {
+  const { view = 0 } = message;
+  const made = { verifiedOf: { ...ui.verifiedOf, [view]: message }, verifying: null };
+  return view === ui.view ? { ...made, verified: message } : made;
 }
 
 /** @param {Message} message @returns {Partial<Ui>} */
@@ -73,9 +128,17 @@ export function answerOf(message, ui) {
   for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant'])) {
     if (message[key]) made[key] = message[key];
   }
-  if (message.lights) Object.assign(made, answerFields(message, ui.lit));
-  else if (!message.exact) made.isLive = true;
-  if (ui.verified && made.weights) made.verified = { ...ui.verified, isOld: true };
+  if (message.lights) Object.assign(made, answerFields(message, ui));
+  else if (!message.exact) {
+    made.isLive = true;
+    // What was said of a view before it was painted is so no more.
+    if (ui.headline === UNPAINTED) made.headline = '';
+  }
+  if (made.weights) {
+    const old = Object.entries(ui.verifiedOf).map(([view, one]) => [view, { ...one, isOld: true }]);
+    made.verifiedOf = Object.fromEntries(old);
+    if (ui.verified) made.verified = { ...ui.verified, isOld: true };
+  }
   // The reasons were those of the answer before.
   if (made.isLive && ui.explained.length) made.explained = [];
   return made;

@@ -1,5 +1,6 @@
 /** All keys: one table, for the keyboard and for the overlay that shows them. */
 
+import { seeNext } from './views.js';
 import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from './tools.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
@@ -116,6 +117,12 @@ export const KEYS = [
         shown: ['V'],
         does: 'side by side, wipe, blink',
         act: ({ store }) => look(store, { layout: next(LAYOUTS, store.value.show.layout) }),
+      },
+      {
+        keys: 'n',
+        shown: ['N'],
+        does: 'next view, where there are several',
+        act: seeNext,
       },
       {
         keys: 'k',

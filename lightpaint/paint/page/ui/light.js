@@ -16,7 +16,7 @@ import { Thumb } from './thumb.js';
 /**
  * @typedef {{k: number, light: Light, hands: Hands, rgb: RGB, lit?: Lit, asked?: Asked,
  *   tied?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
- *   here?: number, readonly: boolean, hasSlider: boolean, thumb?: number, others?: Light[]}} Props
+ *   here?: number, readonly: boolean, hasSlider: boolean, picture: string, thumb?: number, others?: Light[]}} Props
  */
 
 /** Ends of the dimmer, in stops from the present. */
@@ -40,7 +40,7 @@ export class LightRow extends Component {
     return html`<div class=${`light ${dim} ${isOpen ? 'is-open' : ''}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
       <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
-        <${Thumb} name=${`thumb/${k}`} generation=${this.props.thumb} hands=${hands} />
+        <${Thumb} name=${this.props.picture} generation=${this.props.thumb} hands=${hands} />
         <${Share} share=${this.props.lit?.share ?? 0} here=${here} />
       </div>
       <div class="light-main">

@@ -1,5 +1,6 @@
 /** The list of lights: search, sort, groups that fold, a row for each light. */
 
+import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { luminance } from './colours.js';
 import { Button, Select } from './controls.js';
@@ -64,7 +65,8 @@ function row(ui, hands, k, isMany) {
     rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${ui.asked[light.name]} tied=${tied}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} readonly=${ui.readonly} hasSlider=${isOpen || !isMany}
-    thumb=${ui.resources[`thumb/${k}`]} others=${isOpen ? ui.lights : undefined} />`;
+    picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
+    others=${isOpen ? ui.lights : undefined} />`;
 }
 
 /** @param {{name: string, ui: Ui, hands: Hands, members: number[], isMany: boolean}} props */
@@ -120,18 +122,42 @@ function sorted(ui, found) {
   return made;
 }
 
-/** Lights with a group come under its name, at the place of the first of them.
+/** Lights that belong together come under one name, at the place of the first of them.
  * @param {Ui} ui @param {number[]} found @returns {{name: string | null, members: number[]}[]} */
 function grouped(ui, found) {
+  const names = ui.lights.map((_, k) => groupOf(ui, k));
   /** @type {{name: string | null, members: number[]}[]} */
   const made = [];
   for (const k of found) {
-    const group = ui.lights[k].group ?? null;
-    const isMany = ui.lights.filter((one) => one.group === group).length > 1;
-    const name = isMany ? group : null;
+    const count = names.filter((one) => one === names[k]).length;
+    const name = count >= (isStem(ui, k) ? FEWEST : 2) ? names[k] : null;
     const same = name === null ? undefined : made.find((one) => one.name === name);
     if (same) same.members.push(k);
     else made.push({ name, members: [k] });
   }
   return made;
+}
+
+/** Lights whose names begin alike that are folded together, at least. */
+const FEWEST = 3;
+
+/** On one dimmer; of one group; or, of many lights, of names that begin alike.
+ * @param {Ui} ui @param {number} k @returns {string | null} */
+function groupOf(ui, k) {
+  const { name, group } = ui.lights[k];
+  const tie = ui.ties.find((names) => names.includes(name));
+  const others = tie && (tie.length === 2 ? tie[1] : `${tie.length - 1} more`);
+  if (tie) return `${tie[0]} and ${others}, on one dimmer`;
+  return group ?? (ui.lights.length > MANY ? stemOf(name) : null);
+}
+
+/** @param {Ui} ui @param {number} k */
+function isStem(ui, k) {
+  const { name, group } = ui.lights[k];
+  return !group && !ui.ties.some((names) => names.includes(name));
+}
+
+/** `window` of `window_12`, `cyc` of `cyc left`. @param {string} name @returns {string | null} */
+function stemOf(name) {
+  return /^[^\s_.:/\-\d]+/.exec(name)?.[0] ?? null;
 }

@@ -1,5 +1,6 @@
 /** Looks that were kept: pictures with names, to go on from, to compare and to mix. */
 
+import { inView } from '../engine/protocol.js';
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
 import { mixOf } from './model.js';
@@ -27,13 +28,14 @@ function Kept({ one, ui, hands }) {
   const [isNaming, setNaming] = useState(false);
   const [isSure, setSure] = useState(false);
   const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
+  const its = inView(one.thumbnail, ui.view);
+  const picture = its in ui.resources ? its : one.thumbnail;
   const about = one.delta_e === null ? one.name : `${one.name}, ΔE ${number(one.delta_e, 2)}`;
   return html`<li class="look" onPointerLeave=${() => setSure(false)}>
     <button type="button" class="look-picture" aria-label=${`Go on from ${about}`}
       data-tip="Go on from this look; undo comes back"
       onClick=${() => session.send('load_look', { look: one.id })}>
-      <${Thumb} name=${one.thumbnail} generation=${ui.resources[one.thumbnail] ?? 0}
-        hands=${hands} />
+      <${Thumb} name=${picture} generation=${ui.resources[picture] ?? 0} hands=${hands} />
     </button>
     ${
       isNaming

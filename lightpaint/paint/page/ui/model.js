@@ -14,6 +14,8 @@ import { ofKelvin } from './colours.js';
 /** @typedef {{id: number, name: string, weights: RGB[], delta_e: number | null, stamp: string,
  *   thumbnail: string}} Look */
 /** @typedef {Record<string, any>} Asked */
+/** @typedef {{headline: string, delta_e: number, delta_e_asked: number, sentences: string[]}}
+ * Seen */
 /** @typedef {{what: string, done: number, total: number, unit: string}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
@@ -24,12 +26,18 @@ import { ofKelvin } from './colours.js';
  * @property {string} waiting why there is nothing yet, if something went wrong
  * @property {boolean} isWriting files
  * @property {Progress | null} writing how far that is, where it takes long
- * @property {any} state as the session said it last
+ * @property {any} state as the session said it last, of the view that is shown
+ * @property {number} view that is shown
+ * @property {{name: string, size: [number, number]}[]} views of the session
+ * @property {(Seen | null)[] | null} ofViews how close each view is; null where nothing is painted
+ * @property {number[][] | null} shares of each light, in each view
+ * @property {Record<number, any>} verifiedOf renders, by view
  * @property {Light[]} lights
  * @property {Lit[]} lit the last exact answer
  * @property {RGB[]} weights the last answer
  * @property {string} headline
  * @property {number | null} deltaE
+ * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
  * @property {string[]} sentences
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {Record<string, Asked>} asked
@@ -44,7 +52,7 @@ import { ofKelvin } from './colours.js';
  * @property {{spp: number, agrees: boolean, text: string, isOld?: boolean} | null} verified
  * @property {string[]} explained
  * @property {{files: string[], command: string} | null} exported
- * @property {"wait" | "open" | "lost"} connection
+ * @property {"wait" | "open" | "lost" | "stale"} connection
  * @property {{reason: string, text: string} | null} closed
  * @property {Toast[]} toasts
  * @property {Record<string, number>} resources
@@ -105,11 +113,17 @@ export function first() {
     isWriting: false,
     writing: null,
     state: null,
+    view: 0,
+    views: [],
+    ofViews: null,
+    shares: null,
+    verifiedOf: {},
     lights: [],
     lit: [],
     weights: [],
     headline: '',
     deltaE: null,
+    deltaAsked: null,
     sentences: [],
     isLive: false,
     asked: {},

@@ -22,7 +22,7 @@ export function Toasts({ ui, hands }) {
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Banner({ ui, hands }) {
   const { closed, connection } = ui;
-  if (closed) {
+  if (closed && connection !== 'stale') {
     const canTake = closed.reason === 'taken';
     return html`<div class="banner" role="alert"><${Icon} name="warn" /><span>${closed.text}</span>
       ${
@@ -37,9 +37,13 @@ export function Banner({ ui, hands }) {
       }
     </div>`;
   }
-  if (connection !== 'lost') return null;
+  if (connection !== 'lost' && connection !== 'stale') return null;
+  const text =
+    connection === 'lost'
+      ? 'The connection is lost. Finished strokes are safe; trying again …'
+      : 'This page is of an earlier start of the painter: open the address that its terminal shows.';
   return html`<div class="banner" role="alert"><${Icon} name="warn" />
-    <span>The connection is lost. Finished strokes are safe; trying again …</span></div>`;
+    <span>${text}</span></div>`;
 }
 
 /** A basis that still renders, pictures that still load. @param {{ui: Ui}} props */

@@ -1,6 +1,6 @@
 /** Talks with the session: what it says becomes state, what a person does becomes messages. */
 
-import { answerOf, progressOf, stateOf } from './heard.js';
+import { answerOf, progressOf, stateOf, verifiedOf } from './heard.js';
 
 /** @typedef {import("./engine.js").Host} Host */
 /** @typedef {import("./engine.js").Message} Message */
@@ -81,8 +81,9 @@ export class Session {
         resources: { ...this.store.value.resources, ...m.resources },
       }),
       exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false, writing: null }),
-      verified: (/** @type {any} */ m) => ({ verified: m, verifying: null }),
-      explained: (/** @type {any} */ m) => ({ explained: m.sentences }),
+      verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
+      explained: (/** @type {any} */ m) =>
+        (m.view ?? 0) === this.store.value.view ? { explained: m.sentences } : undefined,
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
     })[message.kind]?.(message);
@@ -218,11 +219,16 @@ export class Session {
     return this.send('set', { values: { [key]: value } });
   }
 
+  /** Why the view that is shown is not closer. */
+  explain() {
+    return this.send('explain', { view: this.store.value.view });
+  }
+
   verify(run = true) {
     this.store.set({
       verifying: run ? { what: 'verify', done: 0, total: 0, unit: '' } : null,
     });
-    return this.send('verify', { run });
+    return this.send('verify', { run, view: this.store.value.view });
   }
 }
 

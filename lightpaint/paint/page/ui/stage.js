@@ -1,5 +1,6 @@
 /** The pictures, and what lies over them: names, the brush, the wipe, a hint for the first stroke. */
 
+import { inView } from '../engine/protocol.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
 import { toHex } from './colours.js';
 import { point, ring } from './cursor.js';
@@ -71,9 +72,9 @@ export function Stage({ ui, hands }) {
   // At once, so that names lie where the pictures will.
   useMemo(
     () => engine.show(shown(ui)),
-    [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights],
+    [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights, ui.view],
   );
-  const hasAlbedo = ui.resources.albedo !== undefined;
+  const hasAlbedo = ui.resources[inView('albedo', ui.view)] !== undefined;
   // Before the next press of a pointer.
   useLayoutEffect(
     () =>

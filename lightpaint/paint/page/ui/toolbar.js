@@ -1,5 +1,6 @@
 /** The tools at the side, and above the pictures what the one in the hand can be set to. */
 
+import { inView } from '../engine/protocol.js';
 import { html, useState } from '../vendor/preact.js';
 import { toHex } from './colours.js';
 import { Button, Choice, Number_, Select, Slider } from './controls.js';
@@ -50,7 +51,7 @@ export function ToolOptions({ ui, hands }) {
     <strong>${label}</strong>
     ${
       paints &&
-      ui.resources.albedo !== undefined &&
+      ui.resources[inView('albedo', ui.view)] !== undefined &&
       html`<${Choice} label="Paint as"
       value=${ui.as} choices=${PAINT_AS} change=${(/** @type {any} */ as) => store.set({ as })} />`
     }

@@ -1,5 +1,6 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
+import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { Bar } from './bar.js';
 import { Button, Choice } from './controls.js';
@@ -33,7 +34,8 @@ export function TruthPanel({ ui, hands }) {
   const legend = overlay && LEGENDS[overlay];
   const choose = (/** @type {any} */ value) => {
     look(store, { overlay: value });
-    if (value === 'beyond' && ui.resources.beyond === undefined) session.send('explain');
+    const isThere = ui.resources[inView('beyond', ui.view)] !== undefined;
+    if (value === 'beyond' && !isThere) session.explain();
   };
   // The first of them stands below the pictures, too.
   const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
@@ -50,7 +52,7 @@ export function TruthPanel({ ui, hands }) {
     ${
       !ui.readonly &&
       html`<div class="row">
-      <${Button} label="Why not closer?" act=${() => session.send('explain')}
+      <${Button} label="Why not closer?" act=${() => session.explain()}
         tip="What keeps the lights from what was painted" />
       ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
     </div>`
@@ -92,6 +94,9 @@ function Verified({ ui, hands }) {
   </div>`;
 }
 
+const DELTA_E =
+  'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear; and of the light as it was';
+
 /** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
@@ -107,11 +112,13 @@ export function AnswerLine({ ui, hands }) {
           ? html`<span class="live" data-tip=${'A quick answer while you paint, without what takes longer; the exact one follows'}>live</span>`
           : null
       }
-      <span class="said">${text}</span>
+      <span class="said" data-tip=${text.length > 100 ? text : undefined}>${text}</span>
       ${
         !first &&
         ui.deltaE !== null &&
-        html`<span class="faint" data-tip=${'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear'}>ΔE ${number(ui.deltaE, 2)}</span>`
+        html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
+          ui.deltaAsked !== null && `, was ${number(ui.deltaAsked, 2)}`
+        }</span>`
       }
     </p>
     ${

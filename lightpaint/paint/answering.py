@@ -1,0 +1,115 @@
+"""What is asked in a session beside the paint, and the answer that follows both under the hand."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import constraints_of
+from lightpaint.lighting.fit import meant_by
+from lightpaint.lighting.live import Live
+from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.problem import reduced_by
+from lightpaint.paint.wishes import Wishes
+from lightpaint.settings import Settings
+from lightpaint.target.target import Target
+
+
+class Answering:
+    """Wishes, and the weights that come closest under them. Updated in place.
+
+    settings, constraints: what was asked before the session began. transform: what is painted
+    through.
+
+    Attributes:
+        wishes: What is asked now, also by a slider that still moves.
+        kept: What was asked before it moved; None where none moves.
+        weights: (n, 3), the last answer.
+    """
+
+    def __init__(
+        self,
+        views: Sequence[LiveView],
+        wishes: Wishes,
+        *,
+        settings: Settings,
+        constraints: Constraints,
+        transform: ViewTransform,
+    ) -> None:
+        self.wishes = wishes
+        self.kept: Wishes | None = None
+        self.weights = views[0].basis.present_weights
+        self._settings, self._given, self._transform = settings, constraints, transform
+        self.begin(views)
+
+    def begin(self, views: Sequence[LiveView]) -> None:
+        """Go on with these views."""
+        self._basis = views[0].basis
+        self._live = Live(views, fit=self.fit, constraints=self._constraints(self.wishes))
+        self._live.prepare()
+
+    @property
+    def mode(self) -> str:
+        """In which space answers are found."""
+        return self._live.mode
+
+    @property
+    def fit(self) -> Settings:
+        """What it is to be close, with nothing left open."""
+        return self._fit(self.wishes)
+
+    @property
+    def settings(self) -> Settings:
+        """The same, with all that follows from the painting left open."""
+        return self.wishes.settings(self._settings)
+
+    @property
+    def constraints(self) -> Constraints:
+        """What is asked of the lights, beside what their scene asks."""
+        return self._given.and_then(self.wishes.constraints())
+
+    @property
+    def basis(self) -> Basis:
+        """Whose lights are asked: those of all views."""
+        return self._basis
+
+    def check(self, wishes: Wishes) -> None:
+        """Raise LightpaintError for what cannot be asked, before anything is changed."""
+        reduced_by(self._constraints(wishes), self._basis, self._fit(wishes))
+
+    def ask(self, wishes: Wishes) -> None:
+        """This from now on."""
+        self.wishes = wishes
+        self._live.asks(self.fit, self._constraints(wishes))
+
+    def move(self, wishes: Wishes) -> None:
+        """This, as long as a slider moves. Raises LightpaintError, and changes nothing then."""
+        self.check(wishes)
+        self.kept = self.kept or self.wishes
+        self.ask(wishes)
+
+    def move_back(self) -> bool:
+        """Whether there was a slider that somebody has left; what was asked before is asked."""
+        if self.kept is None:
+            return False
+        wishes, self.kept = self.kept, None
+        self.ask(wishes)
+        return True
+
+    def solve(self) -> None:
+        """The weights, as the paint is now."""
+        self.weights = self._live.answer(self.weights)
+
+    def _fit(self, wishes: Wishes) -> Settings:
+        # A target as those of a session are, for what follows from that.
+        one, black = np.ones((1, 1), np.float32), np.zeros((1, 1, 3), np.float32)
+        how: dict[str, Any] = {"through_view": True, "over_look": True}
+        target = Target("painting", black, one, False, transform=self._transform, **how)
+        return meant_by(wishes.settings(self._settings), [target])
+
+    def _constraints(self, wishes: Wishes) -> Constraints:
+        asked = constraints_of(self._basis.asked).and_then(self._given)
+        return asked.and_then(wishes.constraints())

@@ -1,0 +1,97 @@
+"""What goes on beside the brush: threads that give way to it, and the exact answer at rest."""
+
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from threading import Condition, Thread, get_native_id
+
+from lightpaint.errors import LightpaintError
+from lightpaint.files import first_line
+from lightpaint.paint.frames import Message
+
+#: Seconds of rest after a stroke before the exact answer is looked for.
+REST_S = 0.2
+
+#: How much less urgent than strokes all else is, where threads can be told apart: on Linux.
+NICE = 10
+
+
+class StoppedError(Exception):
+    """Somebody does not want it any more."""
+
+
+class Settling:
+    """Has the exact answer found whenever the brush rests, in a thread of its own.
+
+    find: finds it, and says so. say: hears what goes wrong.
+    """
+
+    def __init__(self, find: Callable[[], None], say: Callable[[Message], None]) -> None:
+        self._find, self._say = find, say
+        self._bell = Condition()
+        self._is_unsettled, self._is_open = False, True
+
+    def ring(self) -> None:
+        """Something has changed."""
+        with self._bell:
+            self._is_unsettled = True
+            self._bell.notify_all()
+
+    def end(self) -> None:
+        """Nothing more is to be found."""
+        with self._bell:
+            self._is_open = False
+            self._bell.notify_all()
+
+    def settle(self) -> None:
+        """Until the end."""
+        give_way()
+        while True:
+            with self._bell:
+                self._bell.wait_for(lambda: self._is_unsettled or not self._is_open)
+                if not self._is_open:
+                    return
+                self._is_unsettled = False
+            time.sleep(REST_S)
+            with self._bell:
+                if self._is_unsettled:
+                    continue
+            try:
+                self._find()
+            except Exception as error:
+                # A mistake of our own ends no session: the next stroke is answered again.
+                self._say(Message("say", {"text": told(error), "tone": "warn"}))
+
+
+def later(work: Callable[[], None], name: str, say: Callable[[Message], None]) -> None:
+    """Do it in a thread of its own; what fails is said."""
+
+    def run() -> None:
+        give_way()
+        try:
+            work()
+        except StoppedError:
+            say(Message("progress", {"what": "", "done": 1, "total": 1}))
+        except Exception as error:
+            say(Message("say", {"text": told(error), "tone": "warn"}))
+
+    Thread(target=run, name=f"lightpaint-{name}", daemon=True).start()
+
+
+def told(error: Exception, *, at_length: bool = True) -> str:
+    """What to say of it; a mistake of lightpaint's own is told at length where it was started."""
+    if isinstance(error, LightpaintError):
+        return str(error)
+    if at_length:
+        traceback.print_exception(error)
+    return f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
+
+
+def give_way() -> None:
+    """Let this thread, and those that it starts, leave the processors to more urgent ones."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, get_native_id(), NICE)

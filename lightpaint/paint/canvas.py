@@ -1,0 +1,228 @@
+"""The painting of one view: its pixels, and the stroke that is not done yet."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import PaintError
+from lightpaint.lighting.live_view import LiveView
+from lightpaint.paint.steps import Patch, Pixels, Region, Step, painted_by
+
+#: Importance of a pixel beyond which it is a slip, and light, beside the present look's brightest.
+MOST, BRIGHTEST = 1e4, 1e9
+
+
+class Canvas:
+    """What is painted of one view. Updated in place.
+
+    Attributes:
+        basis: What the lights do in it.
+        present: (h, w, 3) linear, the present look without its grain: what shows where nothing is
+            painted.
+        image: (h, w, 3) linear; importance: (h, w): the painting.
+        live: The sums that follow it.
+    """
+
+    def __init__(self, view: int, basis: Basis, present: Floats, steps: Sequence[Step]) -> None:
+        self.view = view
+        self._open: list[tuple[Region, Pixels]] = []
+        self.improve(basis, present, steps)
+
+    def improve(self, basis: Basis, present: Floats, steps: Sequence[Step]) -> None:
+        """Go on with a basis of more samples, from steps that are done; an open stroke stays."""
+        painted = [(region, self.pixels(region)) for region, _ in self._open]
+        self.basis, self.present = basis, np.asarray(present, np.float32)
+        empty = np.zeros(basis.size, np.float32)
+        self.image, self.importance = painted_by(steps, (self.present, empty), self.view)
+        unpainted = self.importance == 0
+        self.image[unpainted] = self.present[unpainted]
+        self.live = LiveView(basis, self.image, self.importance)
+        self._open = []
+        for region, pixels in painted:
+            self.paint(region, pixels)
+
+    @property
+    def name(self) -> str:
+        """Of the sensor that it is seen through."""
+        return self.basis.origin.sensor
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) of the picture."""
+        return self.basis.size
+
+    @property
+    def whole(self) -> Region:
+        """All of it."""
+        return (0, self.size[0], 0, self.size[1])
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether any pixel counts."""
+        return bool(self.importance.any())
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a stroke is not done yet."""
+        return bool(self._open)
+
+    def pixels(self, region: Region) -> Pixels:
+        """What the canvas holds there, as arrays of their own."""
+        where = _slices(region)
+        return self.image[where].copy(), self.importance[where].copy()
+
+    def put(self, region: Region, pixels: Pixels) -> None:
+        """Pixels onto the canvas; what is not painted shows the present look."""
+        where = _slices(region)
+        image, importance = pixels
+        painted = (importance > 0)[..., None]
+        self.image[where] = np.where(painted, image, self.present[where])
+        same = np.array_equal(self.importance[where], importance)
+        self.importance[where] = importance
+        self.live.painted(where, with_importance=not same)
+
+    def paint(self, region: Region, pixels: Pixels) -> None:
+        """The same, as part of the stroke that is open from now on."""
+        self._open.append((region, self.pixels(region)))
+        self.put(region, pixels)
+
+    def drop(self) -> Region:
+        """The stroke that is open is forgotten; where it was."""
+        region = _around([one for one, _ in self._open])
+        for one, pixels in reversed(self._open):
+            self.put(one, pixels)
+        self._open = []
+        return region
+
+    def stroke(self) -> Patch | None:
+        """What the stroke that is open has changed, if anything."""
+        region = _around([one for one, _ in self._open])
+        if region[0] == region[1] or region[2] == region[3]:
+            return None
+        after = self.pixels(region)
+        image, importance = (x.copy() for x in after)
+        for (top, bottom, left, right), pixels in reversed(self._open):
+            part = np.s_[top - region[0] : bottom - region[0], left - region[2] : right - region[2]]
+            image[part], importance[part] = pixels
+        before = image, importance
+        # What is sent again, since its answer was lost, is there already.
+        if all(np.array_equal(a, b) for a, b in zip(before, after, strict=True)):
+            return None
+        return Patch(region, before, after, self.view)
+
+    def close(self) -> None:
+        """The stroke that is open is done."""
+        self._open = []
+
+    def checked(self, region: Region, arrays: Mapping[str, npt.NDArray[Any]]) -> Pixels:
+        """What a page says of a region. Raises PaintError for what cannot be painted there."""
+        top, bottom, left, right = region
+        height, width = self.size
+        if not (0 <= top <= bottom <= height and 0 <= left <= right <= width):
+            raise PaintError(f"paint at {list(region)}, and the picture is {width}x{height}")
+        try:
+            image, importance = arrays["image"], arrays["importance"]
+        except KeyError:
+            raise PaintError("paint without its image and importance") from None
+        shape = bottom - top, right - left
+        if image.shape != (*shape, 3) or importance.shape != shape:
+            raise PaintError(
+                f"paint of {list(image.shape)} and {list(importance.shape)} at {list(region)}"
+            )
+        if not (np.isfinite(image).all() and np.isfinite(importance).all()):
+            raise PaintError("paint of NaN or Inf")
+        if importance.size and not (importance.min() >= 0 and importance.max() <= MOST):
+            raise PaintError(f"importance beyond 0 to {MOST:g}")
+        if image.size and not (image.min() >= 0 and image.max() <= BRIGHTEST):
+            raise PaintError(f"light beyond 0 to {BRIGHTEST:g}")
+        return image.astype(np.float32), importance.astype(np.float32)
+
+
+class Canvases:
+    """Those of all views of a session: strokes go to one of them at a time, looks to all."""
+
+    def __init__(
+        self, bases: Sequence[Basis], presents: Sequence[Floats], steps: Sequence[Step]
+    ) -> None:
+        self._all = tuple(
+            Canvas(k, basis, present, steps)
+            for k, (basis, present) in enumerate(zip(bases, presents, strict=True))
+        )
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __iter__(self) -> Iterator[Canvas]:
+        return iter(self._all)
+
+    def __getitem__(self, view: int) -> Canvas:
+        """That of a view. Raises PaintError if there is none."""
+        if view >= len(self):
+            raise PaintError(f"no view {view}: there are {len(self)}")
+        return self._all[view]
+
+    def improve(
+        self, bases: Sequence[Basis], presents: Sequence[Floats], steps: Sequence[Step]
+    ) -> None:
+        """As of each."""
+        for view, basis, present in zip(self, bases, presents, strict=True):
+            view.improve(basis, present, steps)
+
+    @property
+    def live(self) -> list[LiveView]:
+        """The sums of each."""
+        return [view.live for view in self]
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether any pixel counts."""
+        return any(view.is_painted for view in self)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a stroke is not done yet."""
+        return any(view.is_open for view in self)
+
+    def strokes(self) -> tuple[Patch, ...]:
+        """What strokes that are open have changed."""
+        return tuple(patch for view in self if (patch := view.stroke()) is not None)
+
+    def close(self) -> None:
+        """What is open is done."""
+        for view in self:
+            view.close()
+
+    def drop(self) -> list[tuple[int, Region]]:
+        """What is open is forgotten; in which views, and where."""
+        return [(view.view, view.drop()) for view in self if view.is_open]
+
+    def put(self, patches: Sequence[Patch], *, is_back: bool = False) -> None:
+        """The pixels after a step, or those before it."""
+        for patch in patches:
+            self[patch.view].put(patch.region, patch.before if is_back else patch.after)
+
+    def instead(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
+        """What it changes to have these, by view, instead of all that is painted."""
+        made = []
+        for k, (image, importance) in paintings.items():
+            view = self[k]
+            given = np.asarray(image, np.float32), np.asarray(importance, np.float32)
+            made.append(Patch(view.whole, view.pixels(view.whole), given, k))
+        return tuple(made)
+
+
+def _slices(region: Region) -> tuple[slice, slice]:
+    top, bottom, left, right = region
+    return slice(top, bottom), slice(left, right)
+
+
+def _around(regions: list[Region]) -> Region:
+    """The smallest region that holds all."""
+    if not regions:
+        return (0, 0, 0, 0)
+    tops, bottoms, lefts, rights = zip(*regions, strict=True)
+    return min(tops), max(bottoms), min(lefts), max(rights)

@@ -1,0 +1,143 @@
+"""What a cell of a notebook gives to a painter, and sets in it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.errors import PaintError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.paint.launch import check_bases, check_together
+from lightpaint.paint.session import Session
+from lightpaint.paint.steps import Pixels
+from lightpaint.paint.subject import Subject
+from lightpaint.paint.wishes import Wishes
+from lightpaint.scene.quality import on_film
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.settings import Settings
+from lightpaint.target.target import Target
+
+#: What can be painted.
+Paintable = Basis | Scene | LightGroups | str | Path
+
+#: Paintings by view, what is asked with them, and what undo calls it.
+Loaded = tuple[Mapping[int, Pixels], Wishes, str]
+
+
+def of_targets(session: Session, targets: Any) -> Loaded:
+    """These paintings, one for each view; None leaves a view unpainted. Raises LightpaintError."""
+    if not isinstance(targets, Sequence) or len(targets) != len(session.views):
+        raise PaintError(
+            f"painter.targets is a list of {len(session.views)}, a lp.Target or None for each view"
+        )
+    paintings = {k: _painting(session, k, one, "targets") for k, one in enumerate(targets)}
+    return paintings, session.wishes, "paintings from a cell"
+
+
+def of_target(session: Session, target: Any) -> Loaded:
+    """This painting of the first view. Raises LightpaintError."""
+    return {0: _painting(session, 0, target, "target")}, session.wishes, "painting from a cell"
+
+
+def _painting(session: Session, view: int, target: Any, name: str) -> Pixels:
+    its = session.views[view]
+    if not isinstance(target, Target | None):
+        kind = type(target).__name__
+        raise PaintError(f"painter.{name} is a lp.Target or None, not {kind}")
+    if target is None:
+        return its.present, np.zeros(its.size, np.float32)
+    target = target.fitted_to(its.size, resize=False)
+    return target.image, target.importance
+
+
+def of_lighting(session: Session, lighting: Any) -> Loaded:
+    """Every light held there. Raises LightpaintError."""
+    if not isinstance(lighting, Lighting):
+        raise PaintError(f"painter.lighting is a lp.Lighting, not {type(lighting).__name__}")
+    weights = lighting.weights_for(session.basis)
+    lights = {
+        light.name: {"lock": weight.tolist()}
+        for light, weight in zip(session.basis.lights, weights, strict=True)
+        if not light.is_fixed
+    }
+    wishes = Wishes(lights, session.wishes.ties, session.wishes.values)
+    return {}, wishes, "lighting from a cell"
+
+
+def of_constraints(session: Session, constraints: Any) -> Loaded:
+    """This asked, and nothing else. Raises LightpaintError."""
+    if not isinstance(constraints, Constraints | None):
+        kind = type(constraints).__name__
+        raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")
+    lights, values = session.basis.lights, session.wishes.values
+    wishes = Wishes.asking(constraints or Constraints(), lights, values)
+    return {}, wishes, "constraints from a cell"
+
+
+def same_paintings(new: Sequence[Target | None], old: Sequence[Target | None]) -> bool:
+    """Whether nothing has been painted between them."""
+    return len(new) == len(old) and all(map(_same, new, old))
+
+
+def _same(new: Target | None, old: Target | None) -> bool:
+    if new is None or old is None:
+        return new is old
+    return np.array_equal(new.image, old.image) and np.array_equal(new.importance, old.importance)
+
+
+def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[Subject, ...]:
+    """What is painted, of one view or of several. how: as of `_subject`.
+
+    Raises LightpaintError for what cannot be.
+    """
+    several = list(given) if isinstance(given, list | tuple) else [given]
+    if not several:
+        raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
+    made = tuple(_subject(one, among=len(several), **how) for one in several)
+    if len(made) > 1 and len({subject.scene is None for subject in made}) > 1:
+        raise PaintError("scenes and bases at once: give one kind for all views")
+    if len(made) > 1 and any(subject.groups is not None for subject in made):
+        raise PaintError("light groups have one view only: give bases, or scenes")
+    check_bases([subject.basis for subject in made if subject.basis is not None])
+    scenes = [subject.loaded for subject in made if subject.scene is not None]
+    check_together([scene.sensor_names[scene.sensor] for scene in scenes])
+    return made
+
+
+def _subject(
+    given: Any,
+    folder: str | Path | None,
+    settings: Settings,
+    constraints: Constraints | None,
+    transform: ViewTransform | TransformChoice | None,
+    among: int,
+) -> Subject:
+    """What is painted. Raises LightpaintError for what cannot be."""
+    about: dict[str, Any] = {
+        "settings": settings,
+        "constraints": constraints or Constraints(),
+        "choice": TransformChoice.of(transform),
+        "among": among,
+    }
+    if isinstance(given, str | Path):
+        given = load_scene(given)
+    if isinstance(given, Scene):
+        scene = on_film(given, settings.quality, settings.resolution)
+        name = str(scene.path)
+        about |= {"scene": scene}
+    elif isinstance(given, LightGroups):
+        name = given.basis.origin.scene
+        about |= {"basis": given.basis, "groups": given}
+    elif isinstance(given, Basis):
+        name = given.origin.scene
+        about |= {"basis": given}
+    else:
+        kind = type(given).__name__
+        raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
+    place = Path(f"{Path(name).stem}.paint") if folder is None else Path(folder)
+    return Subject(source=name, folder=place.absolute(), **about)

@@ -1,0 +1,126 @@
+"""What somebody asks for that takes long: exports, the verifying render, why it is not closer."""
+
+from collections.abc import Callable, Sequence
+from threading import Lock
+from typing import Any, Protocol
+
+from lightpaint.basis.clean import as_halves
+from lightpaint.errors import PaintError
+from lightpaint.lighting.analysis.analyse import analyse, with_findings
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.paint import protocol
+from lightpaint.paint.beside import StoppedError, later
+from lightpaint.paint.frames import Message
+from lightpaint.paint.moment import Moment
+from lightpaint.paint.pictures import Picture
+from lightpaint.paint.steps import of_view
+from lightpaint.paint.subject import Subject, painting_of
+from lightpaint.paint.wishes import Wishes
+from lightpaint.progress import Progress
+
+Asked = protocol.Export | protocol.Verify | protocol.Explain
+
+
+class Place(Protocol):
+    """What an errand wants of the studio it goes out from."""
+
+    subjects: tuple[Subject, ...]
+
+    def now(self) -> tuple[Moment, Lighting]:
+        """What is painted and asked, and the last answer."""
+
+    def put(self, name: str, picture: Picture) -> None:
+        """A picture from now on, of which pages are told."""
+
+    def tell(self, message: Message) -> None:
+        """Say it to pages."""
+
+    def hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """How far something is. Raises StoppedError once nobody wants it any more."""
+
+
+class Errands:
+    """Those of one studio; one of them renders or writes at a time."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._render, self._renders = Lock(), False
+
+    def said(self, message: Asked) -> list[Message]:
+        """Begin with it. Raises PaintError for what there is not."""
+        works: dict[type, Callable[[Any], None]] = {
+            protocol.Export: self._export,
+            protocol.Verify: self._verified,
+            protocol.Explain: self._explain,
+        }
+        if isinstance(message, protocol.Verify):
+            if not message.run:
+                self._renders = False
+                return [Message("started", {"what": "stop"})]
+            if self._subject(message.view).scene is None:
+                raise PaintError("there is no scene to render: it was opened from a saved basis")
+        elif isinstance(message, protocol.Explain):
+            self._subject(message.view)
+        what = type(message).__name__.lower()
+        later(lambda: works[type(message)](message), what, self._place.tell)
+        return [Message("started", {"what": what})]
+
+    def command(self, sensors: Sequence[str], wishes: Wishes) -> str:
+        """The command that answers exported paintings alike, where there are commands."""
+        subject = self._place.subjects[0]
+        paths = {sensor: str(painting_of(subject.folder, sensor)) for sensor in sensors}
+        return subject.command(paths, wishes) if paths else ""
+
+    def _subject(self, view: int) -> Subject:
+        subjects = self._place.subjects
+        if view >= len(subjects):
+            raise PaintError(f"no view {view}: there are {len(subjects)}")
+        return subjects[view]
+
+    def _answer(self) -> tuple[Moment, Lighting]:
+        """What is painted now, and the exact answer to it."""
+        moment, now = self._place.now()
+        solution = moment.solution()
+        if solution is None:
+            return moment, now
+        return moment, with_findings(solution, analyse(solution)).lighting
+
+    def _export(self, message: protocol.Export) -> None:
+        # It brings all rooms, of which painting needs a few.
+        from lightpaint.paint.exports import export
+
+        moment, lighting = self._answer()
+
+        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+            del label  # what it is at within an export is no news to a page
+            self._place.hears("export", done, total, unit)
+
+        with self._render:
+            files = export(self._place.subjects, moment, lighting, message.what, hears)
+        command = self.command(moment.sensors, moment.wishes)
+        fields = {"files": [str(x) for x in files], "command": command}
+        self._place.tell(Message("exported", fields))
+
+    def _verified(self, asked: protocol.Verify) -> None:
+        from lightpaint.paint.exports import verified
+
+        moment, lighting = self._answer()
+
+        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+            if not self._renders:
+                raise StoppedError
+            self._place.hears(label, done, total, unit)
+
+        self._renders = True
+        progress: Progress = hears
+        with self._render:
+            basis = moment.bases[asked.view]
+            picture, said, agrees = verified(self._subject(asked.view), basis, lighting, progress)
+        self._place.put(of_view("verified", asked.view), as_halves(picture))
+        about = {"agrees": agrees, "text": said, "view": asked.view}
+        self._place.tell(Message("verified", about))
+
+    def _explain(self, asked: protocol.Explain) -> None:
+        said, beyond = self._place.now()[0].beyond(asked.view)
+        self._place.put(of_view("beyond", asked.view), beyond)
+        self._place.tell(Message("explained", {"sentences": said, "view": asked.view}))

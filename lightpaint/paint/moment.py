@@ -1,0 +1,87 @@
+"""What was painted and asked at one time, for a solve that takes longer than a stroke."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.analysis.uncertainty import correct_noise
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.paint.wishes import Wishes
+from lightpaint.report.sentences import what_is_missed
+from lightpaint.report.verdict import headline
+from lightpaint.settings import Settings
+from lightpaint.target.target import Target
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A session as it was.
+
+    version: of the session then. bases, targets: of each view; None where nothing was painted.
+    """
+
+    version: int
+    bases: tuple[Basis, ...]
+    targets: tuple[Target | None, ...]
+    wishes: Wishes
+    settings: Settings
+    constraints: Constraints
+
+    @property
+    def painted(self) -> tuple[int, ...]:
+        """The views in which something was: those that count."""
+        return tuple(k for k, target in enumerate(self.targets) if target is not None)
+
+    @property
+    def painted_targets(self) -> tuple[Target, ...]:
+        """What was painted in these."""
+        return tuple(target for target in self.targets if target is not None)
+
+    @property
+    def sensors(self) -> list[str]:
+        """Of these, by which their paintings are told apart; "" of the only view there is."""
+        if len(self.bases) == 1:
+            return [""]
+        return [self.bases[k].origin.sensor for k in self.painted]
+
+    def solution(self) -> Solution | None:
+        """The exact answer; None where nothing is painted. Raises LightpaintError."""
+        if not self.painted:
+            return None
+        solution = solution_of(self._problem(constraints=self.constraints, fit=self.settings))
+        if self.settings.corrects_noise(is_known=self.bases[0].knows_noise):
+            solution = correct_noise(solution)
+        return solution
+
+    def _problem(self, **how: Any) -> Problem:
+        return Problem.of([self.bases[k] for k in self.painted], self.painted_targets, **how)
+
+    def beyond(self, view: int = 0) -> tuple[list[str], npt.NDArray[np.uint8]]:
+        """What no light can make of the painting of a view: sentences, and a picture (h, w) of
+        where.
+
+        The best with nothing else asked: nothing held, any colour, no constraints. 255 stands for
+        what is missed by all that a display has.
+        """
+        target = self.targets[view]
+        if target is None:
+            nothing = np.zeros(self.bases[view].size, np.uint8)
+            return ["Nothing is painted here yet."], nothing
+        solution = self.solution()
+        assert solution is not None
+        analysis = analyse(solution)[self.painted.index(view)]
+        best = solution_of(self._problem(fit=replace(self.settings, hold=0.0, colors="free")))
+        transform = best.problem.fit.transform or ViewTransform()
+        shown = transform.encode(self.bases[view].mix(best.weights))
+        missed = np.abs(shown - transform.encode(target.image)).max(axis=-1)
+        missed = np.where(target.importance > 0, np.clip(missed, 0, 1), 0)
+        said = [headline(analysis.seen), *what_is_missed(analysis.diagnosis)]
+        return said, np.round(255 * missed).astype(np.uint8)
