@@ -98,7 +98,7 @@ def _pool() -> ThreadPoolExecutor:
     """
     nice = os.getpriority(os.PRIO_PROCESS, 0) if hasattr(os, "getpriority") else 0
     if nice not in _pools:
-        _pools[nice] = ThreadPoolExecutor((os.cpu_count() or 1) + 1, f"lightpaint-beside-{nice}")
+        _pools[nice] = ThreadPoolExecutor((os.cpu_count() or 1) + 1, f"side-by-side-{nice}")
     return _pools[nice]
 
 

@@ -126,6 +126,9 @@ def painting_of(folder: Path, sensor: str) -> Path:
 
 def bases_of(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
     """Bases of several views; where they are still to be rendered, all of few samples first."""
+    for subject in subjects:
+        if subject.scene is not None and subject.known is None:
+            _ = subject.loaded  # what is wrong with one is said before another is rendered
     each = [subject.bases(progress) for subject in subjects]
     found = [next(bases) for bases in each]
     yield list(found)

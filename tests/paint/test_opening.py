@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import run
+from command import spawn
 from renderer import write_room
 
 import lightpaint as lp
@@ -106,7 +106,7 @@ def test_a_known_scene_is_painted_without_being_loaded(
 
 def test_what_is_wrong_with_a_scene_ends_the_painter_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "scene.xml").write_text("<scene version='3.0.0'><bsdf type='no'/></scene>")
-    done = run(tmp_path, "paint", "scene.xml", "--no-browser", "--port", "0")
+    done = spawn(tmp_path, "paint", "scene.xml", "--no-browser", "--port", "0")
     assert done.returncode == 2
     [line] = done.stderr.strip().splitlines()
     assert "scene.xml" in line
@@ -119,7 +119,7 @@ def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
 ) -> None:
     folder = path.parent / "s"
     Store.open(folder / "session.db", Identity.of([make_basis(2)])).close()
-    done = run(path.parent, "paint", path.name, "-o", "s", "--no-browser", "--port", "0")
+    done = spawn(path.parent, "paint", path.name, "-o", "s", "--no-browser", "--port", "0")
     assert done.returncode == 2
     assert "session.db is a session of" in done.stderr
     assert "(--new)" in done.stderr
