@@ -34,6 +34,7 @@ from lightpaint.basis.basis import BasisLight, Origin
 from lightpaint.lighting.fit import meant_by
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
+from lightpaint.paint.launch import at_hand
 from lightpaint.paint.server import Server
 from lightpaint.paint.store import MemoryStore
 from lightpaint.paint.studio import Studio
@@ -183,7 +184,8 @@ def serve(case: str, asked: str, space: str) -> None:
         server = Server(studio, port=0)
         studio.start()
         print(server.url, flush=True)
-        server.run()
+        with at_hand():
+            server.run()
 
 
 class Opened:
@@ -257,6 +259,7 @@ class Opened:
             self.stroke(number, moves=30)
             number += 1
             if number % 10 == 0:
+                time.sleep(3)  # until the exact answer has been found, and its memory is free
                 session.send("HeapProfiler.collectGarbage")
                 heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
                 held = Path(f"/proc/{self.server.pid}/statm").read_text().split()[1]
@@ -282,7 +285,7 @@ STAGES = {
 
 
 def print_starts(scene: str, times: int) -> None:
-    """From the start of a process to an answered stroke, with an empty cache and a full one."""
+    """How soon a stroke is answered after the start of a process, with and without a cache."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         path = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)

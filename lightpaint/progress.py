@@ -5,7 +5,9 @@ listen; which of them listens is the caller's choice. Who listens to the corrido
 remarks, too.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -82,3 +84,24 @@ def labelled(listen: Listener, name: str) -> Listener:
         listen(f"{label} of {name}", done, total, unit)
 
     return _Split(report, listen.say, lambda text: listen.note(f"{text} of {name}"))
+
+
+_CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)
+
+
+@contextmanager
+def while_wanted(check: Callable[[], None]) -> Iterator[None]:
+    """Work that may be given up: what it calls asks `check` now and then.
+
+    check: raises whatever is to end the work, from whichever thread takes part in it.
+    """
+    token = _CHECK.set(check)
+    try:
+        yield
+    finally:
+        _CHECK.reset(token)
+
+
+def wanted() -> Callable[[], None]:
+    """What tells, by raising, whether the work that this is part of is wanted no more."""
+    return _CHECK.get()

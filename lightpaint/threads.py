@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
+from contextvars import copy_context
 from functools import cache
 from itertools import count
 from threading import Event
@@ -12,6 +13,8 @@ from typing import Any, TypeVar
 # The controller finds the libraries that are loaded: numpy has to be.
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
+
+from lightpaint.progress import wanted
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -53,17 +56,19 @@ def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
     """work(job) of each job, several at a time with BLAS on one thread; results in order.
 
     What comes out has the bits that one job after the other would give. Of several errors the one
-    of the first job is raised. A job may have jobs side by side of its own.
+    of the first job is raised. A job may have jobs side by side of its own. Work that is wanted no
+    more ends before the next job.
     """
     waiting = list(jobs)
     results: list[Any] = [None] * len(waiting)
     errors: dict[int, Exception] = {}
     turns = count()
-    ended = Event()
+    ended, check = Event(), wanted()
 
     def take_turns() -> None:
         while not ended.is_set() and (k := next(turns)) < len(waiting):
             try:
+                check()
                 results[k] = work(waiting[k])
             except Exception as error:
                 errors[k] = error
@@ -71,7 +76,7 @@ def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
     with one_thread():
         # One thread more than processors: three channels then share two of them evenly.
         hands = min(os.cpu_count() or 1, len(waiting) - 1)
-        helpers = [_pool().submit(take_turns) for _ in range(hands)]
+        helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(hands)]
         try:
             take_turns()
         except BaseException:

@@ -35,7 +35,9 @@ class PaintedTiles:
         everything = slice(0, len(importance)), slice(0, importance.shape[1])
         self._leave(everything)
         self._paint = TiledEquations(basis.images, image, importance)
-        self._rest = TiledEquations(basis.images, basis.present_look, self._left)
+        rest = basis.images, basis.present_look, self._left
+        self._rest = TiledEquations(*rest, like=self._paint)
+        self._is_old: Region | None = None  # where the rest is another by now
 
     def _leave(self, region: Region) -> None:
         left = np.maximum(1 - self._importance[region], 0)
@@ -48,12 +50,16 @@ class PaintedTiles:
         before = self._left[region].copy()
         self._leave(region)
         if not np.array_equal(before, self._left[region]):
-            self._rest.update(region)
+            self._is_old = region if self._is_old is None else _both(self._is_old, region)
 
     def equations(self, rest_weight: float) -> NormalEquations:
-        equations, rest = self._paint.equations, self._rest.equations
+        equations = self._paint.equations
         if not rest_weight:
             return equations
+        if self._is_old is not None:
+            self._rest.update(self._is_old)
+            self._is_old = None
+        rest = self._rest.equations
         return NormalEquations(
             equations.M + rest_weight * rest.M,
             equations.b + rest_weight * rest.b,
@@ -179,6 +185,15 @@ class Films:
         w = weights.astype(np.float32)
         mixed = np.stack([w[:, c] @ rows for c, rows in enumerate(self._rows)])
         return mixed.astype(np.float64)
+
+
+def _both(one: Region, other: Region) -> Region:
+    """The smallest region that holds both."""
+    (top, left), (below, right) = (
+        [min(a.start, b.start) for a, b in zip(one, other, strict=True)],
+        [max(a.stop, b.stop) for a, b in zip(one, other, strict=True)],
+    )
+    return slice(top, below), slice(left, right)
 
 
 def _around(along: slice, side: int, length: int) -> tuple[int, int]:

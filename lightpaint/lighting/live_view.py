@@ -7,6 +7,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.live_sums import FILM, PaintedTiles, Region, SmallFilm
 
+#: Pixels along the parts of rows that importance is summed over.
+WIDE = 64
+
 
 class LiveView:
     """A painting that changes under a brush. Updated in place.
@@ -17,20 +20,20 @@ class LiveView:
 
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self.basis, self._image, self._importance = basis, image, importance
-        self._sums = np.zeros((len(importance), 2))
-        self._count_rows(slice(0, len(importance)))
+        self._sums = np.zeros((len(importance), -(-importance.shape[1] // WIDE), 2))
+        self._count((slice(0, len(importance)), slice(0, importance.shape[1])))
         self._light: PaintedTiles | None = None
         self._display: SmallFilm | None = None
 
     @property
     def counts(self) -> Doubles:
         """Importance of all that is painted, and the weight of the rest, (2,)."""
-        return np.asarray(self._sums.sum(axis=0))
+        return np.asarray(self._sums.sum(axis=(0, 1)))
 
     @property
     def is_painted(self) -> bool:
         """Whether anything is."""
-        return bool(self._sums[:, 0].any())
+        return bool(self._sums[..., 0].any())
 
     @property
     def pixels(self) -> int:
@@ -40,7 +43,7 @@ class LiveView:
     def painted(self, region: Region, *, with_importance: bool = True) -> None:
         """A rectangle of the painting is another now. with_importance: also what counts there."""
         if with_importance:
-            self._count_rows(region[0])
+            self._count(region)
         if self._light is not None:
             self._light.painted(region, with_importance=with_importance)
         if self._display is not None:
@@ -64,8 +67,16 @@ class LiveView:
         if self._display is not None:
             self._display.see_through(transform)
 
-    def _count_rows(self, rows: slice) -> None:
-        a = self._importance[rows].astype(np.float64)
-        self._sums[rows, 0] = a.sum(axis=1)
-        left = np.where(self.basis.emitters_seen[rows], 0, np.maximum(1 - a, 0))
-        self._sums[rows, 1] = left.sum(axis=1)
+    def _count(self, region: Region) -> None:
+        """Sum importance anew, of parts of rows: a sum of sums has the same bits whatever the way
+        it came about.
+        """
+        rows, columns = region
+        first, last = columns.start // WIDE, -(-columns.stop // WIDE)
+        where = rows, slice(first * WIDE, last * WIDE)
+        a = self._importance[where].astype(np.float64)
+        left = np.where(self.basis.emitters_seen[where], 0, np.maximum(1 - a, 0))
+        starts = np.arange(0, a.shape[1], WIDE)
+        for k, values in enumerate((a, left)):
+            if a.size:
+                self._sums[rows, first:last, k] = np.add.reduceat(values, starts, axis=1)

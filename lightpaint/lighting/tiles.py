@@ -6,8 +6,10 @@ subtracted, so that nothing drifts: undoing a stroke gives back the very same bi
 updated problem is bit for bit the one built from scratch.
 """
 
+import threading
 from functools import partial
 from itertools import pairwise, product
+from math import prod
 
 import numpy as np
 
@@ -41,8 +43,15 @@ class TiledEquations:
     """
 
     def __init__(
-        self, images: Floats, target: Floats, importance: Floats, *, side: int | None = None
+        self,
+        images: Floats,
+        target: Floats,
+        importance: Floats,
+        *,
+        side: int | None = None,
+        like: "TiledEquations | None" = None,
     ) -> None:
+        """like: of the same images, updated for the same strokes; they are looked at once then."""
         self._images = images
         n, height, width, _ = images.shape
         if importance.ndim == 2:
@@ -56,6 +65,8 @@ class TiledEquations:
         self._target = target
         self._importance = importance
         self.side = side_for(n, height, width) if side is None else side
+        self._lit: _Lit = _Lit(images, self.side) if like is None else like._lit
+        self._lit.is_shared = like is not None
         # What a stroke of colour leaves as it is, M, is kept apart from what it changes, b and
         # ‖Ψ‖².
         shape = -(-height // self.side), -(-width // self.side)
@@ -104,24 +115,74 @@ class TiledEquations:
             slice(rows.start * side, rows.stop * side),
             slice(columns.start * side, columns.stop * side),
         )
-        # The target goes along as one more image.
         D = np.empty((*tiles, self._importance.shape[2], side * side))
-        pixels = np.empty((*tiles, 3, n + 1, side * side))
+        target = np.empty((*tiles, 3, 1, side * side))
         _cut(self._importance[where][None], side, out=D[:, :, :, None])
-        _cut(self._images[(slice(None), *where)], side, out=pixels[:, :, :, :n])
-        _cut(self._target[where][None], side, out=pixels[:, :, :, n:])
+        _cut(self._target[where][None], side, out=target)
         if not D.all():
             # Pixels without weight may hold anything.
-            np.copyto(pixels, 0, where=(D == 0)[:, :, :, None])
-        painted = pixels[:, :, :, n] * D
-        self._b[0][rows, columns] = np.matmul(pixels, painted[..., None])[..., 0]
+            np.copyto(target, 0, where=(D == 0)[:, :, :, None])
+        painted = target * D[:, :, :, None]
+        lit = self._lit(where, tiles)
+        with np.errstate(invalid="ignore"):
+            b = np.matmul(lit, painted.swapaxes(-1, -2))[..., 0]
+        if not np.isfinite(b).all():
+            lit = np.where((D == 0)[:, :, :, None], 0, lit)
+            b = np.matmul(lit, painted.swapaxes(-1, -2))[..., 0]
+        self._b[0][rows, columns, :, :n] = b
+        self._b[0][rows, columns, :, n] = np.matmul(target, painted.swapaxes(-1, -2))[..., 0, 0]
         if with_M:
-            lit = pixels[:, :, :, :n]
-            lit *= np.sqrt(D)[:, :, :, None]
-            # Of one array and itself numpy forms half of the product, of two all of it, which is
-            # faster for few lights.
-            other = lit.copy() if n <= FEW_LIGHTS else lit
-            np.matmul(lit, other.swapaxes(-1, -2), out=self._M[0][rows, columns])
+            one = _ROOM.array("one", lit.shape)
+            np.multiply(lit, np.sqrt(D)[:, :, :, None], out=one)
+            two = one
+            if n <= FEW_LIGHTS:
+                # Of one array and itself numpy forms half of the product, of two all of it, which
+                # is faster for few lights.
+                two = _ROOM.array("two", lit.shape)
+                two[...] = one
+            np.matmul(one, two.swapaxes(-1, -2), out=self._M[0][rows, columns])
+
+
+class _Lit:
+    """Basis images cut into tiles, in float64.
+
+    is_shared: whether the last block is kept, for who asks for the same, and never changes.
+    """
+
+    def __init__(self, images: Floats, side: int) -> None:
+        self._images, self._side = images, side
+        self._last: tuple[tuple[slice, slice], Doubles] | None = None
+        self.is_shared = False
+
+    def __call__(self, where: tuple[slice, slice], tiles: tuple[int, int]) -> Doubles:
+        """(rows, columns, 3, n, side²) of the tiles at `where`; to look at only."""
+        last = self._last
+        if last is not None and last[0] == where:
+            return last[1]
+        made = np.empty((*tiles, 3, len(self._images), self._side**2))
+        _cut(self._images[(slice(None), *where)], self._side, out=made)
+        if self.is_shared:
+            self._last = (where, made)
+        return made
+
+
+class _Room(threading.local):
+    """Memory of a thread that is used again: new pages from the system take as long as the sums."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Doubles] = {}
+
+    def array(self, name: str, shape: tuple[int, ...]) -> Doubles:
+        """An array of any content, until the next of that name is asked for."""
+        size = prod(shape)
+        if 8 * size > 2 * CHUNK:
+            return np.empty(shape)
+        if name not in self._kept or self._kept[name].size < size:
+            self._kept[name] = np.empty(size)
+        return self._kept[name][:size].reshape(shape)
+
+
+_ROOM = _Room()
 
 
 def _parts(whole: range, size: int) -> list[range]:

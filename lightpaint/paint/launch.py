@@ -1,8 +1,11 @@
 """From what was named to a page that paints it: session file, studio and server, until the end."""
 
+import gc
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -173,13 +176,31 @@ def paint_in_browser(
             studio.on_failure = partial(_failed, server)
             opened(server)
             studio.start()
-            server.run()
+            with at_hand():
+                server.run()
         finally:
             server.close()
         if studio.failure is not None and studio.store is None:
             raise studio.failure
     finally:
         _end(studio, places.store)
+
+
+@contextmanager
+def at_hand() -> Iterator[None]:
+    """Let strokes wait for nothing but their own work, in a process that does nothing else.
+
+    What is imported by now is not looked through for garbage, again and again; and whoever holds
+    the interpreter for long lets go of it ten times as soon.
+    """
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(before / 10)
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(before)
 
 
 class _Places:

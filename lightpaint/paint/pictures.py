@@ -34,12 +34,13 @@ class Pictures:
 
     def __init__(self) -> None:
         self.generations: dict[str, int] = {}
+        self._counts: dict[str, int] = {}  # also of those that are withdrawn: none comes twice
         self._made: dict[str, Picture] = {}
         self._makers: dict[str, Callable[[], Picture]] = {}
 
     def offer(self, name: str, make: Callable[[], Picture]) -> None:
         """From now on there is this picture; what it was before is gone."""
-        self.generations[name] = self.generations.get(name, 0) + 1
+        self.generations[name] = self._counts[name] = self._counts.get(name, 0) + 1
         self._makers[name] = make
         self._made.pop(name, None)
 

@@ -6,6 +6,7 @@ which say what has come of them through `on_message`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from threading import RLock, Thread
 from typing import Any
 
@@ -33,6 +34,11 @@ from lightpaint.paint.store import Store
 from lightpaint.paint.subject import Subject, bases_of, transform_of
 from lightpaint.paint.told import analysis_fields, answer_fields
 from lightpaint.paint.wishes import Wishes
+from lightpaint.progress import while_wanted
+
+
+class OldError(Exception):
+    """Somebody has painted on."""
 
 
 class Studio:
@@ -316,13 +322,21 @@ class Studio:
             if session is None or session.is_open:
                 return
             moment = session.moment()
-        solution = moment.solution()
-        self._tell_answer(lambda: session.settled(moment, solution))
-        if solution is None or moment.version != session.version:
-            return
-        analyses = analyse(solution)
-        known = analysis_fields(analyses, moment.painted)
-        self._tell_answer(lambda: session.settled(moment, solution, **known))
+
+        def check() -> None:
+            if moment.version != session.version or not self._is_open:
+                raise OldError
+
+        # The next stroke gets the processors at once, and rings when it is done.
+        with suppress(OldError), while_wanted(check):
+            solution = moment.solution()
+            self._tell_answer(lambda: session.settled(moment, solution))
+            if solution is None:
+                return
+            check()
+            analyses = analyse(solution)
+            known = analysis_fields(analyses, moment.painted)
+            self._tell_answer(lambda: session.settled(moment, solution, **known))
 
     def _tell_answer(self, make: Callable[[], Message | None]) -> None:
         with self._lock:

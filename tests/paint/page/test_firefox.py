@@ -1,0 +1,178 @@
+"""The page in Firefox: it opens, paints, is answered, and shows that, without a word of complaint.
+
+Firefox is spoken to by WebDriver BiDi, which every installed one understands; that of Playwright
+is another, and a large download.
+"""
+
+import json
+import shutil
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.sync.client import ClientConnection, connect
+
+import lightpaint as lp
+from lightpaint.colour.display import to_8_bit
+from lightpaint.paint.server import Server
+from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+
+PAINTER = "document.getElementById('lightpaint').painter"
+
+#: Seconds in which anything happens on a busy machine.
+PATIENCE_S = 60.0
+
+
+class Fox:
+    """One tab."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket, self.number = socket, 0
+        self.heard: list[Any] = []
+        self.ask("session.new", capabilities={})
+        self.ask("session.subscribe", events=["log.entryAdded"])
+        self.tab = self.ask("browsingContext.getTree")["contexts"][0]["context"]
+
+    def ask(self, method: str, **params: Any) -> Any:
+        self.number += 1
+        self.socket.send(json.dumps({"id": self.number, "method": method, "params": params}))
+        while True:
+            said = json.loads(self.socket.recv(timeout=PATIENCE_S))
+            if said.get("id") == self.number:
+                assert said["type"] == "success", said
+                return said["result"]
+            self.heard.append(said)
+
+    def open(self, url: str) -> None:
+        self.ask("browsingContext.navigate", context=self.tab, url=url, wait="complete")
+
+    def look(self, script: str) -> Any:
+        """What a script finds in the page, None while there is none."""
+        names = f"const {{ engine }} = {PAINTER}; const {{ work, screen }} = engine;"
+        found = self.ask(
+            "script.evaluate",
+            expression=f"JSON.stringify((() => {{ {names} {script} }})() ?? null)",
+            target={"context": self.tab},
+            awaitPromise=True,
+        )
+        return json.loads(found["result"]["value"]) if found["type"] == "success" else None
+
+    def press(self, *keys: str) -> None:
+        actions = [{"type": x, "value": key} for key in keys for x in ("keyDown", "keyUp")]
+        source = {"type": "key", "id": "keys", "actions": actions}
+        self.ask("input.performActions", context=self.tab, actions=[source])
+
+    def drag(self, *places: list[int]) -> None:
+        moves = [{"type": "pointerMove", "x": x, "y": y, "duration": 30} for x, y in places]
+        down, up = ({"type": x, "button": 0} for x in ("pointerDown", "pointerUp"))
+        source = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
+        actions = {**source, "actions": [moves[0], down, *moves[1:], up]}
+        self.ask("input.performActions", context=self.tab, actions=[actions])
+
+    def at(self, x: int, y: int) -> list[int]:
+        """Where a pixel of the painting is in the window."""
+        return self.look(
+            "const box = engine.element.getBoundingClientRect(), [pane] = engine.panes();"
+            f"return [box.left + pane.left + {x + 0.5} * pane.scale,"
+            f" box.top + pane.top + {y + 0.5} * pane.scale].map(Math.round)"
+        )  # type: ignore[no-any-return]
+
+    def seen(self, x: int, y: int) -> list[int]:
+        """Codes on the canvas where a pixel of the painting is shown."""
+        return self.look(
+            "const { left, top, scale } = screen.panes()[0]; screen.now();"
+            f"return Array.from(screen.view.read(Math.floor(left + {x + 0.5} * scale),"
+            f" Math.floor(top + {y + 0.5} * scale), 1, 1)).slice(0, 3)"
+        )  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def fox(tmp_path: Path) -> Iterator[Fox]:
+    """Firefox, where one is installed."""
+    path = shutil.which("firefox-esr") or shutil.which("firefox")
+    if path is None:
+        pytest.skip("Firefox")
+    profile = tmp_path / "profile"
+    profile.mkdir()
+    words = [path, "--headless", "--no-remote", "--profile", str(profile)]
+    process = subprocess.Popen(
+        [*words, "--remote-debugging-port", "0", "about:blank"],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+    with process:
+        try:
+            assert process.stderr is not None
+            said = (line.partition("WebDriver BiDi listening on ")[2] for line in process.stderr)
+            address = next(filter(None, said), "").strip()
+            assert address, "Firefox has not begun"
+            threading.Thread(target=process.stderr.read, daemon=True).start()
+            with connect(f"{address}/session", max_size=2**26, proxy=None) as socket:
+                yield Fox(socket)
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def served(basis: lp.Basis, folder: Path) -> Iterator[tuple[Studio, str]]:
+    """A painter of `basis`, and its address."""
+    studio = Studio(Subject("room.basis.exr", folder, basis=basis), MemoryStore)
+    server = Server(studio, port=0)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    studio.start()
+    try:
+        yield studio, server.url
+    finally:
+        server.stop()
+        thread.join()
+        server.close()
+        studio.close()
+
+
+def until(is_so: Callable[[], Any], what: str) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < end, what
+        time.sleep(0.1)
+
+
+def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_path: Path) -> None:
+    basis = make_basis(3, (54, 96))
+    with served(basis, tmp_path / "room") as (studio, url):
+        fox.open(url)
+        until(
+            lambda: fox.look("return work.isReady && screen.width > 0 && !work.loader.total"),
+            "the page is not ready",
+        )
+        fox.press("0", *"]" * 4)
+        before = fox.seen(80, 40)
+
+        def painted() -> bool:
+            if not studio.session.store.steps:
+                fox.drag(fox.at(20, 20), fox.at(30, 20), fox.at(40, 20))
+            return bool(studio.session.store.steps)
+
+        until(painted, "no stroke is heard")
+        light = np.array(fox.look("return engine.hand.rgb"), float).reshape(1, 3)
+        code = to_8_bit(studio.session.transform.encode(light))[0].astype(int)
+
+        def is_answered() -> bool:
+            shown = fox.look("return Array.from(work.weights)")
+            is_exact = "headline" in studio.state().fields["answer"]
+            return is_exact and shown == studio.session.weights.ravel().tolist()
+
+        until(is_answered, "the exact answer does not come")
+        until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not shown")
+        assert fox.seen(80, 40) == before
+    wrong = [x["params"]["text"] for x in fox.heard if x.get("params", {}).get("level") == "error"]
+    assert wrong == []
