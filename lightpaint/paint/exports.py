@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -47,7 +48,7 @@ def export(
     if "target" in what or "report" in what:
         if not moment.painted:
             raise PaintError("nothing is painted yet: there is no painting to write")
-        for sensor, target in zip(moment.painted_sensors, moment.painted_targets, strict=True):
+        for sensor, target in zip(moment.sensors, moment.painted_targets, strict=True):
             written.append(painting_of(folder, sensor))
             write_painting(written[-1], target)
     if "lighting" in what:
@@ -67,16 +68,20 @@ def _report(subjects: Sequence[Subject], moment: Moment, progress: Progress) -> 
     """All that `solve` leaves, for the paintings as they are; the reports of it."""
     answer = subjects[0].folder / ANSWER
     settings = replace(moment.settings, force=True)
-    of_painted = [subjects[k] for k in moment.painted]
-    scenes = tuple(its.loaded for its in of_painted if its.scene is not None)
+    painted = [subjects[k] for k in moment.painted]
+    scenes = tuple(subject.loaded for subject in painted if subject.scene is not None)
     targets, asked = moment.painted_targets, moment.constraints
     if len(subjects) == 1:
         groups = subjects[0].groups
         basis = moment.bases[0] if groups is None else groups
         job, bases = Job(scenes, targets, answer, basis, asked, settings), None
     elif scenes:
-        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
         bases = [moment.bases[k] for k in moment.painted]
+        # They are on their film already, and have their samples.
+        spp = bases[0].origin.spp if settings.checks_as_basis else settings.spp
+        done: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
+        settings = replace(settings, **done)
+        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
     else:
         raise PaintError("a report of several saved bases needs their scene: open that instead")
     run(job, progress, bases=bases)
