@@ -75,7 +75,8 @@ def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
 
     with one_thread():
         # One thread more than processors: three channels then share two of them evenly.
-        hands = min(os.cpu_count() or 1, len(waiting) - 1)
+        most = (os.cpu_count() or 1) if _limit is None else _limit - 1
+        hands = min(most, len(waiting) - 1)
         helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(hands)]
         try:
             take_turns()
@@ -91,6 +92,14 @@ def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
         raise errors[min(errors)]
     return results
 
+
+def limit_jobs(count: int | None) -> None:
+    """Let no more than `count` jobs be done at a time in this process; None for all there is."""
+    global _limit
+    _limit = count
+
+
+_limit: int | None = None
 
 #: By the niceness of their threads.
 _pools: dict[int, ThreadPoolExecutor] = {}

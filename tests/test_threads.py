@@ -1,14 +1,14 @@
 """The limit on BLAS's threads: within, nested, in jobs side by side, and lifted after."""
 
 import os
-from threading import Barrier
+from threading import Barrier, get_ident
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from lightpaint.lighting.normal_equations import inner_products
-from lightpaint.threads import one_thread, side_by_side
+from lightpaint.threads import limit_jobs, one_thread, side_by_side
 
 
 def _threads() -> set[int]:
@@ -63,6 +63,14 @@ def test_results_in_order_and_errors_come_through():
 def _fail_from_2_on(k: int) -> None:
     if k >= 2:
         raise RuntimeError(str(k))
+
+
+def test_a_process_that_shares_a_machine_does_one_at_a_time():
+    limit_jobs(1)
+    try:
+        assert {get_ident()} == set(side_by_side(lambda _: get_ident(), range(4)))
+    finally:
+        limit_jobs(None)
 
 
 def test_jobs_within_jobs_wait_for_nobody():

@@ -8,13 +8,19 @@ itself for ever.
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from lightpaint.threads import limit_jobs
+
 _limit: int | None = None
 
 
 def limit_threads(count: int | None) -> None:
-    """Let no kernel of this process run on more threads than `count`; None for all there are."""
+    """Let no kernel of this process run on more threads than `count`; None for all there are.
+
+    Nor other work that is done side by side.
+    """
     global _limit
     _limit = count
+    limit_jobs(count)
 
 
 @contextmanager
