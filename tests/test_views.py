@@ -67,15 +67,16 @@ def painting(basis: Basis, weights: np.ndarray, name: str) -> Target:
 
 def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path) -> None:
     sources = [SceneFile(str(room), sensor=name) for name in ("camera", "close")]
+    options = ["--spp=16", "--resolution=1/2"]
     subjects = subjects_of(
         sources,
         tmp_path,
-        settings=Settings(spp=16, verify=False),
-        command=lambda paintings, wishes: solve_command(str(room), paintings, ["--spp=16"], wishes),
+        settings=Settings(spp=16, resolution="1/2", verify=False),
+        command=lambda paintings, wishes: solve_command(str(room), paintings, options, wishes),
     )
     identity = identity_of(subjects, {k: its.loaded for k, its in enumerate(subjects)})
     assert identity is not None
-    assert identity.views == (Seen("camera", (20, 24)), Seen("close", (10, 14)))
+    assert identity.views == (Seen("camera", (10, 12)), Seen("close", (5, 7)))
     exported = Event()
     told: list[Message] = []
 
@@ -88,9 +89,9 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
     studio.on_message = hear
     studio._obtain()
     for k, light in enumerate((0.9, 0.1)):
-        arrays = {"image": np.full((6, 8, 3), light), "importance": np.ones((6, 8))}
+        arrays = {"image": np.full((3, 4, 3), light), "importance": np.ones((3, 4))}
         floats = {key: value.astype(np.float32) for key, value in arrays.items()}
-        studio.said(Paint(k, (2, 8, 3, 11), done=True, view=k), floats)
+        studio.said(Paint(k, (1, 4, 2, 6), done=True, view=k), floats)
     studio.said(Ask(1, {"lock": True}), {})
     studio.said(Export(("target", "lighting", "relit", "report")), {})
     assert exported.wait(60)

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -75,8 +76,12 @@ def _report(subjects: Sequence[Subject], moment: Moment, progress: Progress) -> 
         basis = moment.bases[0] if groups is None else groups
         job, bases = Job(scenes, targets, answer, basis, asked, settings), None
     elif scenes:
-        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
         bases = [moment.bases[k] for k in moment.painted]
+        # They are on their film already, and have their samples.
+        spp = bases[0].origin.spp if settings.checks_as_basis else settings.spp
+        done: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
+        settings = replace(settings, **done)
+        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
     else:
         raise PaintError("a report of several saved bases needs their scene: open that instead")
     run(job, progress, bases=bases)
