@@ -27,9 +27,10 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
 from lightpaint.paint.frames import Message
-from lightpaint.paint.launch import identity_of_scene, subjects_of
+from lightpaint.paint.keeping import identity_of
+from lightpaint.paint.launch import subjects_of
 from lightpaint.paint.protocol import Ask, Export, Paint
-from lightpaint.paint.steps import Identity, Seen
+from lightpaint.paint.steps import Seen
 from lightpaint.paint.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.scene.scene import load_scene
@@ -73,7 +74,8 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
         settings=Settings(spp=16, resolution="1/2", verify=False),
         command=lambda paintings, wishes: solve_command(str(room), paintings, options, wishes),
     )
-    identity = Identity.joined([identity_of_scene(subject.loaded) for subject in subjects])
+    identity = identity_of(subjects, {k: its.loaded for k, its in enumerate(subjects)})
+    assert identity is not None
     assert identity.views == (Seen("camera", (10, 12)), Seen("close", (5, 7)))
     exported = Event()
     told: list[Message] = []

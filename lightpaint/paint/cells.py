@@ -12,7 +12,8 @@ from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.paint.launch import check_bases, check_together
+from lightpaint.lighting.views import check_same_lights
+from lightpaint.paint.keeping import check_together
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Pixels
 from lightpaint.paint.subject import Subject
@@ -103,9 +104,10 @@ def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[
         raise PaintError("scenes and bases at once: give one kind for all views")
     if len(made) > 1 and any(subject.groups is not None for subject in made):
         raise PaintError("light groups have one view only: give bases, or scenes")
-    check_bases([subject.basis for subject in made if subject.basis is not None])
-    scenes = [subject.loaded for subject in made if subject.scene is not None]
-    check_together([scene.sensor_names[scene.sensor] for scene in scenes])
+    check_together([subject.sensor for subject in made])
+    bases = [subject.basis for subject in made if subject.basis is not None]
+    for basis in bases[1:]:
+        check_same_lights(bases[0], basis)
     return made
 
 

@@ -94,6 +94,13 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
         database.executescript(f"PRAGMA incremental_vacuum({GIVEN_BACK})")
 
 
+def identify(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
+    """That an open database is of this. Raises PaintError for one of something else."""
+    with _told(path), transaction(database):
+        _check(database, path, identity)
+        _keep(database, json.dumps(asdict(identity)))
+
+
 def _renew(database: sqlite3.Connection) -> None:
     """Of the first version, which knew one view: a region becomes a list of one place."""
     database.execute("ALTER TABLE step RENAME COLUMN region TO places")
@@ -103,13 +110,6 @@ def _renew(database: sqlite3.Connection) -> None:
         places = json.dumps([] if where is None else [[0, *where]])
         database.execute("UPDATE step SET places = ? WHERE id = ?", (places, number))
     database.execute(f"PRAGMA user_version = {VERSION}")
-
-
-def identify(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
-    """That an open database is of this. Raises PaintError for one of something else."""
-    with _told(path), transaction(database):
-        _check(database, path, identity)
-        _keep(database, json.dumps(asdict(identity)))
 
 
 def _keep(database: sqlite3.Connection, identity: str) -> None:

@@ -97,7 +97,7 @@ class Errands:
 
         with self._render:
             files = export(self._place.subjects, moment, lighting, message.what, hears)
-        command = self.command(moment.sensors, moment.wishes)
+        command = self.command(moment.painted_sensors, moment.wishes)
         fields = {"files": [str(x) for x in files], "command": command}
         self._place.tell(Message("exported", fields))
 

@@ -48,7 +48,7 @@ def export(
     if "target" in what or "report" in what:
         if not moment.painted:
             raise PaintError("nothing is painted yet: there is no painting to write")
-        for sensor, target in zip(moment.sensors, moment.painted_targets, strict=True):
+        for sensor, target in zip(moment.painted_sensors, moment.painted_targets, strict=True):
             written.append(painting_of(folder, sensor))
             write_painting(written[-1], target)
     if "lighting" in what:
@@ -68,8 +68,8 @@ def _report(subjects: Sequence[Subject], moment: Moment, progress: Progress) -> 
     """All that `solve` leaves, for the paintings as they are; the reports of it."""
     answer = subjects[0].folder / ANSWER
     settings = replace(moment.settings, force=True)
-    painted = [subjects[k] for k in moment.painted]
-    scenes = tuple(subject.loaded for subject in painted if subject.scene is not None)
+    of_painted = [subjects[k] for k in moment.painted]
+    scenes = tuple(its.loaded for its in of_painted if its.scene is not None)
     targets, asked = moment.painted_targets, moment.constraints
     if len(subjects) == 1:
         groups = subjects[0].groups

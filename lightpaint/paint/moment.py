@@ -46,11 +46,11 @@ class Moment:
         return tuple(target for target in self.targets if target is not None)
 
     @property
-    def sensors(self) -> list[str]:
-        """Of these, by which their paintings are told apart; "" of the only view there is."""
+    def painted_sensors(self) -> tuple[str, ...]:
+        """Of these views, by which their paintings are told apart; "" of the only one there is."""
         if len(self.bases) == 1:
-            return [""]
-        return [self.bases[k].origin.sensor for k in self.painted]
+            return ("",)
+        return tuple(self.bases[k].origin.sensor for k in self.painted)
 
     def solution(self) -> Solution | None:
         """The exact answer; None where nothing is painted. Raises LightpaintError."""

@@ -24,7 +24,7 @@ def offer_transforms(shelf: Pictures, transforms: Sequence[ViewTransform]) -> No
 def offer_view(
     shelf: Pictures, view: Canvas, transform: ViewTransform, clean: CleanPlanes | None
 ) -> None:
-    """Pictures of a view from now on. clean: planes without their grain, if there are any yet."""
+    """Pictures of a view from now on; clean ones, unless they are there, come later."""
     basis = view.basis
 
     def offer(name: str, make: Any) -> None:

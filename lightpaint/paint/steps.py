@@ -110,13 +110,6 @@ class Identity:
             data = {**rest, "views": [old]}
         return read_record(cls, data)
 
-    @classmethod
-    def joined(cls, alone: Sequence["Identity"]) -> "Identity":
-        """That of a session of several views, from those of each."""
-        first = alone[0]
-        views = tuple(view for its in alone for view in its.views)
-        return cls(first.scene, first.basis, first.lights, views)
-
     @property
     def largest(self) -> int:
         """Pixels of its largest view."""

@@ -239,11 +239,10 @@ class Studio:
     def _take(self, bases: Sequence[Basis]) -> None:
         """Paint on with these bases."""
         first = self.subjects[0]
-        is_kept = first.settings.use_cache
-        clean = [kept_planes(basis) if is_kept else None for basis in bases]
+        cleans = [kept_planes(basis) if first.settings.use_cache else None for basis in bases]
         presents = [
-            denoised(basis.present_look, basis.features) if planes is None else planes.present
-            for basis, planes in zip(bases, clean, strict=True)
+            denoised(basis.present_look, basis.features) if clean is None else clean.present
+            for basis, clean in zip(bases, cleans, strict=True)
         ]
         with self._lock:
             if not self._is_open:
@@ -262,8 +261,8 @@ class Studio:
             else:
                 self._session.improve(bases, presents)
             session = self._session
-            for view, planes in zip(session.views, clean, strict=True):
-                offer_view(self.pictures, view, session.transform, planes)
+            for view, clean in zip(session.views, cleans, strict=True):
+                offer_view(self.pictures, view, session.transform, clean)
             offer_transforms(self.pictures, self._transforms(session))
         self.tell(self.state())
         self._settling.ring()
@@ -295,25 +294,23 @@ class Studio:
         }
 
     def _clean(self) -> None:
-        """Planes without their grain, one after the other."""
-        session = self.session
-        bases = [view.basis for view in session.views]
-        for view, basis in zip(session.views, bases, strict=True):
-            is_there = of_view("clean/0", view.view) in self.pictures.generations
-            if basis.knows_noise and not is_there and not self._clean_view(view, basis):
-                return
+        """Planes without their grain, one after the other, of one view after the other."""
+        for view in self.session.views:
+            name = of_view("clean/0", view.view)
+            if view.basis.knows_noise and name not in self.pictures.generations:
+                self._clean_view(view)
 
-    def _clean_view(self, view: Canvas, basis: Basis) -> bool:
-        """Those of one view, which are kept. Returns whether they are wanted to the end."""
+    def _clean_view(self, view: Canvas) -> None:
+        basis = view.basis
         halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        planes = CleanPlanes(halves, scales, view.present)
         for k in range(len(basis.lights)):
             if not self._is_open or view.basis is not basis:
-                return False
-            halves[k], scales[k] = clean_plane(basis, k)
-            self.put(of_view(f"clean/{k}", view.view), halves[k])
+                return
+            planes.halves[k], planes.scales[k] = clean_plane(basis, k)
+            self.put(of_view(f"clean/{k}", view.view), planes.halves[k])
         if self.subjects[0].settings.use_cache:
-            keep_planes(basis, CleanPlanes(halves, scales, view.present))
-        return True
+            keep_planes(basis, planes)
 
     def _find(self) -> None:
         """The exact answer, then what is known of it."""

@@ -66,6 +66,13 @@ class Subject:
         return self.scene.known if isinstance(self.scene, Opening) else None
 
     @property
+    def sensor(self) -> str:
+        """That it is seen through."""
+        if self.basis is not None:
+            return self.basis.origin.sensor
+        return self.known.sensor if self.known is not None else sensor_of(self.loaded)
+
+    @property
     def wanted(self) -> int | None:
         """Samples per pixel that its basis is to have; None where that is not asked here."""
         if self.scene is None:
@@ -73,6 +80,11 @@ class Subject:
         settings = self.settings
         asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
         return asked or (self.known or self.loaded).spp
+
+    def prepare(self) -> None:
+        """Load a scene of which nothing is known, so that what is wrong with it is said at once."""
+        if self.scene is not None and self.known is None:
+            _ = self.loaded
 
     def bases(self, progress: Progress = silent) -> Iterator[Basis]:
         """Its basis; where it is still to be rendered, first ones of few samples."""
@@ -86,8 +98,7 @@ class Subject:
         from lightpaint.pipeline import obtain
 
         scene, settings, wanted = self.loaded, self.settings, self.wanted or 1
-        sensor = scene.sensor_names[scene.sensor]
-        kept = cache.find(scene.identity, sensor, settings.seed, scene.size)
+        kept = cache.find(scene.identity, sensor_of(scene), settings.seed, scene.size)
         has = 0 if kept is None or not settings.use_cache else kept.origin.spp
         if settings.use_cache and settings.time_s is None:
             for spp in FIRST:
@@ -119,16 +130,10 @@ class Subject:
         return basis.asking(scene.asked)
 
 
-def painting_of(folder: Path, sensor: str) -> Path:
-    """Where the painting of a view is exported to. sensor: "" of the only one."""
-    return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
-
-
 def bases_of(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
     """Bases of several views; where they are still to be rendered, all of few samples first."""
     for subject in subjects:
-        if subject.scene is not None and subject.known is None:
-            _ = subject.loaded  # what is wrong with one is said before another is rendered
+        subject.prepare()
     each = [subject.bases(progress) for subject in subjects]
     found = [next(bases) for bases in each]
     yield list(found)
@@ -145,3 +150,13 @@ def transform_of(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTra
     looks = [basis.present_look for basis in bases]
     whole = looks[0] if len(looks) == 1 else np.concatenate([x.reshape(1, -1, 3) for x in looks], 1)
     return subjects[0].choice.over(ViewTransform("srgb", choose_exposure(whole)))
+
+
+def sensor_of(scene: Scene | Known) -> str:
+    """The name of the sensor that it is seen through."""
+    return scene.sensor if isinstance(scene, Known) else scene.sensor_names[scene.sensor]
+
+
+def painting_of(folder: Path, sensor: str) -> Path:
+    """Where the painting of a view goes among exports. sensor: "" of the only one."""
+    return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")

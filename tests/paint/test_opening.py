@@ -17,7 +17,8 @@ from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoise import Features
 from lightpaint.images.objects import Objects
-from lightpaint.paint.launch import identity_of, identity_of_scene, subject_of
+from lightpaint.paint.keeping import identity_of
+from lightpaint.paint.launch import subject_of
 from lightpaint.paint.opening import Opening
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
@@ -45,7 +46,7 @@ def opened(path: Path, **settings: Any) -> Subject:
 def kept(path: Path, make_basis: Any) -> lp.Basis:
     """A made-up basis, kept as a first session leaves it, and what was known then."""
     first = opened(path)
-    assert identity_of(first) is None
+    assert identity_of([first]) is None
     scene, opening = first.loaded, first.scene
     assert isinstance(opening, Opening)
     made = make_basis(len(scene.lights), scene.size)
@@ -75,7 +76,7 @@ def test_a_known_scene_is_painted_without_being_loaded(
     path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     basis = kept(path, make_basis)
-    identity = identity_of_scene(opened(path).loaded)
+    identity = identity_of([opened(path)], {0: opened(path).loaded})
 
     def loads(**_: Any) -> None:
         raise AssertionError("the scene is loaded")
@@ -83,7 +84,7 @@ def test_a_known_scene_is_painted_without_being_loaded(
     with monkeypatch.context() as patch:
         patch.setattr("lightpaint.sources.load_scene", loads)
         subject = opened(path)
-        assert identity_of(subject) == identity
+        assert identity_of([subject]) == identity
         assert subject.wanted == basis.origin.spp
         assert isinstance(subject.scene, Opening)
         assert subject.scene.remarks == ("a remark",)
