@@ -141,8 +141,9 @@ def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path
         # Elsewhere it is told no more than anybody.
         for headers in ({"host": "evil.example"}, {"origin": "http://evil.example"}):
             assert other.browser.get("/", headers=headers).status_code == 403
+        assert other.browser.head("/").status_code == 410
         other.enter()
-        assert other.browser.get("/").status_code == 200
+        assert other.browser.get("/").status_code == other.browser.head("/").status_code == 200
 
 
 @pytest.mark.parametrize(

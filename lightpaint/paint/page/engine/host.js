@@ -117,8 +117,8 @@ export class SocketHost extends Hearers {
    * page of the new address would find the session taken. */
   async askWhy() {
     try {
-      const url = new URL('data/', this.base);
-      const { status } = await fetch(url, { credentials: 'same-origin', cache: 'no-store' });
+      const how = /** @type {RequestInit} */ ({ credentials: 'same-origin', cache: 'no-store' });
+      const { status } = await fetch(this.base, { ...how, method: 'HEAD' });
       if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
       this.close();
       this.tell('connection', { kind: 'connection', state: 'stale' });
