@@ -351,8 +351,11 @@ class Studio:
             self._bell.notify_all()
 
     def _settle(self) -> None:
-        """The exact answer, whenever the brush rests; then what is known of it."""
-        give_way()
+        """The exact answer, whenever the brush rests; then what is known of it.
+
+        It gives way by giving up. Were it less urgent than others, who needs the interpreter, or a
+        lock, would wait for it as long as they keep it from the processor.
+        """
         while True:
             with self._bell:
                 self._bell.wait_for(lambda: self._unsettled or not self._is_open)
