@@ -15,14 +15,18 @@ with what that has kept, from the start of its process. The browser is open alre
 """
 
 import argparse
+import ctypes
+import gc
 import json
 import os
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -183,9 +187,17 @@ def serve(case: str, asked: str, space: str) -> None:
         studio = Studio([subject], MemoryStore)
         server = Server(studio, port=0)
         studio.start()
+        signal.signal(signal.SIGUSR1, lambda *_: trim())
         print(server.url, flush=True)
         with at_hand():
             server.run()
+
+
+def trim() -> None:
+    """Give back to the system what is not in use, where its C library can: what is left is held."""
+    gc.collect()
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 class Opened:
@@ -260,6 +272,8 @@ class Opened:
             number += 1
             if number % 10 == 0:
                 time.sleep(3)  # until the exact answer has been found, and its memory is free
+                self.server.send_signal(signal.SIGUSR1)
+                time.sleep(1)
                 session.send("HeapProfiler.collectGarbage")
                 heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
                 held = Path(f"/proc/{self.server.pid}/statm").read_text().split()[1]

@@ -47,8 +47,11 @@ class Settling:
             self._bell.notify_all()
 
     def settle(self) -> None:
-        """Until the end."""
-        give_way()
+        """Until the end.
+
+        It gives way by giving up. Were it less urgent than others, who needs the interpreter, or a
+        lock, would wait for it as long as they keep it from the processor.
+        """
         while True:
             with self._bell:
                 self._bell.wait_for(lambda: self._is_unsettled or not self._is_open)

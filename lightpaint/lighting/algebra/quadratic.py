@@ -227,7 +227,8 @@ def moved_along(a: Doubles, x: Doubles, low: Doubles, high: Doubles, wanted: Dou
     at_ends = x[:, None] + ends[..., None] * a[:, None]
     sums = np.einsum("km,kem->ke", a, np.clip(at_ends, low[:, None], high[:, None]))
     after = (sums < wanted[:, None]).sum(axis=1)
-    walls = np.pad(ends, ((0, 0), (1, 1)), constant_values=((0, 0), (-np.inf, np.inf)))
+    walls = np.empty((len(a), ends.shape[1] + 2))
+    walls[:, 0], walls[:, 1:-1], walls[:, -1] = -np.inf, ends, np.inf
     rows = np.arange(len(a))
     first, last = walls[rows, after], walls[rows, after + 1]
     # Some t between the two that the answer lies between.

@@ -141,7 +141,7 @@ export class Painter extends Hearers {
     if (!place || place.strokes.isTaken || this.hand.tool === 'pick') return;
     const scale = this.panes()[0]?.scale ?? 1;
     this.stroke = new Stroke(place.canvas, this.hand, point, scale);
-    this.work.isPainting = true;
+    this.work.isPainting = this.screen.isHeld = true;
     place.strokes.begin();
     this.touched(this.stroke.begin());
   }
@@ -184,7 +184,7 @@ export class Painter extends Hearers {
 
   ended() {
     this.stroke = null;
-    this.work.isPainting = false;
+    this.work.isPainting = this.screen.isHeld = false;
   }
 
   /** A straight stroke, whole. @param {Point} from @param {Point} to */

@@ -30,6 +30,8 @@ export class Screen {
     this.height = 0;
     this.frame = 0;
     this.isLive = false;
+    /** Whether a brush is down: what takes long waits until it is lifted. */
+    this.isHeld = false;
     /** Whether the solution is the present look. */
     this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -107,13 +109,19 @@ export class Screen {
   request(isLive = false) {
     if (isLive) {
       this.isLive = true;
-      clearTimeout(this.rest);
-      this.rest = setTimeout(() => {
-        this.isLive = false;
-        this.request();
-      }, REST);
+      this.wait();
     }
     this.frame ||= requestAnimationFrame(() => this.now());
+  }
+
+  /** Draw sharply after a while. */
+  wait() {
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => {
+      if (this.isHeld) return this.wait();
+      this.isLive = false;
+      this.request();
+    }, REST);
   }
 
   now() {
