@@ -26,10 +26,10 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
         features=None,
         objects=None,
     )
-    write_lights(job, about if view.scene is None else about.asking(view.scene.asked), sums)
+    finish_by_sums(job, about if view.scene is None else about.asking(view.scene.asked), sums)
 
 
-def write_lights(job: Job, about: Basis, sums: Sums) -> None:
+def finish_by_sums(job: Job, about: Basis, sums: Sums) -> None:
     """Solve, and write the lighting, and the scene that has it. about: as of `problem_of_sums`."""
     [view] = job.views
     problem = problem_of_sums(about, view.target.name, sums, constraints=job.asked, fit=job.fit)

@@ -12,7 +12,7 @@ from lightpaint.batch.engine import Engine
 from lightpaint.batch.errands import Done, Film, SumsOfRows, Wanted
 from lightpaint.batch.estimate import rendered_s
 from lightpaint.batch.held import Held
-from lightpaint.batch.lights import write_lights
+from lightpaint.batch.lights import finish_by_sums
 from lightpaint.batch.rows import about_lights
 from lightpaint.batch.spool import Spool
 from lightpaint.batch.task import Task
@@ -79,16 +79,21 @@ def _rendered(
         how |= {"learned": str(spool.learned), "paintings": paintings, "files": reads}
         errands.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **how))
     came: dict[str, list[Sums]] = {}
-    listen("basis", 0, len(errands), "rows")
+    added: list[Sums] = []
+    following = iter(errands)
+    errand = next(following, None)
+    listen("basis", 0, len(errands), "ranges of rows")
     for count, done in enumerate(engine.run(errands)):
         if done.failure:
             raise BasisError(done.failure)
         came[done.look] = done.value
-        listen("basis", count + 1, len(errands), "rows")
+        listen("basis", count + 1, len(errands), "ranges of rows")
+        # In the order of the rows, whatever order they come in.
+        while errand is not None and errand.name in came:
+            more = came.pop(errand.name)
+            added = [a + b for a, b in zip(added, more, strict=True)] if added else more
+            errand = next(following, None)
     spool.drop()
-    added = came[errands[0].name]
-    for errand in errands[1:]:
-        added = [a + b for a, b in zip(added, came[errand.name], strict=True)]
     return added
 
 
@@ -100,7 +105,7 @@ def _write(job: Job, sums: Sums) -> None:
     half = -(-(scene.spp if asked is None else asked) // 2)
     nothing = np.zeros((len(scene.lights), 1, 1, 3), np.float32)
     seed, seen = job.settings.seed, np.zeros((1, 1), bool)
-    write_lights(job, about_lights(scene, seed, (half, half), nothing, nothing, seen), sums)
+    finish_by_sums(job, about_lights(scene, seed, (half, half), nothing, nothing, seen), sums)
 
 
 def _file_of(job: Job) -> Painting:
