@@ -7,6 +7,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.batch.keys import Final
 from lightpaint.scene.render import Stream, pass_sum, passes_of
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 
 class Frame:
@@ -23,7 +24,8 @@ class Frame:
         for k in some:
             half, spp = self._passes[k]
             seed, stream = self._final.seed, Stream.VERIFICATION
-            its = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
+            with interruptible_between_pieces():
+                its = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
             sums[half] = sums[half] + its if half in sums else its
         return sums
 

@@ -22,6 +22,7 @@ class Processes:
     """Several at a time, in worker processes. One that dies takes nothing along but its own try."""
 
     is_apart = True
+    is_gone = False
 
     def __init__(self, workers: int) -> None:
         self.workers = workers

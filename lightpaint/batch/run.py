@@ -25,7 +25,7 @@ from lightpaint.batch.spread import rendered_by
 from lightpaint.batch.sums import solved_by_sums
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of, final_render, is_full
-from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
 from lightpaint.scene.quality import on_film, samples
@@ -86,6 +86,7 @@ class _Run:
         self._looks = {look.entry.name: look for look in plan.looks}
         self._held = plan.held
         self._tries: dict[tuple[str, str], int] = {}
+        self._engine: Engine = InProcess(self._held, self._listen)
         self._begun_s = time.monotonic()
         self._finished = 0
 
@@ -126,7 +127,7 @@ class _Run:
             return stack.enter_context(cluster)
         if how.workers > 1:
             return stack.enter_context(Processes(how.workers))
-        return InProcess(self._held, self._listen)
+        return self._engine
 
     def _has_basis(self, task: Task) -> bool:
         """Whether the basis of a task is saved or kept, so that nothing is to be rendered."""
@@ -253,6 +254,8 @@ class _Run:
         self._listen("steps", self._finished, self._total, "steps")
 
     def _fail(self, look: PlannedLook, step: Step, why: str, done: Done | None = None) -> None:
+        if self._engine.is_gone:
+            raise BatchError(why)
         name = look.entry.name
         if name in self.outcome.failed:
             return
