@@ -16,6 +16,7 @@ from lightpaint.batch.bases import InParts
 from lightpaint.batch.cluster import Cluster
 from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.errands import Done, Film
+from lightpaint.batch.estimate import look_s
 from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.how import How, Outcome
 from lightpaint.batch.journal import Journal, Line
@@ -202,7 +203,8 @@ class _Run:
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
             again = []
-            for done in _closing(self._done([step.task for step in waiting])):
+            tasks = [self._expecting(step.task) for step in waiting]
+            for done in _closing(self._done(tasks)):
                 step = by_look[done.look]
                 if done.is_full:
                     raise OutputError(f"{done.failure}: make room; the same command goes on")
@@ -214,6 +216,12 @@ class _Run:
                 if self._is_stopped():
                     return
             waiting = again
+
+    def _expecting(self, task: Task) -> Task:
+        """The task, which knows roughly how long it takes on one thread."""
+        settings = self._looks[task.look].entry.settings
+        times = 2 * (1 + settings.refine + 4 * bool(settings.suggest))
+        return replace(task, expected_s=times * look_s(self._looks[task.look], self._plan))
 
     def _done(self, tasks: Sequence[Task]) -> Iterator[Done]:
         """What comes of each; of few final renders each is done by all workers."""
