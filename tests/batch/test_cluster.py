@@ -285,14 +285,15 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     (workers.slow / "memory-third").touch()
 
     def free(text: str) -> None:
-        if " takes over " in text:
+        if text.startswith("part 2: ") and " takes over " in text:
             (workers.slow / "wait-part 2").unlink()
 
     hears = Hears(free)
-    do(here, "hung", workers, hears, task_limit_s=4.0)
+    do(here, "hung", workers, hears, task_limit_s=8.0)
     assert contents(here / "hung") == expected
-    assert hears.begun["part 2"] == 2
-    assert hears.begun["third: answer"] == 2
+    # On a machine that is very busy others may seem to hang, too.
+    assert hears.begun["part 2"] >= 2
+    assert hears.begun["third: answer"] >= 2
 
 
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
