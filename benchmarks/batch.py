@@ -184,6 +184,10 @@ def _kept(made: list[Basis], by: Callable[[], Basis]) -> None:
     made.append(by())
 
 
+def _tell(name: str, spent: Took) -> None:
+    print(f"    {name:<14} {spent} s, {spent.all_s:.1f} s of the processor in all", flush=True)
+
+
 def bases(folder: Path, spp: int) -> None:
     """The table of who renders it."""
     limit_threads(1)
@@ -192,17 +196,17 @@ def bases(folder: Path, spp: int) -> None:
     made: list[Basis] = []
     by = partial(basis, InProcess(held, silent), spp, folder / "alone")
     alone = took(partial(_kept, made, by))
+    (height, width), n = made[0].size, len(made[0].lights)
+    print(f"basis of the gallery, {n} lights, {width}x{height}, {spp} samples per pixel:")
     found = [("this process", alone)]
+    _tell(*found[-1])
     for workers in (1, 2):
         with cluster(workers, folder) as address, Cluster(address, silent) as engine:
             basis(engine, WARM, folder / f"warm-{workers}")
             by = partial(basis, engine, spp, folder / f"by-{workers}")
             found.append((f"{workers} workers", took(partial(_kept, made, by), address)))
             peak_mb = _peak_mb(address)
-    (height, width), n = made[0].size, len(made[0].lights)
-    print(f"basis of the gallery, {n} lights, {width}x{height}, {spp} samples per pixel:")
-    for name, spent in found:
-        print(f"    {name:<14} {spent} s, {spent.all_s:.1f} s of the processor in all")
+            _tell(*found[-1])
     one, two = found[1][1], found[2][1]
     over = one.busiest_s / alone.busiest_s - 1, one.clock_s / alone.clock_s - 1
     print(f"    two workers take {two.busiest_s / one.busiest_s:.2f} of one, by the processor, ")

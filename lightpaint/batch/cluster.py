@@ -74,6 +74,11 @@ class Cluster:
         self._returned = Counter[tuple[str, str]]()
 
     @property
+    def is_gone(self) -> bool:
+        """As of `Engine`: whether the scheduler is."""
+        return self._at.is_gone
+
+    @property
     def workers(self) -> int:
         """How many there are now."""
         return max(1, len(self._at.there))

@@ -29,6 +29,8 @@ class ClusterWorkers:
         self._client: Any = _connected(address)
         #: Addresses of those that can be given work.
         self.there: list[str] = []
+        #: Whether the scheduler is.
+        self.is_gone = False
         #: What they tell.
         self.events: deque[dict[str, str]] = deque()
         self._left_out: dict[str, str] = {}
@@ -80,6 +82,7 @@ class ClusterWorkers:
             said = first_line(error)
         else:
             said = self._client.status
+        self.is_gone = True
         raise BatchError(
             f"the scheduler at {self._address} is gone ({said}); the same command goes on once it "
             "is back"

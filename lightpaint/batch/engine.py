@@ -23,6 +23,10 @@ class Engine(Protocol):
         """Whether it works in other processes, which have no basis at hand."""
 
     @property
+    def is_gone(self) -> bool:
+        """Whether nobody is there any more to do anything, which is no look's failure."""
+
+    @property
     def workers(self) -> int:
         """How many errands it does at a time, as far as is known."""
 
@@ -37,6 +41,7 @@ class InProcess:
     """One after the other, here."""
 
     is_apart = False
+    is_gone = False
     workers = 1
 
     def __init__(self, held: Held, listen: Listener) -> None:

@@ -43,7 +43,7 @@ def estimate(plan: Plan) -> Estimate:
     costs = [plan.costs[key] for key in needed]
     return Estimate(
         sum(rendered_s(cost.samples, cost.lights) for cost in costs),
-        sum(_look_s(look, plan) for look in left),
+        sum(look_s(look, plan) for look in left),
         max((cost.memory for cost in costs), default=0),
     )
 
@@ -53,8 +53,8 @@ def rendered_s(samples: int, lights: int) -> float:
     return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)
 
 
-def _look_s(look: PlannedLook, plan: Plan) -> float:
-    """Of the steps that are left."""
+def look_s(look: PlannedLook, plan: Plan) -> float:
+    """Of the steps of a look that are left, on two cores."""
     costs = [plan.costs.get(key, SAVED) for key in look.steps[0].task.bases]
     pixels = sum(cost.size[0] * cost.size[1] for cost in costs)
     want, spent_s = look.entry.want, 0.0

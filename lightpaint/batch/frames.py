@@ -3,12 +3,11 @@
 import gc
 from typing import Any
 
-import numpy as np
-
 from lightpaint.arrays import Doubles
 from lightpaint.batch.keys import Final
 from lightpaint.scene.render import Stream, pass_sum, passes_of
 from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 
 class Frame:
@@ -19,13 +18,15 @@ class Frame:
         self._passes = passes_of(scene, final.spp)
         self._loaded: Any = scene.load()
 
-    def sum(self, some: range) -> Doubles:
-        """The undivided sums of both halves of those passes, (2, h, w, 3)."""
-        sums = np.zeros((2, *self._scene.size, 3), np.float64)
+    def sum(self, some: range) -> dict[int, Doubles]:
+        """The undivided sum, (h, w, 3), of those passes that belong to a half, by the half."""
+        sums: dict[int, Doubles] = {}
         for k in some:
             half, spp = self._passes[k]
             seed, stream = self._final.seed, Stream.VERIFICATION
-            sums[half] += pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
+            with interruptible_between_pieces():
+                its = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
+            sums[half] = sums[half] + its if half in sums else its
         return sums
 
     def close(self) -> None:

@@ -17,6 +17,8 @@ from lightpaint.batch.task import Task
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.records import strict_json
 from lightpaint.result_folder import RECORD, ResultFolder
+from lightpaint.screen import some_names
+from lightpaint.staging import is_below
 
 #: Bytes that are sent at a time.
 PIECE = 2**26
@@ -66,7 +68,8 @@ def packed(errand: Errand, contents: Contents, *, run: str, is_shared: bool) -> 
         return tuple((file, contents.of(file)) for file in whole)
 
     files, carried = summed(errand.needs), summed(errand.carried)
-    return Parcel(errand, files, carried, os.getcwd(), is_shared, run)
+    # What it has read by now stays here.
+    return Parcel(errand.moved(str), files, carried, os.getcwd(), is_shared, run)
 
 
 class Store:
@@ -208,6 +211,8 @@ def unpack(errand: Errand, files: dict[str, bytes]) -> None:
     Raises OutputError for what must not be replaced, as if it were written from here.
     """
     folder = Path(errand.writes)
+    if odd := [name for name in files if not is_below(name)]:
+        raise OutputError(f"a worker would write {some_names(odd)} beside {folder}")
     record = strict_json(files[RECORD].decode()) if RECORD in files else {"answers": []}
     adds_to = folder / "lighting.json" if errand.kind == "render" else None
     results = ResultFolder(

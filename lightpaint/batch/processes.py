@@ -22,6 +22,7 @@ class Processes:
     """Several at a time, in worker processes. One that dies takes nothing along but its own try."""
 
     is_apart = True
+    is_gone = False
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
@@ -62,7 +63,8 @@ class Processes:
         while waiting or running:
             try:
                 while waiting and len(running) < self.workers:
-                    running[pool.submit(_work, waiting[0])] = waiting[0]
+                    # What it has read by now stays here.
+                    running[pool.submit(_work, waiting[0].moved(str))] = waiting[0]
                     del waiting[0]
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:

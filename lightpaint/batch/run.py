@@ -16,6 +16,7 @@ from lightpaint.batch.bases import InParts
 from lightpaint.batch.cluster import Cluster
 from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.errands import Done, Film
+from lightpaint.batch.estimate import look_s
 from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.how import How, Outcome
 from lightpaint.batch.journal import Journal, Line
@@ -26,7 +27,7 @@ from lightpaint.batch.spread import rendered_by
 from lightpaint.batch.sums import solved_by_sums
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of, final_render, is_full
-from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
 from lightpaint.scene.quality import on_film, samples
@@ -87,6 +88,7 @@ class _Run:
         self._looks = {look.entry.name: look for look in plan.looks}
         self._held = plan.held
         self._tries: dict[tuple[str, str], int] = {}
+        self._engine: Engine = InProcess(self._held, self._listen)
         self._begun_s = time.monotonic()
         self._finished = 0
 
@@ -128,7 +130,7 @@ class _Run:
             return stack.enter_context(cluster)
         if how.workers > 1:
             return stack.enter_context(Processes(how.workers))
-        return InProcess(self._held, self._listen)
+        return self._engine
 
     def _has_basis(self, task: Task) -> bool:
         """Whether the basis of a task is saved or kept, so that nothing is to be rendered."""
@@ -205,7 +207,8 @@ class _Run:
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
             again = []
-            for done in _closing(self._done([step.task for step in waiting])):
+            tasks = [self._expecting(step.task) for step in waiting]
+            for done in _closing(self._done(tasks)):
                 step = by_look[done.look]
                 if done.is_full:
                     raise OutputError(f"{done.failure}: make room; the same command goes on")
@@ -217,6 +220,12 @@ class _Run:
                 if self._is_stopped():
                     return
             waiting = again
+
+    def _expecting(self, task: Task) -> Task:
+        """The task, which knows roughly how long it takes on one thread."""
+        settings = self._looks[task.look].entry.settings
+        times = 2 * (1 + settings.refine + 4 * bool(settings.suggest))
+        return replace(task, expected_s=times * look_s(self._looks[task.look], self._plan))
 
     def _done(self, tasks: Sequence[Task]) -> Iterator[Done]:
         """What comes of each; of few final renders each is done by all workers."""
@@ -260,6 +269,8 @@ class _Run:
         self._listen("steps", self._finished, self._total, "steps")
 
     def _fail(self, look: PlannedLook, step: Step, why: str, done: Done | None = None) -> None:
+        if self._engine.is_gone:
+            raise BatchError(why)
         name = look.entry.name
         if name in self.outcome.failed:
             return

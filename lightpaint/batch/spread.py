@@ -45,7 +45,8 @@ def rendered_by(
                 raise SceneError(done.failure)
             came[done.look] = done.value
             while following < len(errands) and errands[following].name in came:
-                sums += came.pop(errands[following].name)
+                for half, its in came.pop(errands[following].name).items():
+                    sums[half] += its
                 following += 1
             listen("relit", count + 1, len(errands), "ranges of passes")
         return estimate_of(sums, passes)

@@ -79,16 +79,21 @@ def _rendered(
         how |= {"learned": str(spool.learned), "paintings": paintings, "files": reads}
         errands.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **how))
     came: dict[str, list[Sums]] = {}
-    listen("basis", 0, len(errands), "rows")
+    added: list[Sums] = []
+    following = iter(errands)
+    errand = next(following, None)
+    listen("basis", 0, len(errands), "ranges of rows")
     for count, done in enumerate(engine.run(errands)):
         if done.failure:
             raise BasisError(done.failure)
         came[done.look] = done.value
-        listen("basis", count + 1, len(errands), "rows")
+        listen("basis", count + 1, len(errands), "ranges of rows")
+        # In the order of the rows, whatever order they come in.
+        while errand is not None and errand.name in came:
+            more = came.pop(errand.name)
+            added = [a + b for a, b in zip(added, more, strict=True)] if added else more
+            errand = next(following, None)
     spool.drop()
-    added = came[errands[0].name]
-    for errand in errands[1:]:
-        added = [a + b for a, b in zip(added, came[errand.name], strict=True)]
     return added
 
 

@@ -18,6 +18,7 @@ from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_
 from command import run, succeed
 
 from lightpaint.batch import engine as engines
+from lightpaint.batch import run as run_module
 from lightpaint.batch import work
 from lightpaint.batch.errands import Done
 from lightpaint.batch.gallery import FILES, contact_sheet, gallery_page
@@ -249,6 +250,28 @@ def test_an_interrupt_says_how_to_go_on(
         patch.setattr(engines, "do", interrupted)
         with pytest.raises(Interrupted, match="10 looks are left; the same command goes on"):
             do(here)
+    do(here)
+    assert contents(here / "out") == undisturbed[1]
+
+
+def test_workers_that_are_all_gone_are_no_look_s_failure(
+    here: Path, undisturbed: tuple[Path, dict[str, bytes]]
+) -> None:
+    class Gone(engines.InProcess):
+        def run(self, errands: Any) -> Any:
+            yield engines.do(errands[0], self._held, self._listen)
+            self.is_gone = True
+            yield Done(errands[1].name, errands[1].kind, "the scheduler is gone")
+
+    def begun(run: Any, _: Any) -> Any:
+        return Gone(run._held, run._listen)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module._Run, "_begun", begun)
+        with pytest.raises(BatchError, match="the scheduler is gone"):
+            do(here)
+    [line] = (here / "out" / "journal.jsonl").read_text().splitlines()
+    assert json.loads(line)["state"] == "done"
     do(here)
     assert contents(here / "out") == undisturbed[1]
 

@@ -31,6 +31,7 @@ from lightpaint.basis.render.sums import halves_of, mean_and_half_difference
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.threads import kernels
+from lightpaint.signals import interruptible_between_pieces
 
 #: Camera samples of a part: some seconds of one processor, which is what an accident costs.
 SAMPLES = SAMPLES_PER_PASS // 2
@@ -129,10 +130,11 @@ def lesson(scene: Scene, spp: int, seed: int) -> Floats | None:
     tracer = Tracer(scene, view_seed(seed, scene.sensor), None)
     try:
         # The order of additions, which only one thread keeps to, decides what is learned.
-        with kernels(threads=1):
+        with interruptible_between_pieces() as let_interrupts_through, kernels(threads=1):
             its, step = max(1, LESSON // (height * width)), max(1, height * width // LESSON)
             for k in range(min(max(spp * height * width // PER_LESSON, 1), LESSONS)):
                 # Of a large picture some rows tell enough, each time others.
+                let_interrupts_through()
                 tracer.learn(range(k * step // LESSONS, height, step), k * its, its)
         learned: Floats = tracer.guide.learned()
         return learned
@@ -165,7 +167,7 @@ class PartRenderer:
 
             self._tracer = Tracer(self._scene, self._seed, self._learned)
             self._tracer.guide.freeze()
-        with kernels():
+        with interruptible_between_pieces(), kernels():
             sums: tuple[Floats, Floats] = self._tracer.part(
                 part.half, range(part.top, part.bottom), part.first, part.spp
             )
@@ -180,9 +182,9 @@ class PartRenderer:
                 {x.name: white if x.name == its else black for x in self._scene.lights}
             )
             self._light = light
-        image = light_pass(
-            self._loaded, self._scene, light, part.half, part.number, part.spp, self._seed
-        )
+        which = light, part.half, part.number, part.spp, self._seed
+        with interruptible_between_pieces():
+            image = light_pass(self._loaded, self._scene, *which)
         return image[None], np.zeros(self._scene.size, np.float32)
 
     def close(self) -> None:
