@@ -194,9 +194,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     def _set(self, proposal: Any) -> Any:
         """Do what somebody sets, or raise where they set it."""
         name, value = proposal.trait.name, proposal.value
-        if self._is_telling:
-            return value
-        with self._lock:
+        with self._lock:  # another thread may be telling something now
+            if self._is_telling:
+                return value
             for message in self._studio.load(*ACTS[name](self._studio.session, value)):
                 self._places.tell(message)
             new = self._now()

@@ -125,7 +125,7 @@ def fox(tmp_path: Path) -> Iterator[Fox]:
 @contextmanager
 def served(basis: lp.Basis, folder: Path) -> Iterator[tuple[Studio, str]]:
     """A painter of `basis`, and its address."""
-    studio = Studio(Subject("room.basis.exr", folder, basis=basis), MemoryStore)
+    studio = Studio([Subject("room.basis.exr", folder, basis=basis)], MemoryStore)
     server = Server(studio, port=0)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
