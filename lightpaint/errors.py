@@ -97,3 +97,7 @@ class UnknownLightError(LightingError, KeyError):
 
 class OutputError(LightpaintError):
     """A file or folder that cannot be written."""
+
+
+#: Mistakes in a painting, or in what lies where its answer goes, are of that look alone.
+ALONE = (ImageError, TargetError, OutputError)

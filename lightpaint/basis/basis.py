@@ -208,25 +208,25 @@ class Basis(Shown):
     @cached_property
     def power(self) -> Doubles:
         """‖Φᵢ‖² over the picture, (n, 3) float64; where an emitter is seen, nothing counts."""
-        counted = np.flatnonzero(~self.emitters_seen.ravel())
-        rows = self.images.reshape(len(self.lights), -1, 3)
-        power = np.zeros((len(self.lights), 3))
-        for start in range(0, counted.size, BLOCK):
-            block = rows[:, counted[start : start + BLOCK]].astype(np.float64)
-            power += np.einsum("npc,npc->nc", block, block)
-        return _kept(power)
+        counted = (~self.emitters_seen.ravel()).astype(np.float64)
+        return _kept(self._sums(counted, is_squared=True))
 
     @cached_property
     def totals(self) -> Doubles:
         """Σ_pixels Φᵢ, (n, 3) float64, over all of the picture."""
-        rows = self.images.reshape(len(self.lights), -1, 3)
-        # A sum over axes this short is slow in NumPy, a product with ones is not; in float64 and
-        # by blocks it is as exact as the sum, and needs no copy of the basis.
-        ones, totals = np.ones(BLOCK), np.zeros((len(self.lights), 3))
+        return _kept(self._sums(np.ones(self.images[0, ..., 0].size)))
+
+    def _sums(self, counted: Doubles, *, is_squared: bool = False) -> Doubles:
+        """Σ_pixels counted · Φᵢ, or its square, (n, 3). counted: (pixels,)."""
+        rows, sums = self.images.reshape(len(self.lights), -1, 3), np.zeros((len(self.lights), 3))
+        # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
+        # is as exact as the sum, and needs no copy of the basis.
         for start in range(0, rows.shape[1], BLOCK):
             block = rows[:, start : start + BLOCK].astype(np.float64)
-            totals += ones[: block.shape[1]] @ block
-        return _kept(totals)
+            if is_squared:
+                block *= block
+            sums += counted[start : start + BLOCK] @ block
+        return sums
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""

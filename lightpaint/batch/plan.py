@@ -21,7 +21,7 @@ from lightpaint.batch.manifest import Manifest, read_manifest
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
 from lightpaint.batch.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.variations import varied
-from lightpaint.errors import BatchError, ImageError, LightpaintError, OutputError, TargetError
+from lightpaint.errors import ALONE, BatchError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -34,9 +34,6 @@ from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
-
-#: Mistakes in a painting, or in what lies where its answer goes, are of that look alone.
-ALONE = (ImageError, TargetError, OutputError)
 
 
 def plan(

@@ -6,13 +6,26 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 
 from lightpaint.cli import lines
 from lightpaint.cli.manner import Manner, Outcome, speaking
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
 from lightpaint.errors import BatchError, LightpaintError
+
+#: Where commands are that are not among the plain ones.
+_HOMES = {
+    "batch": "batch",
+    "cache": "upkeep",
+    "doctor": "upkeep",
+    "export": "export",
+    "lights": "listing",
+    "paint": "painter",
+    "solve": "solving",
+}
 
 
 def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
@@ -34,14 +47,12 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
         # the middle of it would leave libraries half there, which some do not survive.
         from lightpaint.signals import interruptible_between_pieces
 
-        with interruptible_between_pieces():
+        with _without_garbage(), interruptible_between_pieces():
             from lightpaint.cli import terminal
             from lightpaint.cli.options import values_of
             from lightpaint.scene.variant import SlowBackendWarning
 
             command = _command(options.command)
-        # What was imported stays, and need not be looked through for garbage again.
-        gc.freeze()
 
         # The commands say it in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
@@ -61,15 +72,21 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
     return 130
 
 
+@contextmanager
+def _without_garbage() -> Iterator[None]:
+    """What is made here stays, and is not looked through for garbage, now or later."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def _command(name: str) -> Callable[..., Outcome]:
-    """The function of a command."""
-    if name == "paint":  # which is to be there at once, and needs few of the rooms
-        from lightpaint.cli.painter import paint
-
-        return paint
-    from lightpaint.cli import commands
-
-    return getattr(commands, name)  # type: ignore[no-any-return]
+    """The function of a command, of whose rooms the others have no need."""
+    module = import_module(f"lightpaint.cli.{_HOMES.get(name, 'commands')}")
+    return getattr(module, name)  # type: ignore[no-any-return]
 
 
 def _failed(command: str, error: Exception) -> int:

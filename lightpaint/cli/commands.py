@@ -1,4 +1,4 @@
-"""What each sub-command does: calls of the corridor, and tables of what came out."""
+"""What the plain sub-commands do: calls of the corridor, and what came out told."""
 
 import shlex
 from collections.abc import Sequence
@@ -8,16 +8,10 @@ from typing import Any
 
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import documents, tables, terminal
-from lightpaint.cli.batch import batch as batch
-from lightpaint.cli.export import export as export
-from lightpaint.cli.listing import lights as lights
 from lightpaint.cli.listing import note_scene
 from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
-from lightpaint.cli.painter import paint as paint
-from lightpaint.cli.solving import solve as solve
-from lightpaint.cli.upkeep import cache as cache
-from lightpaint.cli.upkeep import doctor as doctor
+from lightpaint.cli.solving import solve
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import OutputError

@@ -17,7 +17,7 @@ from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
 from lightpaint.colour.transform import TransformChoice
-from lightpaint.errors import BasisError, BatchError, OutputError, TargetError
+from lightpaint.errors import ALONE, BasisError, BatchError, OutputError, TargetError
 from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.file import read_constraints
@@ -129,7 +129,6 @@ def jobs_of(
     receives why one cannot be done, by the name of its folder.
     """
     # Jobs know all rooms, of which other commands need less.
-    from lightpaint.batch.plan import ALONE
     from lightpaint.job import Job
 
     basis = basis_of(options)
@@ -184,23 +183,27 @@ def jobs_of(
 
 def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
     """What `solve` is asked for, with a gallery where it is of several looks."""
+    how: dict[str, Any] = {
+        "table": options.table,
+        "wanted": Wanted(options.max_miss, options.min_fit),
+    }
+    if len(options.targets) <= 1 and not options.variations:
+        return {"jobs": jobs_of(options, settings), **how}
+
+    # Galleries, which one look has no need of.
     from lightpaint.batch.variations import words_of
     from lightpaint.cli.several import several_of
 
     failed: dict[str, str] = {}
-    words = words_of(options.variations)
     jobs, several = several_of(
         jobs_of(options, settings, failed),
-        words,
+        words_of(options.variations),
         failed,
-        is_shown=len(options.targets) > 1 or bool(words),
         output=Path(options.output) if options.output else None,
         keep_going=options.keep_going,
         force=options.force,
     )
-    wanted = Wanted(options.max_miss, options.min_fit)
-    how = {"table": options.table, "wanted": wanted, "failed": failed, "several": several}
-    return {"jobs": jobs, **how}
+    return {"jobs": jobs, "several": several, **how}
 
 
 def _scene_to_export(options: Namespace) -> SceneFile | None:

@@ -4,27 +4,65 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lightpaint.batch.gallery import check_gallery
-from lightpaint.batch.made import shifted_folders, sibling_folder, siblings
-from lightpaint.batch.plan import ALONE
-from lightpaint.errors import OutputError
+from lightpaint.basis.basis import Basis
+from lightpaint.batch.entries import Entry
+from lightpaint.batch.gallery import FILES, check_gallery, spoken_counts
+from lightpaint.batch.made import leave_shifted, shifted_folders, sibling_folder, siblings
+from lightpaint.batch.solved import entry_of, write_gallery_of
+from lightpaint.batch.work import is_full
+from lightpaint.cli import terminal
+from lightpaint.errors import ALONE, OutputError
 from lightpaint.job import Job
+from lightpaint.lighting.lighting import Lighting
 from lightpaint.result_folder import ResultFolder
 
 
-@dataclass(frozen=True)
+@dataclass
 class Several:
     """What several looks of one command are to each other.
 
-    together: folder of a gallery of all. keep_going: whether one that is bad fails alone. called:
-    by folder, what is a variation of another. made: by the folder of an answer, the variations that
-    are made of it, and where they go.
+    together: folder of a gallery of all; None where somebody else's page lies there. keep_going:
+    whether one that is bad fails alone. called: by folder, what is a variation of another. made: by
+    the folder of an answer, the variations that are made of it, and where they go. failed: names of
+    those that cannot be done, and why. entries: what the gallery shows.
     """
 
-    together: Path | None = None
-    keep_going: bool = False
-    called: Mapping[Path, str] = field(default_factory=dict)
-    made: Mapping[Path, Mapping[str, ResultFolder]] = field(default_factory=dict)
+    together: Path | None
+    keep_going: bool
+    called: Mapping[Path, str]
+    made: Mapping[Path, Mapping[str, ResultFolder]]
+    failed: dict[str, str]
+    entries: list[Entry] = field(default_factory=list)
+
+    def is_done(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
+        """Make the variations of an answer that are made of it."""
+        self._enter(job)
+        for word, place in self.made.get(job.folder, {}).items():
+            leave_shifted(job, word, place, lighting, bases)
+            self.entries.append(entry_of(job, place.folder, word))
+
+    def goes_on(self, job: Job, error: Exception) -> bool:
+        """Whether the others are solved all the same."""
+        if not self.keep_going or is_full(error):
+            return False
+        self._enter(job)
+        self.failed[job.folder.name] = str(error)
+        return True
+
+    def show(self, bases: Sequence[Basis]) -> None:
+        """Say what failed, and write the gallery."""
+        for name, why in self.failed.items():
+            terminal.complain("solve", f"{name}: {why}")
+        if self.together is None:
+            return
+        named = {entry.name for entry in self.entries}
+        lost = [Entry(name, "") for name in self.failed if name not in named]
+        rows = write_gallery_of(self.together, [*self.entries, *lost], self.failed, bases)
+        terminal.write(f"{self.together / FILES[0]}: {spoken_counts(rows)}")
+
+    def _enter(self, job: Job) -> None:
+        if all(entry.name != job.folder.name for entry in self.entries):
+            self.entries.append(entry_of(job, variation=self.called.get(job.folder, "")))
 
 
 def several_of(
@@ -32,7 +70,6 @@ def several_of(
     words: Sequence[str],
     failed: dict[str, str],
     *,
-    is_shown: bool,
     output: Path | None,
     keep_going: bool,
     force: bool,
@@ -40,7 +77,7 @@ def several_of(
     """All jobs, those of variations behind the looks that they vary, and what goes with them.
 
     words: variations. failed: receives why, by the name of its folder, where one of them cannot be
-    done and the others go on. is_shown: whether there is a gallery. output: as it was given.
+    done and the others go on. output: as it was given.
     """
     _check_apart([job.folder for job in jobs], words)
     found: list[Job] = []
@@ -57,10 +94,8 @@ def several_of(
         found += [job, *anew.values()]
         called |= {sibling.folder: word for word, sibling in anew.items()}
         made[job.folder] = places
-    together = None
-    if is_shown:
-        together = _together(output, [job.folder for job in jobs], force=force)
-    return found, Several(together, keep_going, called, made)
+    together = _together(output, [job.folder for job in jobs], force=force)
+    return found, Several(together, keep_going, called, made, failed)
 
 
 def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:

@@ -167,7 +167,7 @@ sys.exit(main())
     ("module", "number"),
     [
         ("lightpaint.cli.parser", signal.SIGINT),
-        ("lightpaint.cli.commands", signal.SIGTERM),
+        ("lightpaint.cli.listing", signal.SIGTERM),
         ("numpy", signal.SIGINT),
         ("mitsuba", signal.SIGINT),
     ],
