@@ -41,17 +41,20 @@ class Curve:
             return light
         return np.asarray(light @ np.linalg.inv(self.matrix).T.astype(light.dtype))
 
+    def encode_planes(self, planes: Floats) -> Floats:
+        return self.forward(np.clip(self._mixed_planes(planes), 0, self.white))
+
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        light = planes if self.matrix is None else self.matrix.astype(planes.dtype) @ planes
+        light = self._mixed_planes(planes)
         its = np.minimum(np.maximum(light, 0), self.white)
         shown, rise = self.rising(its)
         rise *= its == light
-        if self.matrix is not None:
-            return shown, rise[:, None] * self.matrix.astype(rise.dtype)[..., None]
-        slopes = np.zeros((3, *rise.shape), rise.dtype)
-        for k in range(3):
-            slopes[k, k] = rise[k]
-        return shown, slopes
+        if self.matrix is None:
+            return shown, rise
+        return shown, rise[:, None] * self.matrix.astype(rise.dtype)[..., None]
+
+    def _mixed_planes(self, planes: Floats) -> Floats:
+        return planes if self.matrix is None else self.matrix.astype(planes.dtype) @ planes
 
     def _mixed(self, image: Floats) -> Floats:
         return image if self.matrix is None else image @ self.matrix.T.astype(image.dtype)

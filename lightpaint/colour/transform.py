@@ -38,9 +38,13 @@ class Encoding(Protocol):
     def decode(self, image_display: Floats) -> Floats:
         """Linear light of display values in [0, 1]."""
 
+    def encode_planes(self, planes: Floats) -> Floats:
+        """`encode` of linear light (3, p), a row for each channel."""
+
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Of linear light (3, p), a row for each channel: display values (3, p), and derivatives
-        (3, 3, p) of display value i by linear channel j, 0 where clipped.
+        """Of linear light (3, p): display values (3, p), and derivatives (3, 3, p) of display value
+        i by linear channel j, 0 where clipped; (3, p), by its own, where no channel has a say in
+        another.
         """
 
 
@@ -119,12 +123,19 @@ class ViewTransform:
         `agx` and `ocio:` mix channels.
         """
         _, slopes = self.with_slopes(np.reshape(image, (-1, 3)).T)
+        if slopes.ndim == 2:
+            slopes = slopes * np.eye(3)[..., None]
         return np.asarray(slopes.transpose(2, 0, 1).reshape(*image.shape, 3))
+
+    def encode_planes(self, planes: Floats) -> Floats:
+        """What `encode` says of pixels whose channels lie apart, (3, p) linear."""
+        return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
         """What `encode` and `jacobian` say of pixels whose channels lie apart, at once.
 
-        planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p).
+        planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p) or, where
+        no channel has a say in another, the diagonal of these, (3, p).
         """
         scale = 2.0**self.stops
         shown, slopes = _encoding(self.name).with_slopes(planes * scale)

@@ -77,6 +77,9 @@ class OcioEncoding:
     def decode(self, image_display: Floats) -> Floats:
         return _applied(self._to_light, image_display)
 
+    def encode_planes(self, planes: Floats) -> Floats:
+        return self.encode(planes.T).T
+
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
         step = np.maximum(np.abs(planes).max(axis=0), 1e-4) * STEP
         columns = []
@@ -86,7 +89,7 @@ class OcioEncoding:
             up = self.encode((planes + step * aside).T)
             down = self.encode((planes - step * aside).T)
             columns.append((up - down).T / (2 * step))
-        return self.encode(planes.T).T, np.stack(columns, axis=1)
+        return self.encode_planes(planes), np.stack(columns, axis=1)
 
     def _check_way_back(self) -> None:
         greys = np.repeat(np.linspace(0.05, 0.95, 19, dtype=np.float32), 3).reshape(1, 19, 3)

@@ -113,13 +113,13 @@ class SmallFilm:
         if self._transform is not None:
             seen = self._seen_painted.reshape(3, *self._size)[:, rows, columns]
             planes = np.ascontiguousarray(painted).reshape(3, -1)
-            seen[...] = self._transform.with_slopes(planes)[0].reshape(seen.shape)
+            seen[...] = self._transform.encode_planes(planes).reshape(seen.shape)
 
     def see_through(self, transform: ViewTransform | None) -> None:
         """From now on a display is meant that shows light so."""
         if transform is not None and transform != self._transform:
             self._seen_painted, self._seen_current = (
-                np.array(transform.with_slopes(x)[0], np.float64)
+                np.array(transform.encode_planes(x), np.float64)
                 for x in (self._painted, self._current)
             )
         self._transform = transform

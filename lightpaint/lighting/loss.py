@@ -116,7 +116,7 @@ class PaintingLoss:
         out = np.empty_like(planes)
         for start in range(0, planes.shape[1], STRIP):
             where = slice(start, start + STRIP)
-            out[:, where] = self.transform.with_slopes(planes[:, where])[0]
+            out[:, where] = self.transform.encode_planes(planes[:, where])
         return image_of(out, image.shape[:-1])
 
     def objective(self, x: Floats) -> Doubles:

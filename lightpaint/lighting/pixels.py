@@ -74,10 +74,12 @@ class Pixels:
 
     def shown(self, x: Doubles) -> Doubles:
         """V(x), of (3, p)."""
-        return x if self.transform is None else self._with_slopes(x)[0]
+        if self.transform is None:
+            return x
+        return np.asarray(self.transform.encode_planes(x), np.float64)
 
     def _with_slopes(self, x: Doubles) -> tuple[Doubles, Doubles]:
-        """V(x), and its derivatives, (3, 3, p)."""
+        """V(x), and its derivatives as `ViewTransform.with_slopes` has them."""
         assert self.transform is not None
         shown, slopes = self.transform.with_slopes(x)
         return np.asarray(shown, np.float64), np.asarray(slopes, np.float64)
@@ -150,7 +152,7 @@ class Pixels:
             moved_shown, moved_slope = self._with_slopes(moved)
             missed[:, its] = moved_shown - shown[:, its]
             slope = own.copy()
-            slope[:, :, its] -= moved_slope * exceeds[:, its]
+            slope[..., its] -= moved_slope * exceeds[:, its]
             way[exceeds] = 0
         if from_clipping:
             slope = _with_chords(own, slope, missed, way)
@@ -182,7 +184,8 @@ class Pixels:
         if self.transform is None:
             return np.ones_like(x)
         own, current = (self._with_slopes(y)[1] for y in (x, self.current))
-        return np.asarray(np.einsum("kcp,kcp->cp", own, current))
+        both = own * current
+        return both if both.ndim == 2 else np.asarray(both.sum(axis=0))
 
     def same_squares(self, a: Doubles, b: Doubles) -> bool:
         """Whether the squares made for two pictures are the same, and so exact between them."""
@@ -245,18 +248,24 @@ def image_of(planes: Doubles, size: tuple[int, ...]) -> Doubles:
 
 def _of_squares(slope: Doubles, missed: Doubles) -> tuple[Doubles, Doubles]:
     """Half the gradient of what is missed, squared, downwards, and what squares of single channels
-    count that are nowhere below; (3, p) each, by the derivatives (3, 3, p).
+    count that are nowhere below; (3, p) each, by the derivatives.
     """
+    if slope.ndim == 2:
+        return slope * missed, np.square(slope)
     mixed = np.einsum("kcp,kdp->cdp", slope, slope)
     return np.einsum("kcp,kp->cp", slope, missed), np.abs(mixed, out=mixed).sum(axis=1)
 
 
 def _with_chords(own: Doubles, slope: Doubles, missed: Doubles, way: Doubles) -> Doubles:
     """`slope` with chords of display values that are flat by `own` and miss something."""
-    flat = ~own.any(axis=1) & (missed * way > 0)
+    is_flat = own == 0 if own.ndim == 2 else ~own.any(axis=1)
+    flat = is_flat & (missed * way > 0)
     if not flat.any():
         return slope
     slope = slope.copy()
+    if slope.ndim == 2:
+        slope[flat] += missed[flat] / way[flat]
+        return slope
     k, its = np.nonzero(flat)
     slope[k, k, its] += missed[k, its] / way[k, its]
     return slope
