@@ -27,6 +27,7 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.paint.launch import at_hand
 from lightpaint.paint.server import Server
-from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings
@@ -184,7 +185,7 @@ def serve(case: str, asked: str, space: str) -> None:
             settings=Settings(space=space or None),  # type: ignore[arg-type]
             constraints=lp.Constraints.of(json.loads(asked)),
         )
-        studio = Studio([subject], MemoryStore)
+        studio = Studio([subject], partial(Store.open, Path(folder) / "made_up.lightpaint"))
         server = Server(studio, port=0)
         studio.start()
         signal.signal(signal.SIGUSR1, lambda *_: trim())
