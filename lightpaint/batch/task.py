@@ -85,6 +85,7 @@ class Task:
         return replace(
             self,
             job=json.dumps(_moved(json.loads(self.job), move)),
+            bases=tuple(json.dumps(_moved(json.loads(key), move)) for key in self.bases),
             lightings=tuple(map(move, self.lightings)),
             reads=tuple(map(move, self.reads)),
             files=tuple(file and move(file) for file in self.files),

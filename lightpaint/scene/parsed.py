@@ -27,6 +27,7 @@ from lightpaint.scene.integrator import (
     read_integrator,
     replace_integrator,
 )
+from lightpaint.scene.normals import settle_normals
 
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000
@@ -152,7 +153,9 @@ class ParsedScene:
                     del props[key]
             props["film"] = film.load()
         with self._resolving(), mitsuba_errors(self.path, self.instead):
-            return mi.parser.instantiate(self.config, state)
+            scene = mi.parser.instantiate(self.config, state)
+        settle_normals(scene)
+        return scene
 
     def lit_by_points(
         self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]

@@ -23,6 +23,11 @@ def limit_threads(count: int | None) -> None:
     limit_jobs(count)
 
 
+def adds_in_order() -> bool:
+    """Whether all that kernels of this process add up they add in the same order each time."""
+    return _limit == 1
+
+
 @contextmanager
 def kernels(threads: int | None = None) -> Iterator[None]:
     """Run what is traced in this block on no more threads than the process may have.

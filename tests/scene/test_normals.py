@@ -1,0 +1,68 @@
+"""Normals of smooth meshes, where a process adds everything up on one thread."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.threads import limit_threads
+from lightpaint.scene.variant import use_variant
+
+use_variant()
+
+import mitsuba as mi  # noqa: E402
+
+
+@pytest.fixture(autouse=True)
+def _in_order() -> Iterator[None]:
+    limit_threads(1)
+    yield
+    limit_threads(None)
+
+
+def ball(*, off: float = 0.0, factor: float = 1.0) -> object:
+    """A scene of a smooth mesh: its own normals times `factor`, and so far off."""
+    rows, columns = 12, 24
+    up, round_ = np.mgrid[0.1 : np.pi - 0.1 : rows * 1j, 0 : 2 * np.pi : columns * 1j]
+    points = np.stack([np.sin(up) * np.cos(round_), np.sin(up) * np.sin(round_), np.cos(up)], -1)
+    corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    faces = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)]).reshape(-1, 3)
+    mesh = mi.Mesh("ball", rows * columns, len(faces), has_vertex_normals=True)
+    its = mi.traverse(mesh)
+    its["vertex_positions"] = points.astype(np.float32).ravel()
+    its["faces"] = faces.ravel()
+    its.update()
+    mesh.recompute_vertex_normals()
+    its = mi.traverse(mesh)
+    its["vertex_normals"] = its["vertex_normals"] * factor + off
+    its.update()
+    return mi.load_dict({"type": "scene", "it": mesh})
+
+
+def normals(scene: object) -> np.ndarray:
+    [mesh] = scene.shapes()  # type: ignore[attr-defined]
+    return np.array(mi.traverse(mesh)["vertex_normals"])
+
+
+def test_what_was_computed_is_computed_again() -> None:
+    expected, scene = normals(ball()), ball(off=2e-7)
+    assert (normals(scene) != expected).any()
+    settle_normals(scene)
+    np.testing.assert_array_equal(normals(scene), expected)
+
+
+def test_those_of_a_file_stay() -> None:
+    scene = ball(factor=-1.0)
+    before = normals(scene)
+    settle_normals(scene)
+    np.testing.assert_array_equal(normals(scene), before)
+
+
+def test_where_threads_are_many_nothing_is_touched() -> None:
+    limit_threads(None)
+    scene = ball(off=2e-7)
+    before = normals(scene)
+    settle_normals(scene)
+    np.testing.assert_array_equal(normals(scene), before)
