@@ -68,6 +68,12 @@ class CleanPlanes:
         """Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
         return _mixed(self.halves, self.scales, weights)
 
+    def scaled_as(self, basis: Basis) -> "CleanPlanes":
+        """The same light, by the scales of the planes of another basis of the same lights."""
+        scales = np.array([scale_of(plane) for plane in basis.images])
+        halves = np.stack([as_halves(self.plane(k), x) for k, x in enumerate(scales)])
+        return CleanPlanes(halves, scales, self.present)
+
     def plane(self, k: int) -> Floats:
         """That of light k at unit emission, (h, w, 3) float32."""
         return np.asarray(self.halves[k] * np.float32(self.scales[k]), np.float32)

@@ -7,6 +7,7 @@ which say what has come of them through `on_message`.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from threading import RLock, Thread
 from typing import Any
 
@@ -41,6 +42,22 @@ class OldError(Exception):
     """Somebody has painted on."""
 
 
+@dataclass(frozen=True)
+class _Clean:
+    """Planes without grain. basis: that they were made of. is_kept: whether a file has them."""
+
+    basis: Basis
+    planes: CleanPlanes
+    is_kept: bool = False
+
+    def is_of(self, basis: Basis) -> bool:
+        return self.basis.images is basis.images
+
+    def shown_of(self, basis: Basis) -> CleanPlanes:
+        """What does for the eye until there are those of `basis`."""
+        return self.planes if self.is_of(basis) else self.planes.scaled_as(basis)
+
+
 class Studio:
     """Views under the brush.
 
@@ -62,6 +79,7 @@ class Studio:
         self.on_failure: Callable[[Exception], None] | None = None
         self.failure: Exception | None = None
         self.pictures = Pictures()
+        self._cleans: dict[int, _Clean] = {}  # by view
         self._session: Session | None = None
         self._looks: Looks | None = None
         self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
@@ -222,8 +240,9 @@ class Studio:
         try:
             for bases in bases_of(self.subjects, self.hears):
                 self._take(bases)
+                self._clean()
             self.tell(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
-            self._clean()
+            self._keep_clean()
         except StoppedError:
             pass
         except Exception as error:
@@ -244,6 +263,13 @@ class Studio:
             denoised(basis.present_look, basis.features) if clean is None else clean.present
             for basis, clean in zip(bases, cleans, strict=True)
         ]
+        for k, (basis, clean) in enumerate(zip(bases, cleans, strict=True)):
+            if clean is not None:
+                self._cleans[k] = _Clean(basis, clean, is_kept=True)
+        shown = [
+            self._cleans[k].shown_of(basis) if k in self._cleans else None
+            for k, basis in enumerate(bases)
+        ]
         with self._lock:
             if not self._is_open:
                 raise StoppedError
@@ -261,7 +287,7 @@ class Studio:
             else:
                 self._session.improve(bases, presents)
             session = self._session
-            for view, clean in zip(session.views, cleans, strict=True):
+            for view, clean in zip(session.views, shown, strict=True):
                 offer_view(self.pictures, view, session.transform, clean)
             offer_transforms(self.pictures, self._transforms(session))
         self.tell(self.state())
@@ -294,10 +320,13 @@ class Studio:
         }
 
     def _clean(self) -> None:
-        """Planes without their grain, one after the other, of one view after the other."""
+        """Planes without their grain, one after the other, of one view after the other.
+
+        Until they are there, those of the samples before do for the eye.
+        """
         for view in self.session.views:
-            name = of_view("clean/0", view.view)
-            if view.basis.knows_noise and name not in self.pictures.generations:
+            its = self._cleans.get(view.view)
+            if view.basis.knows_noise and (its is None or not its.is_of(view.basis)):
                 self._clean_view(view)
 
     def _clean_view(self, view: Canvas) -> None:
@@ -309,8 +338,14 @@ class Studio:
                 return
             planes.halves[k], planes.scales[k] = clean_plane(basis, k)
             self.put(of_view(f"clean/{k}", view.view), planes.halves[k])
+        self._cleans[view.view] = _Clean(basis, planes)
+
+    def _keep_clean(self) -> None:
+        """Keep those of the whole basis for the next session."""
         if self.subjects[0].settings.use_cache:
-            keep_planes(basis, planes)
+            for its in self._cleans.values():
+                if not its.is_kept:
+                    keep_planes(its.basis, its.planes)
 
     def _find(self) -> None:
         """The exact answer, then what is known of it."""

@@ -83,3 +83,17 @@ def test_scales_keep_all_but_the_last_bits(brightest: float):
     scale = scale_of(plane)
     assert np.log2(scale) == round(np.log2(scale))
     np.testing.assert_allclose(as_halves(plane, scale) * np.float32(scale), plane, rtol=2**-11)
+
+
+def test_the_same_light_by_the_scales_of_brighter_planes(make_basis: Any):
+    basis = make_basis(2, (24, 32))
+    planes = clean_planes(basis)
+    assert planes is not None
+    brighter = replace(basis, images=basis.images * np.float32(2**12))
+    its = planes.scaled_as(brighter)
+    np.testing.assert_array_equal(its.scales, [scale_of(plane) for plane in brighter.images])
+    assert (its.scales != planes.scales).any()
+    for k in range(2):
+        # What is 12 stops below has as many bits less among the half floats' 24.
+        light = planes.plane(k)
+        np.testing.assert_allclose(its.plane(k), light, rtol=2**-11, atol=light.max() * 2**-11)

@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import protocol
+from lightpaint.paint import protocol, studio
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.store import Store
@@ -134,6 +134,41 @@ def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
     assert sum(light["share"] for light in fields["lights"]) == pytest.approx(1)
     assert [len(light["emission"]) for light in fields["lights"]] == [3, 3, 3]
     assert any(light["error"] for light in fields["lights"])
+
+
+def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A picture without grain is not shown with it again while the lights are still rendered."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    better = replace(basis, images=basis.images * np.float32(1.5))
+    is_taken, goes_on = threading.Event(), threading.Event()
+    cleaned: list[lp.Basis] = []
+    real = studio.clean_plane
+
+    def clean_plane(its: lp.Basis, k: int) -> Any:
+        if its.images is better.images:
+            is_taken.set()
+            goes_on.wait(30)
+        cleaned.append(its)
+        return real(its, k)
+
+    monkeypatch.setattr(studio, "clean_plane", clean_plane)
+    monkeypatch.setattr(studio, "bases_of", lambda *_: iter([[basis], [better]]))
+    heard = Heard(tmp_path, basis)
+    assert is_taken.wait(30)
+    assert len(cleaned) == len(basis.lights)
+    fields = heard.studio.state().fields
+    for k, light in enumerate(fields["lights"]):
+        assert f"clean/{k}" in fields["resources"]
+        shown = heard.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
+        assert shown.mean() == pytest.approx(basis.images[k].mean(), rel=0.1)
+    goes_on.set()
+    heard.wait(lambda m: m.kind == "progress" and m.fields["done"] == 1)
+    for k, light in enumerate(fields["lights"]):
+        shown = heard.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
+        assert shown.mean() == pytest.approx(better.images[k].mean(), rel=0.1)
+    heard.studio.close()
 
 
 def test_clean_planes_come_later_and_keep_the_light(
