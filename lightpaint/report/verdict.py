@@ -15,7 +15,7 @@ from lightpaint.screen import some_names
 HOLDING: dict[Held, str] = {
     "hold": "what you did not paint is held as it is",
     "colors": "lamps keep their colours",
-    "constraints": "some lights are locked or limited",
+    "constraints": "some lights are locked, limited or left out",
 }
 
 

@@ -67,7 +67,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         (
             _seen(5.0, held=("colors", "constraints")),
             "Part of the way, but the brighter light in the middle is out of reach: lamps keep "
-            "their colours, and some lights are locked or limited.",
+            "their colours, and some lights are locked, limited or left out.",
         ),
         (
             _seen(5.0, on="figure_hollow"),
