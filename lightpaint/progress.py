@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 
@@ -31,6 +32,9 @@ class Listener(Progress, Protocol):
     def note(self, text: str) -> None:
         """A stage that is done, and what was used in it: for who wants to know all."""
 
+    def at_work(self, worker: str, what: str | None) -> None:
+        """What one of several workers does now; None for nothing."""
+
 
 class _Silent:
     """Listens to nothing."""
@@ -44,6 +48,9 @@ class _Silent:
     def note(self, text: str) -> None:
         """Hear no stage."""
 
+    def at_work(self, worker: str, what: str | None) -> None:
+        """Hear of no worker."""
+
 
 #: Whoever does not listen.
 silent = _Silent()
@@ -51,11 +58,12 @@ silent = _Silent()
 
 @dataclass(frozen=True)
 class _Split:
-    """Progress goes to one, remarks to another, and stages to a third."""
+    """Progress goes to one, remarks to another, stages to a third, what workers do to a fourth."""
 
     progress: Progress
     remarks: Callable[[str], None]
     stages: Callable[[str], None]
+    workers: Callable[[str, str | None], None]
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         self.progress(label, done, total, unit)
@@ -66,11 +74,14 @@ class _Split:
     def note(self, text: str) -> None:
         self.stages(text)
 
+    def at_work(self, worker: str, what: str | None) -> None:
+        self.workers(worker, what)
+
 
 def listener(progress: Progress) -> Listener:
     """`progress` as a listener: a plain callable lets remarks and stages pass."""
-    say, note = (getattr(progress, name, getattr(silent, name)) for name in ("say", "note"))
-    return _Split(progress, say, note)
+    heard = ("say", "note", "at_work")
+    return _Split(progress, *(getattr(progress, name, getattr(silent, name)) for name in heard))
 
 
 class Interrupted(KeyboardInterrupt):
@@ -83,7 +94,12 @@ def labelled(listen: Listener, name: str) -> Listener:
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
         listen(f"{label} of {name}", done, total, unit)
 
-    return _Split(report, listen.say, lambda text: listen.note(f"{text} of {name}"))
+    note = partial(_note_of, listen, name)
+    return _Split(report, listen.say, note, listen.at_work)
+
+
+def _note_of(listen: Listener, name: str, text: str) -> None:
+    listen.note(f"{text} of {name}")
 
 
 _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)

@@ -169,6 +169,7 @@ class Cluster:
             for sent in self._sent:
                 if (spoken(sent.errand), sent.worker) == self.begun[-1]:
                     sent.since_s = time.monotonic()
+                    self._listen.at_work(f"worker {sent.worker}", spoken(sent.errand))
             self._listen.note(f"{event['errand']} begun by {event['worker']}")
 
     def _come_back(self, waiting: deque[Errand], tries: Counter[str]) -> Iterator[Done]:
@@ -184,6 +185,7 @@ class Cluster:
             if came is None:
                 continue
             self._sent.remove(sent)
+            self._rests(sent.worker)
             self._note_turns()
             self._returned[spoken(sent.errand), sent.worker] += not isinstance(came, list)
             if isinstance(came, list):  # a worker that was begun anew at the same address
@@ -196,6 +198,11 @@ class Cluster:
                 waiting.append(sent.errand)
                 continue
             yield came if came.files is None else _unpacked(sent.errand, came)
+
+    def _rests(self, worker: str) -> None:
+        """Tell of a worker that has nothing to do."""
+        if all(sent.worker != worker for sent in self._sent):
+            self._listen.at_work(f"worker {worker}", None)
 
     def _came(self, sent: _Sent) -> Done | list[str] | None:
         """What came of it; None if it was lost on the way."""
@@ -221,6 +228,7 @@ class Cluster:
             with suppress(Exception):
                 sent.future.cancel(force=True)
             self._sent.remove(sent)
+            self._rests(sent.worker)
             if sent.since_s is not None:  # it was at work on that
                 tries[sent.errand.name] += 1
                 name = spoken(sent.errand)

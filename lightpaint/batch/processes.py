@@ -11,10 +11,10 @@ from concurrent.futures.process import BrokenProcessPool
 from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.engine import LOST, TRIES
-from lightpaint.batch.errands import Done, Errand
+from lightpaint.batch.errands import Done, Errand, spoken
 from lightpaint.batch.held import Held
 from lightpaint.batch.work import do
-from lightpaint.progress import silent
+from lightpaint.progress import Listener, silent
 from lightpaint.scene.threads import limit_threads
 
 
@@ -24,8 +24,8 @@ class Processes:
     is_apart = True
     is_gone = False
 
-    def __init__(self, workers: int) -> None:
-        self.workers = workers
+    def __init__(self, workers: int, listen: Listener = silent) -> None:
+        self.workers, self._listen = workers, listen
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> "Processes":
@@ -59,20 +59,29 @@ class Processes:
     def _together(self, waiting: list[Errand], lost: list[Errand]) -> Iterator[Done]:
         """Empty `waiting`, as many at a time as there are workers, until one of them dies."""
         running: dict[Future[Done], Errand] = {}
+        # Which process takes an errand only the pool knows, but so many are at work.
+        places: dict[Future[Done], str] = {}
+        free = [f"worker {k + 1}" for k in reversed(range(self.workers))]
         pool = self._started()
         while waiting or running:
             try:
                 while waiting and len(running) < self.workers:
                     # What it has read by now stays here.
-                    running[pool.submit(_work, waiting[0].moved(str))] = waiting[0]
+                    future = pool.submit(_work, waiting[0].moved(str))
+                    running[future], places[future] = waiting[0], free.pop()
+                    self._listen.at_work(places[future], spoken(waiting[0]))
                     del waiting[0]
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     done = future.result()
                     del running[future]
+                    free.append(places.pop(future))
+                    self._listen.at_work(free[-1], None)
                     yield done
             except BrokenProcessPool:
                 lost += running.values()
+                for place in places.values():
+                    self._listen.at_work(place, None)
                 self._end()
                 return
 

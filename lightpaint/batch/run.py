@@ -129,7 +129,7 @@ class _Run:
             )
             return stack.enter_context(cluster)
         if how.workers > 1:
-            return stack.enter_context(Processes(how.workers))
+            return stack.enter_context(Processes(how.workers, self._listen))
         return self._engine
 
     def _has_basis(self, task: Task) -> bool:

@@ -13,6 +13,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    Task,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
@@ -126,24 +127,37 @@ def _timed(text: str) -> str:
     return f"{text} [{lap:.2f} s, {total:.2f} s in all]"
 
 
+#: Workers that have a line each; of more only how many there are.
+WORKERS = 8
+
+
+class _Count(MofNCompleteColumn):
+    """How many of how many, and nothing where nobody counts."""
+
+    def render(self, task: Task) -> Text:
+        return Text("") if task.total is None else super().render(task)
+
+
 class Listener:
     """Hears progress and remarks, and shows them on stderr; of equal remarks the first.
 
-    On a terminal bars are shown while it is entered; in a log it is one line for each piece of
-    work that begins.
+    On a terminal bars are shown while it is entered, and a line for each worker that is at work; in
+    a log it is one line for each piece of work that begins.
     """
 
     def __init__(self) -> None:
         self._said: set[str] = set()
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
+        self._workers: dict[str, TaskID] = {}
+        self._others: set[str] = set()  # workers without a line
 
     def __enter__(self) -> "Listener":
         if sys.stderr.isatty() and not manner().is_quiet:
             columns = (
                 TextColumn("{task.description}", markup=False),
                 BarColumn(),
-                MofNCompleteColumn(),
+                _Count(),
                 TimeElapsedColumn(),
             )
             self._bars = Progress(*columns, console=Console(stderr=True), transient=True)
@@ -153,7 +167,7 @@ class Listener:
     def __exit__(self, *_: object) -> None:
         if self._bars is not None:
             self._bars.stop()
-        self._bars, self._tasks = None, {}
+        self._bars, self._tasks, self._workers, self._others = None, {}, {}, set()
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
@@ -165,6 +179,27 @@ class Listener:
             what = label if unit == "passes" else f"{label} ({unit})"
             self._tasks[label] = self._bars.add_task(visible(what), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
+
+    def at_work(self, worker: str, what: str | None) -> None:
+        """Show what a worker does now; None for nothing."""
+        if self._bars is None:
+            return
+        if what is None:
+            self._others.discard(worker)
+            if worker in self._workers:
+                self._bars.remove_task(self._workers.pop(worker))
+        elif worker in self._workers:
+            self._bars.reset(self._workers[worker], description=visible(f"{worker}: {what}"))
+        elif len(self._workers) < WORKERS:
+            self._others.discard(worker)
+            self._workers[worker] = self._bars.add_task(visible(f"{worker}: {what}"), total=None)
+        else:
+            self._others.add(worker)
+        if self._others or "others" in self._tasks:
+            others = f"and {len(self._others)} more at work"
+            if "others" not in self._tasks:
+                self._tasks["others"] = self._bars.add_task(others, total=None)
+            self._bars.update(self._tasks["others"], description=others, visible=bool(self._others))
 
     def say(self, text: str) -> None:
         """A remark, above the bars if there are any."""

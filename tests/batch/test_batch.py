@@ -297,6 +297,21 @@ def test_tasks_are_the_same_wherever_they_are_sent(here: Path) -> None:
             Task.from_json(text)
 
 
+class _AtWork:
+    """Listens to what each worker does."""
+
+    def __init__(self) -> None:
+        self.workers: dict[str, str | None] = {}
+        self.done: set[str] = set()
+
+    def __call__(self, *_: Any) -> None: ...
+
+    def at_work(self, worker: str, what: str | None) -> None:
+        assert (self.workers.get(worker) is None) == (what is not None)
+        self.workers[worker] = what
+        self.done.add(what or "")
+
+
 def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     here: Path, undisturbed: tuple[Path, dict[str, bytes]]
 ) -> None:
@@ -311,10 +326,13 @@ def test_workers_make_the_same_and_one_that_dies_costs_nothing(
 
     started: list[Any] = []
     begin = Processes.__enter__
+    hears = _AtWork()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Processes, "__enter__", lambda it: started.append(it) or begin(it))
-        outcome = run_batch(planned, How(workers=2), told=told)
+        outcome = run_batch(planned, How(workers=2), hears, told=told)
     assert died
+    assert hears.workers == {"worker 1": None, "worker 2": None}
+    assert {f"{name}: answer" for name in outcome.done} <= hears.done
     assert not outcome.failed
     assert contents(here / "out") == undisturbed[1]
 

@@ -164,6 +164,7 @@ class Hears:
 
     when: Callable[[str], None] = lambda text: None
     said: list[str] = field(default_factory=list)
+    workers: dict[str, str | None] = field(default_factory=dict)
 
     def __call__(self, *_: Any) -> None: ...
 
@@ -172,6 +173,9 @@ class Hears:
         self.when(text)
 
     note = say
+
+    def at_work(self, worker: str, what: str | None) -> None:
+        self.workers[worker] = what
 
     @property
     def begun(self) -> Counter[str]:
@@ -231,6 +235,7 @@ def test_a_cluster_does_what_one_process_does(
     # The only final render is one of both workers.
     assert hears.begun["bright 0"] == hears.begun["bright 1"] == 1
     assert hears.begun["bright: render"] == 0
+    assert list(hears.workers.values()) == [None, None]
     assert len({text.split()[-1] for text in hears.said if " begun by " in text}) == 2
     # Again nothing is done; and on a shared disk it is the same.
     assert do(here, "all", workers, hears).done == []

@@ -145,6 +145,31 @@ def test_progress_and_remarks_on_a_terminal(
     assert capfd.readouterr().err == f"basis of {SHOWN}: 2 passes\n"
 
 
+def test_each_worker_has_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "dumb")
+
+    def shown(listen: terminal.Listener) -> list[str]:
+        assert listen._bars is not None
+        return [task.description for task in listen._bars.tasks if task.visible]
+
+    with terminal.Listener() as listen:
+        listen.at_work("worker 1", f"{BAD}: answer")
+        listen.at_work("worker 2", "night: answer")
+        assert shown(listen) == [f"worker 1: {SHOWN}: answer", "worker 2: night: answer"]
+        listen.at_work("worker 1", None)
+        listen.at_work("worker 2", "dawn: answer")
+        assert shown(listen) == ["worker 2: dawn: answer"]
+        for k in range(3, 20):
+            listen.at_work(f"worker {k}", "dusk: answer")
+        assert len(shown(listen)) == terminal.WORKERS + 1
+        assert shown(listen)[-1] == "and 10 more at work"
+        for k in range(2, 20):
+            listen.at_work(f"worker {k}", None)
+        assert shown(listen) == []
+    listen.at_work("worker 1", "night: answer")  # in a log nothing is said of it
+
+
 def test_markup_of_rich_is_text(capfd: pytest.CaptureFixture[str]) -> None:
     table = terminal.table("name")
     table.row(escape("[red]x[/red]") + "[/blue]")
