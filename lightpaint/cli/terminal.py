@@ -176,7 +176,7 @@ class Listener:
                 lines.err(f"{label}: {total} {unit}")
             return
         if label not in self._tasks:
-            what = label if unit == "passes" else f"{label} ({unit})"
+            what = label if unit in ("passes", label) else f"{label} ({unit})"
             self._tasks[label] = self._bars.add_task(visible(what), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
 
