@@ -1,6 +1,6 @@
 """What is rendered to be painted on or looked at: templates, and scenes as they were relit."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -233,17 +233,22 @@ def _thumbnails(
 
 
 def relit_folder(
-    scene: Scene, lighting: Path, folder: Path, *, force: bool = False
+    scene: Scene,
+    lighting: Path,
+    folder: Path,
+    *,
+    views: Sequence[str] = ("",),
+    force: bool = False,
 ) -> ResultFolder:
-    """Where `relight_look` writes. lighting: the file whose lighting it is."""
+    """Where `relight_look` writes. lighting: the file whose lighting it is. views: as there."""
     files = [*check_relightable(scene, folder / "relit.xml")]
-    files += [folder / "relit.exr", folder / "relit.png"]
+    files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
     reads = (lighting, *scene.read_files)
     return ResultFolder(folder, tuple(files), reads, (lighting,), adds_to=lighting, force=force)
 
 
 def relight_look(
-    scene: Scene,
+    scenes: Mapping[str, Scene],
     lighting: Lighting,
     results: ResultFolder,
     *,
@@ -253,21 +258,26 @@ def relight_look(
     progress: Progress = silent,
     rendered: Callable[[Scene], Estimate] | None = None,
 ) -> None:
-    """Write relit.xml, and its render as relit.exr and, denoised, as relit.png.
+    """Write relit.xml, and its renders as relit.exr and, denoised, as relit.png.
 
-    resolution: part of the film that is rendered, as of `Settings`. rendered: who renders the relit
-    scene, instead of this process.
+    scenes: one through each sensor, by the folder in `results` that its pictures go to; "" for that
+    itself. resolution: part of the film that is rendered, as of `Settings`. rendered: who renders
+    the relit scene, instead of this process.
     """
     for remark in remarks_of_pictures():
         listener(progress).say(remark)
     results.check()
+    how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
     with results.filled() as folder:
-        relit = on_film(relight(scene, lighting, folder / "relit.xml"), None, resolution)
-        how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
-        image = rendered(relit) if rendered else render(relit, spp=spp, label="relit", **how)
-        write_estimate(folder / "relit.exr", image, {})
-        features = render_features(relit, seed=seed)
-        clean = denoised(image.image, features, quality="high")
-        texts = how_denoised(features, raw="relit.exr")
-        write_png(folder / "relit.png", clean, stops=choose_exposure(clean), texts=texts)
+        for view, scene in scenes.items():
+            relit = on_film(relight(scene, lighting, folder / "relit.xml"), None, resolution)
+            label = f"relit of {view}" if view else "relit"
+            image = rendered(relit) if rendered else render(relit, spp=spp, label=label, **how)
+            (folder / view).mkdir(exist_ok=True)
+            write_estimate(folder / view / "relit.exr", image, {})
+            features = render_features(relit, seed=seed)
+            clean = denoised(image.image, features, quality="high")
+            texts = how_denoised(features, raw="relit.exr")
+            stops = choose_exposure(clean)
+            write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
         settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")

@@ -158,16 +158,20 @@ def final_render(
     listen: Listener,
     rendered: Callable[[Scene], Estimate] | None = None,
 ) -> None:
-    """The final render of a look that is answered. rendered: who renders, if others do."""
+    """The final renders of a look that is answered, one for each view.
+
+    rendered: who renders, if others do.
+    """
     fields = fields_of(task, held)
     [lighting] = map(Path, task.lightings)
-    results = relit_folder(
-        fields["scenes"][0].content, lighting, fields["folder"], force=fields["settings"].force
-    )
+    scenes: list[Scene] = [file.content for file in fields["scenes"]]
+    views = view_names(scenes) if fields["by_sensor"] else [""]
+    force = fields["settings"].force
+    results = relit_folder(scenes[0], lighting, fields["folder"], views=views, force=force)
     how: dict[str, Any] = {"spp": task.final.spp, "seed": task.final.seed}
     how["resolution"] = task.final.resolution
     relight_look(
-        fields["scenes"][0].content,
+        dict(zip(views, scenes, strict=True)),
         read_lighting(lighting),
         results,
         progress=listen,

@@ -144,7 +144,7 @@ def relight(
             terminal.say(f"{folder}: the lighting was solved for another state of the scene")
         with terminal.Listener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            relight_look(loaded, lighting, place, progress=listen, **how)
+            relight_look({"": loaded}, lighting, place, progress=listen, **how)
             listen.note(f"{folder} relit and rendered")
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
     return Outcome(lambda: {"results": [_relit(*x) for x in zip(lightings, results, strict=True)]})

@@ -36,6 +36,8 @@ sensors = ["camera", "side"]
 name = "both"
 views = { camera = "bright.exr", side = "dark.exr" }
 variations = ["warmer"]
+want = ["predict", "render"]
+render = { spp = 8 }
 
 [[look]]
 name = "final"
@@ -114,6 +116,15 @@ def test_only_what_is_wanted_is_rendered(here: Path, done: dict[str, Any]) -> No
         render = read_estimate(out / name / "relit.exr")[0]
         assert render.size == (10, 12)
         assert (out / name / "relit.png").is_file()
+    # Of several views one through each sensor, which shows what was predicted there.
+    for name in ("both", "both-warmer"):
+        assert not (out / name / "relit.exr").exists()
+        for view in ("camera", "side"):
+            render, predicted = (
+                read_estimate(out / name / view / file)[0].image.mean()
+                for file in ("relit.exr", "predicted.exr")
+            )
+            assert render == pytest.approx(predicted, rel=0.15)  # noise of 8 samples
     by_name = {look["look"]: look for look in done["looks"]}
     assert by_name["final"]["agrees"] is True
     assert "agrees" not in by_name["dark-side"]
