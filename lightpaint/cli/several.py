@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.batch.entries import Entry
@@ -11,6 +12,7 @@ from lightpaint.batch.made import leave_shifted, shifted_folders, sibling_folder
 from lightpaint.batch.solved import entry_of, write_gallery_of
 from lightpaint.batch.work import is_full
 from lightpaint.cli import terminal
+from lightpaint.cli.documents import files_document
 from lightpaint.errors import ALONE, OutputError
 from lightpaint.job import Job
 from lightpaint.lighting.lighting import Lighting
@@ -24,7 +26,8 @@ class Several:
     together: folder of a gallery of all; None where somebody else's page lies there. keep_going:
     whether one that is bad fails alone. called: by folder, what is a variation of another. made: by
     the folder of an answer, the variations that are made of it, and where they go. failed: names of
-    those that cannot be done, and why. entries: what the gallery shows.
+    those that cannot be done, and why. entries: what the gallery shows. shifted: documents of the
+    variations that are made of answers.
     """
 
     together: Path | None
@@ -33,6 +36,7 @@ class Several:
     made: Mapping[Path, Mapping[str, ResultFolder]]
     failed: dict[str, str]
     entries: list[Entry] = field(default_factory=list)
+    shifted: list[dict[str, Any]] = field(default_factory=list)
 
     def is_done(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
         """Make the variations of an answer that are made of it."""
@@ -40,6 +44,9 @@ class Several:
         for word, place in self.made.get(job.folder, {}).items():
             leave_shifted(job, word, place, lighting, bases)
             self.entries.append(entry_of(job, place.folder, word))
+            files = [file for file in place.files if file.is_file()]
+            about = {"variation": word, "of": str(job.folder)}
+            self.shifted.append(files_document(place.folder, files, **about))
 
     def goes_on(self, job: Job, error: Exception) -> bool:
         """Whether the others are solved all the same."""

@@ -1,7 +1,7 @@
 """What `lightpaint solve` does: one painting or several, their variations, a gallery of all."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.answer import Table, show_look, spoken_settings
@@ -59,8 +59,14 @@ def solve(
         terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
     if shortfalls:
         terminal.complain("solve", some_of(shortfalls, joint="; "))
+    made = [] if several is None else several.shifted
+
+    def told() -> dict[str, Any]:
+        found = {"results": [documents.result_document(*x, wanted) for x in results]}
+        return found | ({"variations": made} if made else {})
+
     return Outcome(
-        lambda: {"results": [documents.result_document(*x, wanted) for x in results]},
+        told,
         1 if shortfalls or (several is not None and several.failed) else 0,
     )
 

@@ -90,7 +90,14 @@ def test_variations_are_what_a_batch_makes_of_them(here: Path) -> None:
         ours, theirs = (read_lighting(here / x / name / "lighting.json") for x in ("few", "many"))
         assert ours.emission == theirs.emission
     # Without a folder they lie beside each other, with the gallery of both.
-    succeed(here, "solve", "b.basis.exr", "p0.exr", "--variations", "warmer")
+    told = json.loads(
+        succeed(here, "solve", "b.basis.exr", "p0.exr", "--variations", "warmer", "--json", "-q")
+    )
+    assert [x["folder"] for x in told["results"]] == ["p0"]
+    [made] = told["variations"]
+    assert (made["variation"], made["of"], made["folder"]) == ("warmer", "p0", "p0-warmer")
+    assert all((here / file).is_file() for file in made["files"])
+    assert "p0-warmer/lighting.json" in made["files"]
     assert (here / "p0-warmer" / "predicted.exr").is_file()
     assert "2 looks" in (here / "index.html").read_text()
 
