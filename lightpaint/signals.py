@@ -94,7 +94,8 @@ def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
         signal.signal(number, lambda number, _frame: pending.append(number))
     try:
         yield let_through
-        let_through()
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
+        # One may have come until just now.
+        let_through()

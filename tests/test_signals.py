@@ -41,6 +41,26 @@ def test_an_interrupt_in_the_last_piece_is_not_lost():
         signal.raise_signal(signal.SIGINT)
 
 
+def test_an_interrupt_while_handlers_are_put_back_is_not_lost(monkeypatch: pytest.MonkeyPatch):
+    """Between the last look at what has come and the handler's return there is a moment."""
+    real, is_at_end = signal.signal, []
+
+    def comes_first(number: signal.Signals, handler: Any) -> Any:
+        if is_at_end:
+            is_at_end.pop()
+            signal.raise_signal(signal.SIGINT)
+        return real(number, handler)
+
+    def work() -> None:
+        with monkeypatch.context() as patch, interruptible_between_pieces():
+            patch.setattr(signal, "signal", comes_first)
+            is_at_end.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 def test_ignored_interrupts_stay_ignored():
     """As under nohup, or in the background of a script."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
