@@ -1,6 +1,7 @@
 """Running the command line as a user does: in this process, or in one of its own."""
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,11 @@ import pytest
 from lightpaint.cli import main
 
 Runner = Callable[..., CompletedProcess[str]]
+
+
+def as_from_a_terminal() -> None:
+    """In a process that begins: it ends with its terminal, also where `nohup` runs these tests."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def run(folder: Path, *arguments: object, **variables: str) -> CompletedProcess[str]:

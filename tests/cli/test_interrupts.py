@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import as_from_a_terminal
 from renderer import CORNELL, LIGHTS, PATH, SAME_SAMPLES, write_room
 
 from lightpaint.basis.basis import Basis
@@ -47,6 +48,7 @@ def start(
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=as_from_a_terminal,
     )
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import refused
+from command import as_from_a_terminal, refused
 from light_groups import interleaved, pictures
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
@@ -163,6 +163,7 @@ def painting(folder: Path, *given: str) -> Iterator[tuple["subprocess.Popen[str]
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        preexec_fn=as_from_a_terminal,
     )
     with process:
         try:
