@@ -36,7 +36,7 @@ _MARKUP = re.compile(
     rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
     rb"|(?P<type><!DOCTYPE(?>%b|%b|%b|[^<>\"'])*+>)"
     rb"|</(?P<end>%b)\s*+>"
-    rb"|<(?P<tag>%b)(?P<attributes>(?:\s++%b\s*+=\s*+%b)*+)\s*+(?P<empty>/?)>"
+    rb"|<(?P<tag>%b)(?P<attributes>(?>(?:\s++%b\s*+=\s*+%b)*))\s*+(?P<empty>/?)>"
     % (_SKIPPED, _QUOTED, _SKIPPED, _DECLARATION, _NAME, _NAME, _NAME, _QUOTED)
 )
 _DECLARED = re.compile(rb"<!ENTITY\s+(%b)" % _NAME)
