@@ -37,7 +37,8 @@ def test_a_solve_from_python_is_that_of_paint_with_light(room: Path, tmp_path: P
     write_rgb(tmp_path / "t.exr", _target(basis).image)
     how = {"spp": 8, "noise_correction": False}
     look = lp.paint_with_light(scene, tmp_path / "t.exr", tmp_path / "out", **how)
-    solution = lp.solve(basis, lp.read_target(tmp_path / "t.exr"))
+    # Threads that learn where lights matter may leave one sample in a million to another light.
+    solution = lp.solve(look.basis, lp.read_target(tmp_path / "t.exr"))
     assert look.basis.asked == basis.asked == scene.asked
     assert {x.constraint for x in solution.lighting.lights} == {"lock 40%", "3200 K"}
     for light in look.lighting.lights:
