@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint import threads
 from lightpaint.basis import basis as basis_module
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
@@ -195,6 +196,8 @@ def test_no_picture_is_encoded_twice(
         return plain(self, image)
 
     monkeypatch.setattr(ViewTransform, "encode", counted)
+    # Two threads that need the same at the same time may both make it.
+    monkeypatch.setattr(threads, "_limit", 1)
     write_report(tmp_path, look, command="")
     # Two suggestions have the same pictures here.
     whole = [its for its in encoded if len(its) == look.predicted.image.nbytes]
