@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import partial
 from typing import Protocol
 
 
@@ -94,12 +93,10 @@ def labelled(listen: Listener, name: str) -> Listener:
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
         listen(f"{label} of {name}", done, total, unit)
 
-    note = partial(_note_of, listen, name)
+    def note(text: str) -> None:
+        listen.note(f"{text} of {name}")
+
     return _Split(report, listen.say, note, listen.at_work)
-
-
-def _note_of(listen: Listener, name: str, text: str) -> None:
-    listen.note(f"{text} of {name}")
 
 
 _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)
