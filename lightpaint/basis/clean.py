@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from lightpaint.basis.basis import Basis, mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoise import denoised, how_denoised, is_there
+from lightpaint.images.resample import resampled
 from lightpaint.threads import side_by_side
 
 FORMAT, PARTS = "lightpaint-clean 1", ("halves", "scales", "present")
@@ -33,6 +35,9 @@ FEWEST, MOST_WANTED, MOST = 2**18, 2**22, 2**24
 #: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
 #: precision.
 BRIGHTEST = 1024.0
+
+#: Pixels on a side over which the share of a light is taken in rough planes.
+ROUGH = 8
 
 #: Rows of planes that are brought to single precision at a time.
 STRIP = 64
@@ -77,6 +82,33 @@ class CleanPlanes:
     def plane(self, k: int) -> Floats:
         """That of light k at unit emission, (h, w, 3) float32."""
         return np.asarray(self.halves[k] * np.float32(self.scales[k]), np.float32)
+
+
+class RoughPlanes:
+    """What each light does without most of the grain: at once, where denoising takes seconds.
+
+    It is the clean picture of the scene as it is, times the share that the light has in it, which
+    is taken of means over some pixels. So they add up to that picture, and shadows are soft.
+
+    present: (h, w, 3) float32, that picture.
+    """
+
+    def __init__(self, basis: Basis, present: Floats) -> None:
+        self.basis, self.present = basis, present
+
+    def plane(self, k: int) -> Floats:
+        """That of light k at unit emission, (h, w, 3) float32; 0 where the scene is black."""
+        lit, total = self._mean(self.basis.images[k]), self._total
+        share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 0)
+        return self.present * resampled(share, self.basis.size)
+
+    @cached_property
+    def _total(self) -> Floats:
+        return self._mean(self.basis.present_look)
+
+    def _mean(self, picture: Floats) -> Floats:
+        height, width = self.basis.size
+        return resampled(picture, (-(-height // ROUGH), -(-width // ROUGH)))
 
 
 def scale_of(plane: Floats) -> float:

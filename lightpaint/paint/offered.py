@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.clean import CleanPlanes, as_halves, scale_of
+from lightpaint.basis.clean import CleanPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.paint import pictures
 from lightpaint.paint.canvas import Canvas, Canvases
@@ -24,19 +24,24 @@ def offer_transforms(shelf: Pictures, transforms: Sequence[ViewTransform]) -> No
 def offer_view(
     shelf: Pictures, view: Canvas, transform: ViewTransform, clean: CleanPlanes | None
 ) -> None:
-    """Pictures of a view from now on; clean ones, unless they are there, come later."""
+    """Pictures of a view from now on; clean planes, unless they are there, are rough at first."""
     basis = view.basis
 
     def offer(name: str, make: Any) -> None:
         shelf.offer(of_view(name, view.view), make)
 
+    rough = RoughPlanes(basis, view.present)
+    can_rough = basis.knows_noise and view.present.any()
     for k, plane in enumerate(basis.images):
         offer(f"plane/{k}", partial(_plane, plane))
         offer(f"thumb/{k}", partial(pictures.small, basis, k))
-        if clean is None:
-            shelf.withdraw(of_view(f"clean/{k}", view.view))
+        name = of_view(f"clean/{k}", view.view)
+        if clean is not None:
+            shelf.put(name, clean.halves[k])
+        elif can_rough:
+            shelf.offer(name, partial(_rough, rough, k))
         else:
-            shelf.put(of_view(f"clean/{k}", view.view), clean.halves[k])
+            shelf.withdraw(name)
     offer("present", lambda: as_halves(view.present))
     offer("look", lambda: pictures.small_picture(view.present, transform))
     offer("painting", lambda: view.image.copy())
@@ -51,6 +56,10 @@ def offer_view(
 
 def _plane(plane: Any) -> Picture:
     return as_halves(plane, scale_of(plane))
+
+
+def _rough(planes: RoughPlanes, k: int) -> Picture:
+    return as_halves(planes.plane(k), scale_of(planes.basis.images[k]))
 
 
 def fields_of_views(views: Canvases) -> dict[str, Any]:

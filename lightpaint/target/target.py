@@ -11,6 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_mean, whole_factor
+from lightpaint.images.resample import resampled
 from lightpaint.screen import Shown
 
 #: By how much more than half one of two shares prevails, beyond the rounding of float32.
@@ -142,9 +143,9 @@ class Target(Shown):
         if size == self.size:
             return self
         weighted = np.dstack([self.image * self.importance[..., None], self.importance])
-        *rgb, importance = np.moveaxis(_resampled(weighted, size), -1, 0)
+        *rgb, importance = np.moveaxis(resampled(weighted, size), -1, 0)
         image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
-        at_least = self._at_least(lambda planes: _resampled(planes, size))
+        at_least = self._at_least(lambda planes: resampled(planes, size))
         return replace(self, image=image, importance=importance, at_least=at_least)
 
     def reduced(self, factor: int) -> "Target":
@@ -211,22 +212,6 @@ class Target(Shown):
                 f"{width}x{height}: crop it to that shape, since resize=True does not stretch"
             )
         return self.resized(size)
-
-
-def _resampled(planes: Floats, size: tuple[int, int]) -> Floats:
-    """(h, w, n) at `size`: means over what a pixel covers; where it grows, interpolated."""
-    from PIL import Image
-
-    height, width = size
-    shrinks = width <= planes.shape[1]
-    kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
-    made = [
-        Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
-            (width, height), kernel
-        )
-        for plane in np.moveaxis(planes, -1, 0)
-    ]
-    return np.dstack([np.asarray(plane) for plane in made])
 
 
 def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

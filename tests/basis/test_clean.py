@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from lightpaint.basis import clean
-from lightpaint.basis.clean import CleanPlanes, as_halves, clean_planes, kept_planes, scale_of
+from lightpaint.basis.clean import (
+    CleanPlanes,
+    RoughPlanes,
+    as_halves,
+    clean_planes,
+    kept_planes,
+    scale_of,
+)
 from lightpaint.images.denoise import denoised, is_there
 
 pytestmark = pytest.mark.skipif(not is_there(), reason="Open Image Denoise")
@@ -97,3 +104,29 @@ def test_the_same_light_by_the_scales_of_brighter_planes(make_basis: Any):
         # What is 12 stops below has as many bits less among the half floats' 24.
         light = planes.plane(k)
         np.testing.assert_allclose(its.plane(k), light, rtol=2**-11, atol=light.max() * 2**-11)
+
+
+def test_rough_planes_add_up_and_are_nearer_to_light_without_grain(make_basis: Any):
+    """Of a few samples: a third of the pixels have all of the light."""
+    rng = np.random.default_rng(4)
+    y, x = np.mgrid[:61, :98] / 61
+    light = np.array([1 / (0.3 + (y - a) ** 2 + (x - b) ** 2) for a, b in ((0, 0), (1, 1.6))])
+    light = light[..., None] * rng.uniform(0.2, 1, (2, 1, 1, 3))
+    grainy = 3 * light * (rng.random(light.shape[:3]) < 1 / 3)[..., None]
+    basis = make_basis(images=grainy, emission=[[1, 0.5, 0.2], [2, 3, 4]])
+    present = np.einsum("nhwc,nc->hwc", light, basis.present_weights).astype(np.float32)
+    rough = RoughPlanes(basis, present)
+    planes = np.array([rough.plane(k) for k in range(2)])
+    assert planes.dtype == np.float32
+    total = np.einsum("nhwc,nc->hwc", planes, basis.present_weights)
+    np.testing.assert_allclose(total, present, rtol=1e-5)  # single precision
+    grain, left = (np.sqrt(np.mean((its - light) ** 2)) for its in (basis.images, planes))
+    assert left < grain / 5  # of 64 pixels each is a mean, and of the total nothing is left
+
+
+def test_what_is_black_is_black_in_rough_planes(make_basis: Any):
+    images = np.zeros((2, 20, 30, 3))
+    images[0, :10, :10] = 1
+    rough = RoughPlanes(make_basis(images=images), images[0].astype(np.float32))
+    assert not rough.plane(1).any()
+    assert not rough.plane(0)[12:].any()

@@ -1,0 +1,24 @@
+"""Images of one picture at any two sizes."""
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+
+
+def resampled(planes: Floats, size: tuple[int, int]) -> Floats:
+    """(h, w, n) float32 at `size`: means over what a pixel covers; where it grows, interpolated.
+
+    size: (height, width).
+    """
+    from PIL import Image
+
+    height, width = size
+    shrinks = width <= planes.shape[1]
+    kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
+    made = [
+        Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
+            (width, height), kernel
+        )
+        for plane in np.moveaxis(planes, -1, 0)
+    ]
+    return np.dstack([np.asarray(plane) for plane in made])
