@@ -29,7 +29,7 @@ from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.steps import Pixels, Region, Step
 from lightpaint.paint.store import Store
-from lightpaint.paint.told import answer_fields
+from lightpaint.paint.told import answer_fields, unpainted_fields
 from lightpaint.paint.wishes import Wishes
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
@@ -185,10 +185,17 @@ class Session:
             return None
         if solution is not None:
             self.answering.weights = solution.weights
+        else:
+            more |= self.unpainted
         answer = answer_fields([view.basis for view in self.views], self.weights)
         for light, known in zip(answer["lights"], of_lights, strict=bool(of_lights)):
             light |= known
         return self.answer(**{**self.about, **more, **answer, "exact": True})
+
+    @property
+    def unpainted(self) -> dict[str, Any]:
+        """What is said of the answer while nothing is painted."""
+        return unpainted_fields(is_asked=bool(self.wishes.lights))
 
     @property
     def about(self) -> dict[str, Any]:

@@ -145,6 +145,8 @@ class Studio:
             known = self._known if self._known.get("version") == session.version else {}
             bases = [view.basis for view in session.views]
             answer = {**answer_fields(bases, session.weights), **known}
+            if not session.is_painted:
+                answer |= session.unpainted
             arrays = session.weights_array
             return Message("state", {**about, **session.about, "answer": answer}, arrays)
 

@@ -107,6 +107,16 @@ def analysis_fields(analyses: Sequence[Analysis], painted: Sequence[int]) -> dic
     }
 
 
+def unpainted_fields(*, is_asked: bool) -> dict[str, Any]:
+    """What is said before anything is painted, and after all of it has been undone.
+
+    is_asked: whether something is asked of the lights.
+    """
+    stay = "the lights stay as they are, but for what you ask of them"
+    said = f"Nothing is painted: {stay if is_asked else 'the answer is the present lighting'}."
+    return {"headline": said, "of_views": None}
+
+
 def sketched(seen: Seen) -> str:
     """How far a painting in progress has come, and what would bring it further: no judgement yet.
 

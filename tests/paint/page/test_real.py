@@ -36,6 +36,8 @@ H, W, N = 54, 96, 3
 #: What goes wrong in the page and is none of its: a picture that a test reads has to be waited for.
 OURS = "ReadPixels"
 
+UNPAINTED = "Nothing is painted: the answer is the present lighting."
+
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
@@ -333,6 +335,23 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     me.ready()
     assert not session.is_open
     assert not session.wishes.lights
+
+
+def test_what_is_said_while_nothing_is_painted(served: Served, opened: Any) -> None:
+    me = opened(served).ready()
+    said, rows = me.page.locator(".headline"), me.page.locator(".lights")
+    until(lambda: said.inner_text() == UNPAINTED, "it is not said at the start")
+    me.press("0").stroke((60, 30), (80, 30)).still("brush")
+    me.page.get_by_text("ΔE").first.wait_for()
+    until(lambda: "±" in rows.inner_text(), "it is not said how sure lights are")
+    me.page.reload()
+    me.ready().press("Control+z").still()
+    until(lambda: said.inner_text() == UNPAINTED, "it is not said after all is undone")
+    assert "±" not in rows.inner_text()
+    slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
+    slider.press("ArrowRight")
+    me.still("light 1")
+    until(lambda: "but for what you ask of them" in said.inner_text(), "it is said as before")
 
 
 def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(

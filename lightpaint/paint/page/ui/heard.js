@@ -54,10 +54,13 @@ function answerFields(answer, before) {
   const made = { isLive: false };
   if (headline !== undefined)
     Object.assign(made, { ofViews }, seenOf({ ...answer, ofViews }, before));
+  // Without paint there is nothing to be sure of, or to be held back from.
+  const known = made.deltaE === null && !ofViews ? UNKNOWN : {};
   if (lights) {
     made.shares = shares;
     made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
       ...before.lit[k],
+      ...known,
       ...one,
       share: shares?.[before.view]?.[k] ?? one.share,
     }));
@@ -68,7 +71,7 @@ function answerFields(answer, before) {
 /** How close the view is that is shown. @param {any} answer @param {Ui} ui @returns {Partial<Ui>} */
 function seenOf(answer, { view, views }) {
   const isOne = views.length < 2;
-  const its = isOne ? answer : answer.ofViews?.[view];
+  const its = isOne || !answer.ofViews ? answer : answer.ofViews[view];
   if (!its) return { headline: UNPAINTED, deltaE: null, deltaAsked: null, sentences: [] };
   return {
     headline: its.headline,
@@ -79,6 +82,8 @@ function seenOf(answer, { view, views }) {
 }
 
 const UNPAINTED = 'Nothing is painted in this view: it goes with the others.';
+
+const UNKNOWN = { error: null, held: false, unreached: false };
 
 /** What changes with the view that is shown. @param {Ui} ui @param {number} view
  * @returns {Partial<Ui>} */
@@ -131,8 +136,8 @@ export function answerOf(message, ui) {
   if (message.lights) Object.assign(made, answerFields(message, ui));
   else if (!message.exact) {
     made.isLive = true;
-    // What was said of a view before it was painted is so no more.
-    if (ui.headline === UNPAINTED) made.headline = '';
+    // What was said before anything was painted is so no more.
+    if (ui.deltaE === null) made.headline = '';
   }
   if (made.weights) {
     const old = Object.entries(ui.verifiedOf).map(([view, one]) => [view, { ...one, isOld: true }]);

@@ -46,7 +46,7 @@ export function LightsPanel({ ui, hands }) {
       html`<p class="note"><span>Some lights are not shown. The answer has them
       all.</span> <${Button} label="Show all" act=${() => store.set({ solo: [], mute: [] })} /></p>`
     }
-    ${!found.length && html`<p class="faint">No light is called so.</p>`}
+    ${ui.ready && !found.length && html`<p class="faint">No light is called so.</p>`}
     ${groups.map(({ name, members }) =>
       name === null
         ? members.map((k) => row(ui, hands, k, isMany))

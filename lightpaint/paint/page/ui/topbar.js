@@ -69,6 +69,7 @@ export function TopBar({ ui, hands }) {
 /** @param {{ui: Ui, hands: Hands}} props */
 function ViewChoice({ ui, hands }) {
   const { show } = ui;
+  if (!ui.ready) return null;
   const names = (ui.state?.transforms ?? []).map((/** @type {any} */ one) => one.name ?? one);
   return html`<${Select} label="View" hidden value=${show.transform}
     tip="View transform: how light becomes what the display shows"

@@ -101,10 +101,7 @@ const DELTA_E =
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
   const { store, session } = hands;
-  const first = ui.state?.first && !ui.history.undo.length;
-  const text = first
-    ? 'Nothing is painted yet: the answer is the present lighting.'
-    : ui.headline || 'Finding the lighting …';
+  const text = ui.headline || (ui.ready ? 'Finding the lighting …' : '');
   return html`<div class="answer">
     <p class="headline" role="status">
       ${
@@ -114,7 +111,6 @@ export function AnswerLine({ ui, hands }) {
       }
       <span class="said" data-tip=${text.length > 100 ? text : undefined}>${text}</span>
       ${
-        !first &&
         ui.deltaE !== null &&
         html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
           ui.deltaAsked !== null && `, was ${number(ui.deltaAsked, 2)}`
@@ -123,12 +119,14 @@ export function AnswerLine({ ui, hands }) {
     </p>
     ${
       !ui.readonly &&
+      ui.ready &&
       html`<${Button} label="Keep look" icon="plus" keys="Control+S"
       tip="Keep painting and answer under a name"
       act=${() => session.send('save_look', { name: `Look ${ui.looks.length + 1}` })} />`
     }
     ${
       !ui.open.truth &&
+      ui.ready &&
       html`<${Button} label="How true?" act=${() =>
         store.set({ side: true, open: { ...ui.open, truth: true } })} />`
     }
