@@ -121,6 +121,9 @@ class Errands:
         self._place.tell(Message("verified", about))
 
     def _explain(self, asked: protocol.Explain) -> None:
-        said, beyond = self._place.now()[0].beyond(asked.view)
+        moment, _ = self._place.now()
+        said, beyond = moment.beyond(asked.view)
         self._place.put(of_view("beyond", asked.view), beyond)
-        self._place.tell(Message("explained", {"sentences": said, "view": asked.view}))
+        is_old = self._place.now()[0].version != moment.version
+        fields = {"sentences": said, "view": asked.view, "is_old": is_old}
+        self._place.tell(Message("explained", fields))

@@ -158,6 +158,24 @@ def test_asking_by_numbers_is_exact_in_an_object(page: Any):
     np.testing.assert_array_equal(image[:, :40], 0.5)
 
 
+def test_strokes_over_what_was_asked_of_all_count_more_than_it(page: Any):
+    """As they do beside what is not painted, which is held by three times as much."""
+    objects = np.zeros((H, W), int)
+    objects[:, : W // 10] = 1
+    all_ = "hand.askFor(canvas, {{ stops: {}, mired: 0, object: null }});".format
+    path = stroke("rgb: [1, 1, 1], size: 8, hardness: 1, flow: 1", place(30, 30), place(50, 30))
+    image, importance = painted(page, all_(-1) + "{" + path + "}" + all_(-1), light=0.5)
+    np.testing.assert_allclose([image[30, 40, 0], image[5, 70, 0]], [0.5, 0.125], rtol=1e-6)
+    assert importance[30, 40] == 10
+    assert importance[5, 70] == 1
+    script = all_(-1) + "hand.askFor(canvas, { stops: 1, mired: 0, object: 1 });"
+    _, importance = painted(page, script, light=0.5, objects=objects)
+    rest, its = importance[objects == 0], importance[objects == 1]
+    np.testing.assert_allclose(rest.sum() / its.sum(), 3, rtol=1e-6)
+    # Where something is not painted, that is held, and paint counts as it is.
+    assert painted(page, path, light=0.5)[1].max() == 1
+
+
 @pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "ask"])
 def test_a_dropped_stroke_has_never_been(page: Any, tool: str):
     first = "{" + stroke("rgb: [1, 2, 3], hardness: 0", place(30, 30), place(60, 50)) + "}"

@@ -367,6 +367,28 @@ def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
     assert alone == sorted(alone, reverse=True)
 
 
+def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> None:
+    legend, press = painter.page.locator(".legend"), painter.page.keyboard.press
+    painter.page.locator(".stage").focus()
+    assert legend.count() == 0
+    press("o")
+    assert "too dark" in legend.inner_text()
+    press("o")  # asks for what it shows
+    painter.page.get_by_text("Out of reach", exact=True).wait_for()
+    asked = len(painter.said("explain"))
+    assert asked == 1
+    # An answer to an earlier painting is none.
+    painter.tell(kind="explained", sentences=["Old"], view=0, is_old=True)
+    painter.page.wait_for_timeout(50)
+    assert len(painter.said("explain")) == asked + 1
+    press("o")
+    assert "grey" in legend.inner_text()
+    press("o")
+    assert "counts" in legend.inner_text()
+    press("o")
+    assert legend.count() == 0
+
+
 def test_truth(painter: Painter) -> None:
     painter.button("How true?").click()
     painter.button("False colour").click()

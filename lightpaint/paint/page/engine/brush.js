@@ -80,16 +80,20 @@ export class Path {
 export function fill(canvas, object, flow) {
   const { objects, width } = canvas;
   const region = objects ? around(objects, width, object) : canvas.whole;
+  let count = 0;
   canvas.cover(region, (x, y, before) => {
     const isIn = !objects || objects[y * width + x] === object;
+    if (isIn) count += 1;
     return isIn ? before + flow * (1 - before) : before;
   });
+  canvas.covers(count / canvas.importance.length);
   return region;
 }
 
 /** Cover everything. @param {PaintCanvas} canvas @returns {Region} */
 export function flood(canvas) {
   canvas.cover(canvas.whole, () => 1);
+  canvas.covers(1);
   return canvas.whole;
 }
 

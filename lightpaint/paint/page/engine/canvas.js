@@ -22,6 +22,11 @@ const TILE = 64;
 /** Importance below which a pixel is not painted. */
 const DUST = 1e-3;
 
+/** Importance of the rest of a picture beside that of a stroke, and of a stroke over a pixel that
+ * was painted, at most: that makes up for a stroke over a thirtieth of the picture. */
+const REST = 3;
+const OVER = 10;
+
 /** What halves can hold, so that both views can show it. */
 const MOST = 65504;
 
@@ -36,12 +41,16 @@ export class PaintCanvas {
     this.importance = new Float32Array(height * width);
     /** (h, w, 3) halves. @type {Uint16Array | null} */
     this.albedo = null;
+    /** Whether there was no pixel without paint before the stroke. */
+    this.isAll = false;
     /** Which object each pixel shows, -1 for none. @type {Int16Array | null} */
     this.objects = null;
     /** @type {Map<number, Tile> | null} */
     this.tiles = null;
     /** Where the stroke has been. @type {Region | null} */
     this.region = null;
+    /** Importance of what the stroke paints. */
+    this.full = 1;
   }
 
   /** @returns {Region} */
@@ -63,6 +72,17 @@ export class PaintCanvas {
   begin() {
     this.tiles = new Map();
     this.region = null;
+    this.isAll = this.importance.every((x) => x >= 1);
+    this.covers(0);
+  }
+
+  /**
+   * The stroke covers this part of the picture, as far as is known: over a picture of which all is
+   * painted (a whole that was asked to be darker, say) it is to come about as it does over one that
+   * is not, of which the rest is held. @param {number} part
+   */
+  covers(part) {
+    this.full = this.isAll ? Math.min(OVER, Math.max(1, (1 - part) / (REST * part))) : 1;
   }
 
   /** Cover pixels with the stroke.

@@ -25,10 +25,11 @@ export function changing(canvas, effect) {
       image[3 * p + c] = before + covered * (to(c) - before);
     }
   };
+  const { full } = canvas;
   /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
   const count = (tile, q, p, covered) => {
     const before = tile.importance[q];
-    importance[p] = before < 1 ? before + covered * (1 - before) : before;
+    importance[p] = before < full ? before + covered * (full - before) : before;
   };
   switch (effect.kind) {
     case 'paint': {

@@ -117,6 +117,13 @@ export function verifiedOf(message, ui) {
   return view === ui.view ? { ...made, verified: message } : made;
 }
 
+/** Why it is not closer, unless somebody has painted on. @param {any} message @param {Ui} ui
+ * @returns {Partial<Ui>} */
+export function explainedOf({ view = 0, sentences, is_old: isOld = false }, ui) {
+  const isIts = view === ui.view && !isOld && !ui.isLive;
+  return { explaining: false, explained: isIts ? sentences : [] };
+}
+
 /** @param {Message} message @returns {Partial<Ui>} */
 function weightsOf(message) {
   const flat = message.arrays?.weights?.data;

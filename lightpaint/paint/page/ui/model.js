@@ -51,6 +51,7 @@ import { ofKelvin } from './colours.js';
  * @property {{done: number, total: number} | null} loading
  * @property {{spp: number, agrees: boolean, text: string, isOld?: boolean} | null} verified
  * @property {string[]} explained
+ * @property {boolean} explaining
  * @property {{files: string[], command: string} | null} exported
  * @property {"wait" | "open" | "lost" | "stale"} connection
  * @property {{reason: string, text: string} | null} closed
@@ -137,6 +138,7 @@ export function first() {
     loading: null,
     verified: null,
     explained: [],
+    explaining: false,
     exported: null,
     connection: 'wait',
     closed: null,

@@ -1,6 +1,7 @@
 /** Talks with the session: what it says becomes state, what a person does becomes messages. */
 
-import { answerOf, progressOf, stateOf, verifiedOf } from './heard.js';
+import { answerOf, explainedOf, progressOf, stateOf, verifiedOf } from './heard.js';
+import { look } from './tools.js';
 
 /** @typedef {import("./engine.js").Host} Host */
 /** @typedef {import("./engine.js").Message} Message */
@@ -82,8 +83,7 @@ export class Session {
       }),
       exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false, writing: null }),
       verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
-      explained: (/** @type {any} */ m) =>
-        (m.view ?? 0) === this.store.value.view ? { explained: m.sentences } : undefined,
+      explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
     })[message.kind]?.(message);
@@ -103,7 +103,9 @@ export class Session {
 
   /** @param {string} text */
   failed(text) {
-    this.store.set({ verifying: null, isWriting: false, writing: null });
+    this.store.set({ verifying: null, explaining: false, isWriting: false, writing: null });
+    // It would be asked for again and again.
+    if (this.store.value.show.overlay === 'beyond') look(this.store, { overlay: null });
     this.toast(text, 'warn');
   }
 
@@ -221,6 +223,7 @@ export class Session {
 
   /** Why the view that is shown is not closer. */
   explain() {
+    this.store.set({ explaining: true });
     return this.send('explain', { view: this.store.value.view });
   }
 

@@ -8,6 +8,7 @@ import { counted } from './format.js';
 import { gainOf, paintOf, shown } from './model.js';
 import { Pointer } from './pointer.js';
 import { look } from './tools.js';
+import { Legend } from './truth.js';
 import { Bar } from './bar.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
@@ -110,6 +111,7 @@ export function Stage({ ui, hands }) {
       <i class="ring" style=${{ '--paint': toHex(ui.colour) }}></i><i class="ring is-twin"></i>
     </div>
     ${panes.map((pane, k) => html`<${Tag} key=${k} ui=${ui} pane=${pane} panes=${panes} />`)}
+    ${ui.ready && html`<${Legend} ui=${ui} hands=${hands} panes=${panes} />`}
     ${ui.show.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} hands=${hands} />`}
     ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} />`}
     ${ui.asking && html`<div class="asking" role="status">${asked(ui.asking)}</div>`}

@@ -1,7 +1,6 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
-import { inView } from '../engine/protocol.js';
-import { html } from '../vendor/preact.js';
+import { html, useEffect } from '../vendor/preact.js';
 import { Bar } from './bar.js';
 import { Button, Choice } from './controls.js';
 import { number } from './format.js';
@@ -10,6 +9,7 @@ import { HINTS, look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
+/** @typedef {import("./engine.js").Pane} Pane */
 
 const OVERLAYS = [
   { value: null, label: 'None' },
@@ -20,7 +20,7 @@ const OVERLAYS = [
 ];
 
 /** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
-const LEGENDS = {
+const MEANINGS = {
   missed: ['too dark', 'fits', 'too bright'],
   beyond: ['in reach', 'out of reach'],
   falsecolor: ['−6 stops', 'grey', '+6'],
@@ -30,24 +30,14 @@ const LEGENDS = {
 /** @param {{ui: Ui, hands: Hands}} props */
 export function TruthPanel({ ui, hands }) {
   const { session, store } = hands;
-  const { overlay } = ui.show;
-  const legend = overlay && LEGENDS[overlay];
-  const choose = (/** @type {any} */ value) => {
-    look(store, { overlay: value });
-    const isThere = ui.resources[inView('beyond', ui.view)] !== undefined;
-    if (value === 'beyond' && !isThere) session.explain();
-  };
+  const choose = (/** @type {any} */ overlay) => look(store, { overlay });
   // The first of them stands below the pictures, too.
   const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
     (text) => text !== ui.headline,
   );
   return html`<div class="truth">
-    <${Choice} label="Over the pictures" value=${overlay} choices=${OVERLAYS} change=${choose} />
-    ${
-      legend &&
-      html`<div class="legend"><i class=${`is-${overlay}`}></i>
-      ${legend.map((text) => html`<span key=${text}>${text}</span>`)}</div>`
-    }
+    <${Choice} label="Over the pictures" value=${ui.show.overlay} choices=${OVERLAYS}
+      change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
     ${
       !ui.readonly &&
@@ -58,6 +48,32 @@ export function TruthPanel({ ui, hands }) {
     </div>`
     }
     ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
+  </div>`;
+}
+
+/** What the colours over a picture mean, on that picture. What is out of reach is found anew when it
+ * is looked at and the answer is another one.
+ * @param {{ui: Ui, hands: Hands, panes: Pane[]}} props */
+export function Legend({ ui, hands, panes }) {
+  const { overlay } = ui.show;
+  const isSought = overlay === 'beyond' && ui.deltaE !== null && !ui.isLive && !ui.explained.length;
+  useEffect(() => {
+    if (isSought && !ui.explaining) hands.session.explain();
+  }, [isSought, ui.explaining]);
+  const on = overlay === 'importance' ? 'painting' : 'solution';
+  const pane =
+    panes.find(({ kind }) => kind === on) ?? (overlay === 'falsecolor' ? panes[0] : undefined);
+  if (!overlay || !pane) return null;
+  const { label } = OVERLAYS.find(({ value }) => value === overlay) ?? OVERLAYS[0];
+  const isOld = overlay === 'beyond' && !ui.explained.length;
+  const bottom = Math.min(pane.y + pane.height, pane.top + ui.state.size[0] * pane.scale);
+  return html`<div class="legend" style=${{
+    top: `${bottom - 8}px`,
+    left: `${Math.max(pane.x, pane.left) + 8}px`,
+  }}>
+    <b>${label}${isOld && ui.deltaE !== null ? ', being found …' : ''}</b>
+    <i class=${`is-${overlay}`}></i>
+    ${MEANINGS[overlay].map((text) => html`<span key=${text}>${text}</span>`)}
   </div>`;
 }
 
