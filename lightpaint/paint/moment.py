@@ -14,9 +14,9 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
+from lightpaint.paint.told import sketched
 from lightpaint.paint.wishes import Wishes
 from lightpaint.report.sentences import what_is_missed
-from lightpaint.report.verdict import headline
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
@@ -83,5 +83,5 @@ class Moment:
         shown = transform.encode(self.bases[view].mix(best.weights))
         missed = np.abs(shown - transform.encode(target.image)).max(axis=-1)
         missed = np.where(target.importance > 0, np.clip(missed, 0, 1), 0)
-        said = [headline(analysis.seen), *what_is_missed(analysis.diagnosis)]
+        said = [sketched(analysis.seen), *what_is_missed(analysis.diagnosis)]
         return said, np.round(255 * missed).astype(np.uint8)

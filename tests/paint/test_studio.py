@@ -282,13 +282,21 @@ def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: P
 
 
 def test_why_it_is_not_closer(heard: Heard):
-    heard.paint(1, 8.0)
-    heard.studio.said(protocol.Explain(), {})
-    message = heard.wait(lambda m: m.kind == "explained")
-    assert message.fields["sentences"]
-    beyond = heard.studio.resource("beyond")
-    assert beyond[4:11, 5:14].max() == 0 or beyond.max() <= 255
-    assert not beyond[heard.studio.session.views[0].importance == 0].any()
+    def explained() -> Any:
+        heard.messages.clear()
+        heard.studio.said(protocol.Explain(), {})
+        message = heard.wait(lambda m: m.kind == "explained")
+        assert message.fields["sentences"]
+        assert not message.fields["is_old"]
+        beyond = heard.studio.resource("beyond")
+        assert not beyond[heard.studio.session.views[0].importance == 0].any()
+        return beyond
+
+    # Brighter than the lights are, and even: they come near. Black beside it: none of them does.
+    heard.paint(1, 0.8)
+    assert explained().max() < 64
+    heard.paint(2, 0.0, (3, 12, 10, 15))
+    assert explained()[3:12, 10:15].max() > 128
 
 
 def test_without_a_scene_there_is_nothing_to_render(heard: Heard):

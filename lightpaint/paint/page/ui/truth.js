@@ -1,6 +1,6 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
-import { html, useEffect } from '../vendor/preact.js';
+import { html, useEffect, useLayoutEffect, useRef } from '../vendor/preact.js';
 import { Bar } from './bar.js';
 import { Button, Choice } from './controls.js';
 import { number } from './format.js';
@@ -91,6 +91,9 @@ function Verify({ ui, hands }) {
 /** @param {{ui: Ui, hands: Hands}} props */
 function Verified({ ui, hands }) {
   const { verified, show } = ui;
+  const frame = useRef(/** @type {HTMLElement | null} */ (null));
+  // It may have come below what there is room for.
+  useLayoutEffect(() => frame.current?.scrollIntoView?.({ block: 'nearest' }), [verified]);
   if (!verified) return null;
   const isShown = show.left === 'solution' && show.right === 'verified';
   const compare = () => {
@@ -102,7 +105,7 @@ function Verified({ ui, hands }) {
         : { left: 'solution', right: 'verified', layout: 'wipe', instead: null },
     );
   };
-  return html`<div class=${`verified ${verified.agrees ? 'is-good' : 'is-bad'}`}>
+  return html`<div ref=${frame} class=${`verified ${verified.agrees ? 'is-good' : 'is-bad'}`}>
     <p><${Icon} name=${verified.agrees ? 'check' : 'warn'} /><span>${verified.text}${
       verified.isOld ? ' (of an earlier answer)' : ''
     }</span></p>
