@@ -22,6 +22,9 @@ Region = tuple[slice, slice]
 #: Pixels that a picture is averaged to in display space, at most: what goes into one strip.
 FILM = STRIP
 
+#: What is left of 1 is 1 less what is painted, in singles, up to this.
+EPSILON = 1e-6
+
 #: Parts of a step in display space that are tried. An answer is one step from the one before.
 PARTS = (1.0, 0.5, 0.25)
 
@@ -31,17 +34,33 @@ class PaintedTiles:
 
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self._importance, self._seen = importance, basis.emitters_seen
-        self._left = np.empty(importance.shape, np.float32)
-        everything = slice(0, len(importance)), slice(0, importance.shape[1])
-        self._leave(everything)
+        self._present = basis.present_weights
         self._paint = TiledEquations(basis.images, image, importance)
+        self._left = np.where(basis.emitters_seen, np.float32(0), np.float32(1))
         rest = basis.images, basis.present_look, self._left
         self._rest = TiledEquations(*rest, like=self._paint)
-        self._is_old: Region | None = None  # where the rest is another by now
+        self._whole = self._rest.base.copy()
+        everything = slice(0, len(importance)), slice(0, importance.shape[1])
+        self._leave(everything)
+        # Where the rest is another by now.
+        self._is_old: Region | None = everything
 
     def _leave(self, region: Region) -> None:
         left = np.maximum(1 - self._importance[region], 0)
         self._left[region] = np.where(self._seen[region], 0, left)
+
+    def _update_rest(self, region: Region) -> None:
+        """Where paint and rest are 1 in every pixel, the rest is what the paint is not."""
+        side = self._rest.side
+        within = tuple(
+            slice(part.start * side, part.stop * side) for part in self._rest.touched(region)
+        )
+        counted = self._importance[within] + self._left[within]
+        one = np.where(self._seen[within], np.float32(0), np.float32(1))
+        if np.abs(counted - one).max(initial=0) <= EPSILON:
+            self._rest.update_as_rest(region, self._whole, self._paint, self._present)
+        else:
+            self._rest.update(region)
 
     def painted(self, region: Region, *, with_importance: bool) -> None:
         self._paint.update(region, with_M=with_importance)
@@ -57,7 +76,7 @@ class PaintedTiles:
         if not rest_weight:
             return equations
         if self._is_old is not None:
-            self._rest.update(self._is_old)
+            self._update_rest(self._is_old)
             self._is_old = None
         rest = self._rest.equations
         return NormalEquations(

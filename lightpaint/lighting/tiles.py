@@ -106,6 +106,31 @@ class TiledEquations:
         for pyramid in (self._M, self._b) if with_M else (self._b,):
             _add_up(pyramid, rows, columns)
 
+    def update_as_rest(
+        self, region: tuple[slice, slice], whole: Doubles, painted: "TiledEquations", w: Doubles
+    ) -> None:
+        """The same, where importance is what `painted` leaves of 1: without looking at pixels.
+
+        whole: the `base` at importance 1. painted: of the same images. w: (n, 3), the weights of
+        which the target is the sum.
+        """
+        rows, columns = self.touched(region)
+        if not (rows and columns):
+            return
+        n = len(self._images)
+        tiles = np.s_[rows.start : rows.stop, columns.start : columns.stop]
+        M = np.subtract(whole[tiles], painted.base[tiles], out=self._M[0][tiles])
+        b = np.matmul(M, w.T[..., None])[..., 0]
+        self._b[0][tiles][..., :n] = b
+        self._b[0][tiles][..., n] = np.einsum("rcki,ik->rck", b, w)
+        for pyramid in (self._M, self._b):
+            _add_up(pyramid, rows, columns)
+
+    @property
+    def base(self) -> Doubles:
+        """M of each tile, (rows, columns, 3, n, n); to look at only."""
+        return self._M[0]
+
     def _sum(self, block: tuple[range, range], *, with_M: bool) -> None:
         """Σ D f g over each of a block of tiles: of images and target, and of pairs of images."""
         n, side = len(self._images), self.side

@@ -1,0 +1,52 @@
+"""The sums behind answers under a brush, against those over the whole picture."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.lighting.live_sums import PaintedTiles
+from lightpaint.lighting.normal_equations import NormalEquations
+
+SIZE = 40, 70
+
+
+@pytest.mark.parametrize("most", [1.0, 10.0])
+@pytest.mark.parametrize("over_seen", [False, True])
+def test_paint_and_rest_are_those_of_the_whole_picture(
+    make_basis: Any, most: float, over_seen: bool
+):
+    """Also where importance is beyond 1, and where an emitter is seen, of which no rest counts."""
+    rng = np.random.default_rng(3)
+    seen = np.zeros(SIZE, bool)
+    seen[10:20, 30:50] = True
+    basis = make_basis(4, SIZE, seen=seen)
+    image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    tiles = PaintedTiles(basis, image, importance)
+    for top, left in ((0, 0), (12, 25), (30, 60), (12, 25)):
+        region = slice(top, top + 12), slice(left, left + 17)
+        shape = importance[region].shape
+        image[region] = rng.random((*shape, 3))
+        importance[region] = most * rng.random(shape) * (over_seen | ~seen[region])
+        tiles.painted(region, with_importance=True)
+        made = tiles.equations(2.5)
+        left_of_1 = np.where(seen, 0, np.maximum(1 - importance.astype(np.float64), 0))
+        paint = NormalEquations.of(basis, image, importance)
+        rest = NormalEquations.of(basis, basis.present_look, left_of_1).times(2.5)
+        for name in ("M", "b", "target_norm2"):
+            expected = getattr(paint, name) + getattr(rest, name)
+            # The present look, and what is left of 1, are in single precision.
+            np.testing.assert_allclose(getattr(made, name), expected, rtol=1e-6)
+
+
+def test_what_was_painted_first_has_the_same_rest(make_basis: Any):
+    rng = np.random.default_rng(4)
+    basis = make_basis(3, SIZE)
+    image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    before = PaintedTiles(basis, image, importance)
+    importance[5:25, 8:40] = rng.random((20, 32))
+    before.painted((slice(5, 25), slice(8, 40)), with_importance=True)
+    after = PaintedTiles(basis, image, importance)
+    for name in ("M", "b", "target_norm2"):
+        one, other = (getattr(x.equations(1.0), name) for x in (before, after))
+        np.testing.assert_array_equal(one, other)
