@@ -23,6 +23,8 @@ PAGE = Path(__file__).parent / "page"
 #: The module that begins it; a browser gets it with all that it imports.
 ENTRY = "/main.js"
 
+ICON = "/icon.svg"
+
 
 @dataclass(frozen=True)
 class PageFile:
@@ -47,6 +49,9 @@ def page_files(folder: Path = PAGE) -> dict[str, PageFile]:
             table[f"/{place.as_posix()}"] = PageFile(KINDS[path.suffix], path.read_bytes())
     if "/index.html" in table:
         table["/"] = table["/index.html"]
+    if ICON in table:
+        # Some browsers ask for it whatever a page says.
+        table["/favicon.ico"] = table[ICON]
     if root == PAGE.resolve():
         # A browser takes ten milliseconds for each file, whoever serves it.
         table[ENTRY] = PageFile(KINDS[".js"], bundled(ENTRY[1:]).encode())

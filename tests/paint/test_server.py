@@ -254,6 +254,7 @@ def test_the_page_as_it_ships_is_whole_and_keeps_its_policy() -> None:
             for name in imports.findall(text):
                 assert normpath(join(dirname(path), name)) in table, f"{name} in {path}"
     assert any(path.startswith("/vendor/LICENSE") for path in table)
+    assert table["/favicon.ico"].kind == "image/svg+xml"  # browsers ask for it unasked
 
 
 def test_a_link_out_of_the_page_is_no_file_of_it(tmp_path: Path) -> None:
