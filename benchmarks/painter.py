@@ -72,6 +72,14 @@ WATCH = """() => {
 }"""
 
 
+#: Whether all planes have been made anew without grain, and are there.
+CLEAN = """() => {
+  const { loader } = document.getElementById('lightpaint').painter.engine.work;
+  const clean = Object.entries(loader.resources).filter(([name]) => name.startsWith('clean/'));
+  return clean.length && clean.every(([, count]) => count > 1) && !loader.missing().length;
+}"""
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -224,6 +232,8 @@ class Opened:
             "() => document.getElementById('lightpaint').painter?.engine.work.isReady",
             timeout=120_000,
         )
+        # Clean planes of 64 lights take a minute, and both processors.
+        self.page.wait_for_function(CLEAN, timeout=300_000)
         time.sleep(3)
         self.page.evaluate(WATCH)
         return self

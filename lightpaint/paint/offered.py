@@ -31,14 +31,14 @@ def offer_view(
         shelf.offer(of_view(name, view.view), make)
 
     rough = RoughPlanes(basis, view.present)
-    can_rough = basis.knows_noise and view.present.any()
+    is_lit = bool(view.present.any())
     for k, plane in enumerate(basis.images):
         offer(f"plane/{k}", partial(_plane, plane))
         offer(f"thumb/{k}", partial(pictures.small, basis, k))
         name = of_view(f"clean/{k}", view.view)
         if clean is not None:
             shelf.put(name, clean.halves[k])
-        elif can_rough:
+        elif is_lit:
             shelf.offer(name, partial(_rough, rough, k))
         else:
             shelf.withdraw(name)

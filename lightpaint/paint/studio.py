@@ -315,7 +315,6 @@ class Studio:
                 "wanted": wanted or basis.origin.spp,
                 "done": wanted is None or basis.origin.spp >= wanted,
             },
-            "has_noise": basis.knows_noise,
             "first": not session.store.steps,
             "stroke": session.stroke,
             "command": self._errands.command(sensors, session.wishes),
@@ -328,7 +327,7 @@ class Studio:
         """
         for view in self.session.views:
             its = self._cleans.get(view.view)
-            if view.basis.knows_noise and (its is None or not its.is_of(view.basis)):
+            if its is None or not its.is_of(view.basis):
                 self._clean_view(view)
 
     def _clean_view(self, view: Canvas) -> None:

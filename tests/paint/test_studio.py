@@ -171,6 +171,20 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
     heard.studio.close()
 
 
+def test_lights_of_unknown_noise_are_cleaned_too(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Another renderer's groups come with their grain, and nobody says how much."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    origin = replace(basis.origin, halves=(0, 0))
+    none = np.zeros_like(basis.half_differences)
+    unknown = replace(basis, half_differences=none, origin=origin)
+    assert not unknown.knows_noise
+    heard = Heard(tmp_path, unknown)
+    heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+    heard.studio.close()
+
+
 def test_clean_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

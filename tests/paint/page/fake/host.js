@@ -98,7 +98,6 @@ export class FakeHost {
       transform: { name: 'srgb', stops: 0 },
       resources: this.resources,
       can_render: true,
-      has_noise: true,
       stroke: 0,
       looks: this.looks,
       basis: this.isFirst
