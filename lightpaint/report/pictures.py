@@ -103,7 +103,8 @@ def importance_picture(importance: Floats, current: Floats, *, transform: ViewTr
     """The current look in pale yellow where it counts; dimmed and hatched where not."""
     grey = luminance(transform.encode(current))[..., None]
     counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
-    return over_unpainted(counted, coverage(importance), current, transform=transform)
+    most = max(1.0, float(importance.max(initial=0)))
+    return over_unpainted(counted, coverage(importance / most), current, transform=transform)
 
 
 @dataclass(frozen=True)

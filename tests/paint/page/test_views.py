@@ -27,7 +27,7 @@ def pictures(site: Any) -> dict[str, np.ndarray]:
         "scales": scales,
         "weights": weights,
         "painting": np.exp(rng.normal(-1, 1.5, (H, W, 3))).astype(np.float32),
-        "importance": (rng.random((H, W)) < 0.5).astype(np.float32),
+        "importance": rng.choice(np.float32([0, 1, 4]), (H, W)),
         "beyond": rng.integers(0, 256, (H, W)).astype(np.uint8),
     }
     site.arrays |= {f"plane/{k}": plane for k, plane in enumerate(planes)}

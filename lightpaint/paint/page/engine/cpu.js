@@ -9,7 +9,7 @@ import { VALUES, finite, toFloats } from './half.js';
 import { Layer } from './layer.js';
 import { SRGB } from './lut.js';
 import { Mix } from './mix.js';
-import { INKS, falseColour, inked, missed } from './overlay.js';
+import { INKS, falseColour, fullOf, inked, missed } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
@@ -137,7 +137,8 @@ export class CpuView {
     const isImportance = kind === 'painting' && params.overlay === 'importance';
     if (isImportance && layer.stale) layer.forget();
     layer.show(this.lut, params.stops, isImportance ? 'importance' : falseOnly(params), (rgba) => {
-      if (isImportance) inked(rgba, this.importance, 1, INKS.importance, this.grid(1));
+      const { importance } = this;
+      if (isImportance) inked(rgba, importance, fullOf(importance), INKS.importance, this.grid(1));
       else falseColour(rgba, layer.light, 2 ** params.stops);
     });
     return layer;

@@ -7,6 +7,7 @@
 import { mixedAt } from './cpu.js';
 import { Planes } from './gpu.js';
 import { SRGB } from './lut.js';
+import { fullOf } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
@@ -71,6 +72,7 @@ export class GlView {
     this.beyond = null;
     /** @type {Float32Array | null} */
     this.image = null;
+    this.importance = /** @type {Float32Array} */ (new Float32Array(0));
     /** @type {Params | null} */
     this.last = null;
   }
@@ -112,6 +114,7 @@ export class GlView {
   setCanvas(region, image, importance) {
     if (image !== this.image) region = [0, this.size[0], 0, this.size[1]];
     this.image = image;
+    this.importance = importance;
     const texture = this.pictures.get('painting') ?? this.textures.halves();
     this.pictures.set('painting', texture);
     this.textures.setCanvas(texture, region, image, importance);
@@ -190,7 +193,10 @@ export class GlView {
     gl.uniform1i(at('isSrgb'), Number(!lattice));
     gl.uniform1i(at('isSharp'), Number(isSharp));
     gl.uniform1i(at('isSmall'), Number(pane.scale < 0.75));
-    gl.uniform1i(at('overlay'), overlayOf(pane.kind, params));
+    const overlay = overlayOf(pane.kind, params);
+    gl.uniform1i(at('overlay'), overlay);
+    const isImportance = overlay === OVERLAYS.importance;
+    gl.uniform1f(at('full'), isImportance ? fullOf(this.importance) : 1);
     gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }

@@ -89,6 +89,13 @@ export function missed(rgba, painting, importance, grid) {
   });
 }
 
+/** Importance that is shown as all: the greatest, and 1 at least. @param {Float32Array} importance */
+export function fullOf(importance) {
+  let full = 1;
+  for (const x of importance) if (x > full) full = x;
+  return full;
+}
+
 /** @param {Uint8ClampedArray} rgba changed @param {ArrayLike<number>} amounts (h, w)
  * @param {number} most what stands for all @param {number[]} ink @param {Grid} grid */
 export function inked(rgba, amounts, most, ink, grid) {
