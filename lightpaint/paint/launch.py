@@ -28,6 +28,7 @@ from lightpaint.paint.subject import Subject
 from lightpaint.paint.wishes import Wishes
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
+from lightpaint.signals import interruptible_between_pieces
 from lightpaint.sources import (
     NOT_IN_GROUPS,
     RENDERED,
@@ -140,7 +141,8 @@ def paint_in_browser(
         try:
             studio.on_failure = partial(_failed, server)
             opened(server)
-            studio.start()
+            with interruptible_between_pieces():  # who is being started cannot be waited for
+                studio.start()
             with at_hand():
                 server.run()
         finally:
@@ -197,5 +199,5 @@ def wait_for_renders() -> None:
     """Until what renders beside a painter has come to an end."""
     end_s = time.monotonic() + PATIENCE_S
     for thread in threading.enumerate():
-        if thread.name.startswith("lightpaint-"):
+        if thread.name.startswith("lightpaint-") and thread.is_alive():
             thread.join(max(0.0, end_s - time.monotonic()))

@@ -6,6 +6,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import threading
 import urllib.request
 from collections import deque
 from collections.abc import Iterator
@@ -27,7 +28,7 @@ from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.spelling import solve_command
 from lightpaint.paint.frames import Message, of_frame, to_frame
-from lightpaint.paint.launch import subject_of, subjects_of
+from lightpaint.paint.launch import subject_of, subjects_of, wait_for_renders
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.steps import Identity, Step
 from lightpaint.paint.store import Store
@@ -230,6 +231,12 @@ def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[s
 
 def greeted(socket: ClientConnection) -> dict[str, Any]:
     return said(socket, 0, "hello", version=VERSION)
+
+
+def test_who_is_being_started_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C may come just then; Python refuses to wait for a thread that has not begun."""
+    monkeypatch.setattr(threading, "enumerate", lambda: [threading.Thread(name="lightpaint-x")])
+    wait_for_renders()
 
 
 def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:
