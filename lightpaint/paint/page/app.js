@@ -5,7 +5,7 @@ import { ColourPanel } from './ui/colour.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { counted } from './ui/format.js';
-import { press } from './ui/keys.js';
+import { hearWithin, press } from './ui/keys.js';
 import { LightsPanel } from './ui/lights.js';
 import { Looks } from './ui/looks.js';
 import { first } from './ui/model.js';
@@ -36,18 +36,15 @@ export async function mount(element, host, { global = false, readonly = false, e
   const store = new Store({ ...first(), readonly, open: { ...first().open, ...remembered() } });
   const root = document.createElement('div');
   root.className = 'lightpaint';
-  root.dataset.lmSuppressShortcuts = 'true';
+  root.dataset.lmSuppressShortcuts = 'true'; // of JupyterLab, which hears keys before the painter
   element.append(root);
   const session = new Session(host, store);
   const hands = { store, session, engine };
   listen(hands);
   const ends = new AbortController();
-  const target = global ? window : root;
-  target.addEventListener(
-    'keydown',
-    (event) => press(/** @type {KeyboardEvent} */ (event), hands),
-    { signal: ends.signal },
-  );
+  const { signal } = ends;
+  if (global) window.addEventListener('keydown', (event) => press(event, hands), { signal });
+  else hearWithin(root, hands, signal);
   render(html`<${Painter} hands=${hands} root=${() => root} />`, root);
   const close = () => {
     ends.abort();

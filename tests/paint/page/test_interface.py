@@ -538,6 +538,56 @@ def test_in_a_shadow_root_it_looks_the_same(opened: Any) -> None:
     assert shadow.ui("tool") == "eraser"
 
 
+def test_around_it_nothing_hears_its_keys(opened: Any) -> None:
+    """In a notebook `B` makes a cell, Delete deletes the painter's own."""
+    painter = opened("shadow")
+    painter.page.evaluate(
+        "() => { window.heard = [];"
+        " window.addEventListener('keydown', (event) => window.heard.push(event.key)); }"
+    )
+
+    def heard(*keys: str) -> list[str]:
+        painter.page.evaluate("() => { window.heard = []; }")
+        for key in keys:
+            painter.page.keyboard.press(key)
+        return [key for key in painter.page.evaluate("() => window.heard") if key != "Control"]
+
+    painter.stroke()  # the pictures have the focus
+    assert heard("b", "Delete", "7", "d", "Escape", "Shift+Enter", "Alt+ArrowUp") == []
+    assert heard("Control+z", "Control+s", "Control+x", "Control+v", "Control+Enter") == []
+    assert heard("Control+k", "F2") == ["k", "F2"]
+    painter.stroke(modifiers="Space")
+    assert painter.ui("show")["pan"][0] < 0
+    painter.page.get_by_role("textbox").first.focus()
+    assert heard("f", "Delete", "Control+v") == ["v"]
+    painter.page.locator(".top").click(position={"x": 3, "y": 3})  # nothing is there
+    assert heard("e") == []
+    assert painter.ui("tool") == "eraser"
+    # Nor where what had the focus is gone.
+    painter.page.evaluate("() => document.activeElement.shadowRoot.activeElement.blur()")
+    assert painter.page.evaluate("() => document.activeElement === document.body")
+    assert heard("b", "Delete", "?", "Escape", "Delete") == []
+    assert painter.ui("tool") == "brush"
+    painter.page.evaluate(
+        "() => { const cell = document.body.appendChild(document.createElement('textarea'));"
+        " cell.focus(); cell.blur(); }"
+    )
+    assert heard("e") == ["e"]
+    assert painter.ui("tool") == "brush"
+
+
+def test_a_space_is_typed_beside_it(opened: Any) -> None:
+    """Where the pointer rests on the pictures meanwhile."""
+    painter = opened("shadow")
+    painter.page.evaluate(
+        "() => { const cell = document.createElement('p'); cell.contentEditable = 'true';"
+        " document.body.append(cell); cell.focus(); }"
+    )
+    painter.page.mouse.move(*painter.place())
+    painter.page.keyboard.type("a b")
+    assert painter.page.locator("p[contenteditable]").inner_text() == "a b"
+
+
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (1024, 768), (900, 600)])
 def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
     painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})

@@ -158,17 +158,19 @@ const BY_KEY = new Map(
     .map((one) => [one.keys, one]),
 );
 
+/** Some keyboards have [ and ] behind AltGr, which is Ctrl and Alt on some systems.
+ * @param {KeyboardEvent} event */
+const isMod = (event) => (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
+
 /** @param {KeyboardEvent} event @returns {string} */
 function named(event) {
   const key = event.key.toLowerCase();
-  // Some keyboards have [ and ] behind AltGr, which is Ctrl and Alt on some systems.
-  const isMod = (event.ctrlKey || event.metaKey) && !event.getModifierState('AltGraph');
-  if (isMod) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
+  if (isMod(event)) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
   return key === '=' ? '+' : key;
 }
 
 /** @param {KeyboardEvent} event @returns {boolean} whether it belongs to what is typed in */
-function isTyping(event) {
+export function isTyping(event) {
   const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
   const { tagName } = element;
   if (tagName === 'INPUT')
@@ -191,4 +193,45 @@ export function press(event, hands) {
   else if (found) /** @type {any} */ (found).act(hands);
   else return;
   if (name !== 'escape') event.preventDefault();
+}
+
+/** With Ctrl or ⌘, what changes the cells of a notebook: cut, paste, redo, run. */
+const CELLS = ['x', 'v', 'y', 'enter'];
+
+/**
+ * Whether a key is the painter's alone, where it is one thing among others. By a letter or by
+ * Delete a notebook makes and deletes cells; what opens something around the painter, function keys
+ * and most of what has Ctrl or ⌘, does so from here, too.
+ * @param {KeyboardEvent} event that `press` has seen
+ */
+function isOurs(event) {
+  if (event.defaultPrevented) return true;
+  if (isMod(event)) return !isTyping(event) && CELLS.includes(event.key.toLowerCase());
+  return !/^F\d+$/.test(event.key);
+}
+
+/**
+ * The keys of a painter that is one thing among others: nobody else hears them.
+ * @param {HTMLElement} root @param {Hands} hands @param {AbortSignal} signal ends it
+ */
+export function hearWithin(root, hands, signal) {
+  const hear = (/** @type {KeyboardEvent} */ event) => {
+    press(event, hands);
+    if (isOurs(event)) event.stopPropagation();
+  };
+  root.tabIndex = -1; // wherever in it somebody clicks
+  root.addEventListener('keydown', hear, { signal });
+  // What had the focus may be gone, a window or a button with nothing left to do; then nothing has.
+  let isHere = false;
+  const touched = (/** @type {Event} */ event) => {
+    isHere = event.composedPath().includes(root);
+  };
+  const early = { signal, capture: true };
+  window.addEventListener('pointerdown', touched, early);
+  window.addEventListener('focusin', touched, early);
+  window.addEventListener(
+    'keydown',
+    (event) => isHere && event.target === document.body && hear(event),
+    early,
+  );
 }

@@ -5,6 +5,7 @@ import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../
 import { toHex } from './colours.js';
 import { point, ring } from './cursor.js';
 import { counted } from './format.js';
+import { isTyping } from './keys.js';
 import { gainOf, paintOf, shown } from './model.js';
 import { Pointer } from './pointer.js';
 import { look } from './tools.js';
@@ -235,14 +236,16 @@ function useSurface(frame, pointer, hands) {
     on('keydown', (event) => byKeys(event, pointer, engine, store));
     const over = (/** @type {KeyboardEvent} */ event) => {
       const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
-      if (event.code !== 'Space' || inner.matches?.('input[type=text], textarea')) return;
+      if (event.code !== 'Space' || isTyping(event)) return;
       const isHere = element.matches(':hover') || inner === element;
       pointer.isSpace = event.type === 'keydown' && isHere;
       element.classList.toggle('is-panning', pointer.isSpace);
       if (isHere) event.preventDefault();
     };
-    window.addEventListener('keydown', over, { signal: ends.signal });
-    window.addEventListener('keyup', over, { signal: ends.signal });
+    // On its way there, since the painter keeps its keys from what is around it.
+    const early = { signal: ends.signal, capture: true };
+    window.addEventListener('keydown', over, early);
+    window.addEventListener('keyup', over, early);
     return () => ends.abort();
   }, []);
 }
