@@ -576,6 +576,35 @@ def test_around_it_nothing_hears_its_keys(opened: Any) -> None:
     assert painter.ui("tool") == "brush"
 
 
+def test_windows_lie_over_it(opened: Any) -> None:
+    """In a frame as high as all of a notebook; over the frame where hardly any of it is seen."""
+    painter = opened("shadow", viewport={"width": 1280, "height": 5000})
+
+    def shown(key: str, top: int) -> tuple[Any, Any]:
+        painter.page.evaluate(
+            "(top) => { document.getElementById('lightpaint').style = 'position: absolute;"
+            " left: 50px; width: 800px; height: 560px; top: ' + top + 'px'; }",
+            top,
+        )
+        painter.stroke()
+        painter.page.keyboard.press(key)
+        window = painter.page.get_by_role("dialog")
+        boxes = window.bounding_box(), painter.page.locator(".lightpaint").bounding_box()
+        painter.page.keyboard.press("Escape")
+        assert not window.is_visible()
+        return boxes
+
+    window, around = shown("?", 4000)
+    assert window["x"] > around["x"]
+    assert window["x"] + window["width"] < around["x"] + around["width"]
+    assert window["y"] > around["y"]
+    assert window["y"] + window["height"] < around["y"] + around["height"]
+    painter.page.set_viewport_size({"width": 1280, "height": 720})
+    window, around = shown("?", 500)
+    assert 0 < window["y"] < window["y"] + window["height"] < 720
+    assert window["height"] > 300
+
+
 def test_a_space_is_typed_beside_it(opened: Any) -> None:
     """Where the pointer rests on the pictures meanwhile."""
     painter = opened("shadow")

@@ -168,6 +168,27 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
   </section>`;
 }
 
+/** Pixels below which what is seen of a painter is too low for a window. */
+const LOW = 300;
+
+/**
+ * Have a window lie over what is seen of the painter. The middle of the frame may be nowhere near:
+ * VS Code shows all outputs of a notebook in one that is as high as all of them together.
+ * @param {HTMLElement} element
+ */
+function placeOver(element) {
+  const root = /** @type {HTMLElement} */ (element.closest('.lightpaint'));
+  const box = root.getBoundingClientRect();
+  const { clientWidth, clientHeight } = document.documentElement;
+  const [left, right] = [Math.max(0, box.left), Math.max(0, clientWidth - box.right)];
+  let [top, bottom] = [Math.max(0, box.top), Math.max(0, clientHeight - box.bottom)];
+  if (clientHeight - top - bottom < LOW) top = bottom = 0;
+  const lengths = { top, right, bottom, left };
+  for (const [name, length] of Object.entries(lengths)) {
+    element.style.setProperty(`--${name}`, `${length}px`);
+  }
+}
+
 /**
  * A window over the painter that keeps the focus until it is closed; Escape closes it.
  * @param {{title: string, close: () => void, children?: any, class?: string}} props
@@ -181,7 +202,13 @@ export function Dialog({ title, close, children, class: name }) {
       /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement
     );
     if (element && !element.open) element.showModal();
-    return () => before?.focus?.();
+    const place = () => element && placeOver(element);
+    place();
+    window.addEventListener('resize', place);
+    return () => {
+      window.removeEventListener('resize', place);
+      before?.focus?.();
+    };
   }, []);
   return html`<dialog class=${`dialog ${name ?? ''}`} ref=${ref} aria-labelledby=${id}
     onClose=${close} onClick=${(/** @type {any} */ event) => event.target === ref.current && close()}>
