@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, RLock
 from typing import Any
+from weakref import WeakValueDictionary
 
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
@@ -52,6 +53,9 @@ ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
     "constraints": cells.of_constraints,
 }
 
+#: Painters of this process that keep their session in a file, by its path.
+KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
+
 
 class Live(traitlets.Any):  # type: ignore[misc]
     """An object that is looked at when it is set, also where it is None."""
@@ -69,8 +73,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         target: To begin with; of several views a list of them.
         constraints: What is asked of the lights, beside what is asked in the painter.
         transform: To paint through; what is open of it follows from the scene.
-        store: A file to keep the session in, which is gone on with if it is there. Without one
-            what was painted lives as long as the kernel.
+        store: A file to keep the session in, which is gone on with if it is there; a painter of
+            this kernel that has it is closed. Without one what was painted lives as long as the
+            kernel.
         folder: Receives what is exported.
         height: Of the painter, in pixels of the screen.
         settings: Fields of `lp.Settings`, by name.
@@ -126,6 +131,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         asked = {"settings": Settings(**settings), "constraints": constraints}
         subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
         place = None if store is None else Path(store)
+        if place is not None:
+            if (before := KEPT_IN.get(place.resolve())) is not None:
+                before.close()  # its cell runs again
+            KEPT_IN[place.resolve()] = self
         self._studio = Studio(
             subjects, lambda its: MemoryStore(its) if place is None else Store.open(place, its)
         )

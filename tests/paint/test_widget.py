@@ -299,6 +299,19 @@ def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_: Any, tmp_path: Pa
     np.testing.assert_array_equal(again.target.image, basis.images[2])
 
 
+def test_a_cell_with_a_file_runs_again(
+    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    painter = open_(store=tmp_path / "evening.db")
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    page.paint(basis.images[2])
+    monkeypatch.chdir(tmp_path)
+    again = open_(store="evening.db")
+    assert painter.comm is None
+    np.testing.assert_array_equal(again.target.image, basis.images[2])
+
+
 def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     importlib.import_module("lightpaint.paint.widget")
     monkeypatch.delitem(sys.modules, "lightpaint.paint.widget")
