@@ -190,7 +190,8 @@ def serve(case: str, asked: str, space: str) -> None:
             "made up",
             Path(folder),
             basis=made_up(n, height, width),
-            settings=Settings(space=space or None),  # type: ignore[arg-type]
+            # Those that were kept would be there at once, as rough ones are.
+            settings=Settings(space=space or None, use_cache=False),  # type: ignore[arg-type]
             constraints=lp.Constraints.of(json.loads(asked)),
         )
         studio = Studio([subject], partial(Store.open, Path(folder) / "made_up.lightpaint"))
