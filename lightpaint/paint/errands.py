@@ -1,7 +1,7 @@
 """What somebody asks for that takes long: exports, the verifying render, why it is not closer."""
 
 from collections.abc import Callable, Sequence
-from threading import Lock
+from contextlib import nullcontext
 from typing import Any, Protocol
 
 from lightpaint.basis.clean import as_halves
@@ -9,7 +9,7 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import protocol
-from lightpaint.paint.beside import StoppedError, later
+from lightpaint.paint.beside import StoppedError, Turns, later
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.pictures import Picture
@@ -25,6 +25,7 @@ class Place(Protocol):
     """What an errand wants of the studio it goes out from."""
 
     subjects: tuple[Subject, ...]
+    turns: Turns
 
     def now(self) -> tuple[Moment, Lighting]:
         """What is painted and asked, and the last answer."""
@@ -44,7 +45,7 @@ class Errands:
 
     def __init__(self, place: Place) -> None:
         self._place = place
-        self._render, self._renders = Lock(), False
+        self._renders = False
 
     def said(self, message: Asked) -> list[Message]:
         """Begin with it. Raises PaintError for what there is not."""
@@ -95,7 +96,8 @@ class Errands:
             del label  # what it is at within an export is no news to a page
             self._place.hears("export", done, total, unit)
 
-        with self._render:
+        renders = self._subject(0).scene is not None and {"relit", "report"} & set(message.what)
+        with self._place.turns.errand() if renders else nullcontext():
             files = export(self._place.subjects, moment, lighting, message.what, hears)
         command = self.command(moment.painted_sensors, moment.wishes)
         fields = {"files": [str(x) for x in files], "command": command}
@@ -113,7 +115,7 @@ class Errands:
 
         self._renders = True
         progress: Progress = hears
-        with self._render:
+        with self._place.turns.errand():
             basis = moment.bases[asked.view]
             picture, said, agrees = verified(self._subject(asked.view), basis, lighting, progress)
         self._place.put(of_view("verified", asked.view), as_halves(picture))
