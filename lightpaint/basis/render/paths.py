@@ -64,7 +64,12 @@ class Planes:
         self._pixel, self._pixels = pixel, pixels
 
     def add(self, emitter, value, active):
-        """Add RGB values to the plane of the light that `emitter` belongs to."""
+        """Add RGB values to the plane of the light that `emitter` belongs to.
+
+        What is no number, as one path in a hundred million carries, is left out: a pixel of it
+        would make all sums over the picture none.
+        """
+        active = active & dr.all(dr.isfinite(value))
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         light = dr.gather(mi.UInt32, self._light_of, instance, active)
         row = dr.fma(light, self._pixels, self._pixel)

@@ -498,3 +498,22 @@ def test_what_does_not_fit_is_refused_before_it_is_tried(tmp_path: Path) -> None
 def test_too_few_samples_are_refused(small_room: Scene) -> None:
     with pytest.raises(SceneError, match="too few for two halves"):
         render_basis(small_room, spp=1)
+
+
+def test_what_is_no_number_is_left_out(small_room: Scene) -> None:
+    """One such path in a pixel would make every sum over the picture none."""
+    # What there is of Dr.Jit depends on the variant, which a scene that was loaded has set.
+    import drjit as dr
+    import mitsuba as mi
+
+    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.paths import Planes
+
+    tracer = Tracer(small_room, 0, None)
+    planes, seen = dr.zeros(mi.Float, 3 * len(small_room.lights)), dr.zeros(mi.Float, 1)
+    into = Planes(planes, seen, tracer.light_of, mi.UInt32(0), mi.UInt32(1))
+    emitter = dr.gather(mi.EmitterPtr, tracer.loaded.emitters_dr(), mi.UInt32(0, 0, 0))
+    value = mi.Color3f(mi.Float(1, np.nan, 2), mi.Float(1, 1, np.inf), mi.Float(1, 1, 1))
+    into.add(emitter, value, mi.Bool(True))
+    assert np.sort(np.array(planes))[-3:].tolist() == [1, 1, 1]
+    tracer.close()
