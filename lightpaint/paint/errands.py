@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from threading import Lock
 from typing import Any, Protocol
 
 from lightpaint.basis.clean import as_halves
@@ -45,7 +46,7 @@ class Errands:
 
     def __init__(self, place: Place) -> None:
         self._place = place
-        self._renders = False
+        self._writes, self._renders = Lock(), False
 
     def said(self, message: Asked) -> list[Message]:
         """Begin with it. Raises PaintError for what there is not."""
@@ -97,7 +98,7 @@ class Errands:
             self._place.hears("export", done, total, unit)
 
         renders = self._subject(0).scene is not None and {"relit", "report"} & set(message.what)
-        with self._place.turns.errand() if renders else nullcontext():
+        with self._writes, self._place.turns.errand() if renders else nullcontext():
             files = export(self._place.subjects, moment, lighting, message.what, hears)
         command = self.command(moment.painted_sensors, moment.wishes)
         fields = {"files": [str(x) for x in files], "command": command}

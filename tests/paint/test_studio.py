@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import protocol, studio
+from lightpaint.paint import exports, protocol, studio
 from lightpaint.paint.beside import Turns
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
@@ -125,6 +125,30 @@ def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_pat
     np.testing.assert_allclose(
         [emission[name] for name in basis.names], exact.arrays["weights"], rtol=1e-12
     )
+
+
+def test_one_export_is_written_at_a_time(heard: Heard, monkeypatch: pytest.MonkeyPatch):
+    """Also of what needs no render: they go to the same files."""
+    at_work, most = 0, 0
+    real = exports.export
+
+    def export(*given: Any) -> Any:
+        nonlocal at_work, most
+        at_work += 1
+        most = max(most, at_work)
+        time.sleep(0.1)
+        try:
+            return real(*given)
+        finally:
+            at_work -= 1
+
+    monkeypatch.setattr(exports, "export", export)
+    heard.paint(1, 0.8)
+    heard.exact()
+    for _ in range(3):
+        heard.studio.said(protocol.Export(("target", "lighting")), {})
+    heard.wait(lambda _: sum(m.kind == "exported" for m in heard.messages) == 3)
+    assert most == 1
 
 
 def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
