@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.steps import Identity, KeptLook, Patch, Seen, Step
 from lightpaint.paint.store import Store
 
@@ -13,15 +14,17 @@ IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (Seen("camera", SIZE)
 
 
 def patch(rng: np.random.Generator, size: tuple[int, int] = SIZE) -> Patch:
-    """Some region, with light and importance before and after; also none at all."""
+    """Some region, with what is painted before and after; also none at all."""
     (top, bottom), (left, right) = (sorted(rng.integers(0, n + 1, 2).tolist()) for n in size)
     shape = bottom - top, right - left
+    marks = [None if rng.random() < 0.5 else rng.random((*shape, 3)) < 0.1 for _ in range(2)]
     pixels = [
-        (
+        Pixels(
             rng.standard_normal((*shape, 3)).astype(np.float32),
             rng.integers(0, 3, shape).astype(np.float32),
-        )
-        for _ in range(2)
+            at_least,
+        ).copy()
+        for at_least in marks
     ]
     return Patch((top, bottom, left, right), pixels[0], pixels[1])
 
@@ -45,7 +48,8 @@ def look(number: int, of: int) -> KeptLook:
 
 
 def told(pixels: Any) -> Any:
-    return None if pixels is None else tuple((x.shape, x.dtype.str, x.tobytes()) for x in pixels)
+    found = [None if x is None else (x.shape, x.dtype.str, x.tobytes()) for x in pixels or ()]
+    return None if pixels is None else tuple(found)
 
 
 def content(store: Store) -> Any:
@@ -68,7 +72,7 @@ def content(store: Store) -> Any:
 def big(number: int) -> Step:
     """A step of some 30 kB."""
     rng = np.random.default_rng(number)
-    light = rng.random((30, 40, 3)).astype(np.float32), np.ones((30, 40), np.float32)
+    light = Pixels(rng.random((30, 40, 3)).astype(np.float32), np.ones((30, 40), np.float32))
     return Step("stroke", f"big {number}", {}, (Patch((0, 30, 0, 40), light, light),))
 
 

@@ -15,11 +15,14 @@ from lightpaint.files import one_line
 from lightpaint.images.bitmap import Bitmap, read_bitmap
 from lightpaint.images.decode import light_of_floats, light_of_integers, transform_of, unpremultiply
 from lightpaint.images.exr import Part, read_parts
-from lightpaint.images.exr_layers import ALPHA_NAMES, Layer, choose_layer
+from lightpaint.images.exr_layers import ALPHA_NAMES, RGB_NAMES, Layer, choose_layer
 from lightpaint.images.kinds import head_of, kind_of, name_of
 from lightpaint.images.layered import LAYERED, layered_kind, read_merged
 
 Mask = npt.NDArray[np.bool_]
+
+#: Layer of an EXR, within the painting's own, that is not 0 where brighter is as good.
+AT_LEAST = "at_least"
 
 #: JPEG's rounding keeps white within so many codes of the top.
 JPEG_WHITE = 2
@@ -35,7 +38,8 @@ class Picture:
     alpha: (h, w) float32, None if there is none or all of an integer file is opaque.
     weight: (h, w) float32, an EXR's channel W; RGB is then taken as it is.
     stored: (h, w), where the file has a pixel; None if everywhere.
-    saturated: (h, w, 3), where the file cannot say more: the light is at least that of `image`.
+    saturated: (h, w, 3), where the light is at least that of `image`: the file cannot say more, or
+    its layer `at_least` says so.
     transform: what the numbers were decoded by; None if the file holds light.
     codes: largest integer of the file's numbers; None for floats.
     lossy: whether compression changed the numbers beyond that rounding.
@@ -149,9 +153,20 @@ def _of_layer(layer: Layer) -> Picture:
         alpha=alpha,
         weight=weight,
         stored=_stored(stored_part),
+        saturated=_at_least(layer),
         notes=notes,
         attributes=stored_part.attributes,
     )
+
+
+def _at_least(layer: Layer) -> Mask | None:
+    """Where an EXR says so, as a painting of 8 bits does with its largest code."""
+    inner = replace(layer, prefix=f"{layer.prefix}.{AT_LEAST}" if layer.prefix else AT_LEAST)
+    marks = [inner.channel(*names) for names in zip(*RGB_NAMES, strict=True)]
+    if all(mark is None for mark in marks):
+        return None
+    nowhere = np.zeros(layer.part.size, np.bool_)
+    return np.stack([nowhere if mark is None else mark > 0 for mark in marks], axis=-1)
 
 
 def _stored(part: Part) -> Mask | None:

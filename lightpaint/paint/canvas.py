@@ -10,7 +10,8 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live_view import LiveView
-from lightpaint.paint.steps import Patch, Pixels, Region, Step, painted_by
+from lightpaint.paint.pixels import Pixels, Region, slices
+from lightpaint.paint.steps import Patch, Step, painted_by
 
 #: Importance of a pixel beyond which it is a slip, and light, beside the present look's brightest.
 MOST, BRIGHTEST = 1e4, 1e9
@@ -23,7 +24,7 @@ class Canvas:
         basis: What the lights do in it.
         present: (h, w, 3) linear, the present look without its grain: what shows where nothing is
             painted.
-        image: (h, w, 3) linear; importance: (h, w): the painting.
+        painting: All that is painted; `at_least` is None as long as nothing has been so.
         live: The sums that follow it.
     """
 
@@ -36,14 +37,23 @@ class Canvas:
         """Go on with a basis of more samples, from steps that are done; an open stroke stays."""
         painted = [(region, self.pixels(region)) for region, _ in self._open]
         self.basis, self.present = basis, np.asarray(present, np.float32)
-        empty = np.zeros(basis.size, np.float32)
-        self.image, self.importance = painted_by(steps, (self.present, empty), self.view)
+        self.painting = painted_by(steps, Pixels.unpainted(self.present), self.view)
         unpainted = self.importance == 0
         self.image[unpainted] = self.present[unpainted]
         self.live = LiveView(basis, self.image, self.importance)
         self._open = []
         for region, pixels in painted:
-            self.paint(region, pixels)
+            self._lay(region, pixels)
+
+    @property
+    def image(self) -> npt.NDArray[np.float32]:
+        """(h, w, 3) linear; where nothing is painted, the present look."""
+        return self.painting.image
+
+    @property
+    def importance(self) -> npt.NDArray[np.float32]:
+        """(h, w), above 0 where something is painted."""
+        return self.painting.importance
 
     @property
     def name(self) -> str:
@@ -72,21 +82,27 @@ class Canvas:
 
     def pixels(self, region: Region) -> Pixels:
         """What the canvas holds there, as arrays of their own."""
-        where = _slices(region)
-        return self.image[where].copy(), self.importance[where].copy()
+        return self.painting.part(region).copy()
 
     def put(self, region: Region, pixels: Pixels) -> None:
         """Pixels onto the canvas; what is not painted shows the present look."""
-        where = _slices(region)
-        image, importance = pixels
+        where = slices(region)
+        image, importance, at_least = pixels
         painted = (importance > 0)[..., None]
         self.image[where] = np.where(painted, image, self.present[where])
         same = np.array_equal(self.importance[where], importance)
         self.importance[where] = importance
+        if at_least is not None and self.painting.at_least is None:
+            self.painting = self.painting._replace(at_least=np.zeros(self.image.shape, bool))
+        if self.painting.at_least is not None:
+            self.painting.at_least[where] = False if at_least is None else at_least & painted
         self.live.painted(where, with_importance=not same)
 
     def paint(self, region: Region, pixels: Pixels) -> None:
-        """The same, as part of the stroke that is open from now on."""
+        """The same, of somebody's hand: part of the stroke that is open from now on."""
+        self._lay(region, _marked(pixels, self.painting.part(region)))
+
+    def _lay(self, region: Region, pixels: Pixels) -> None:
         self._open.append((region, self.pixels(region)))
         self.put(region, pixels)
 
@@ -104,15 +120,27 @@ class Canvas:
         if region[0] == region[1] or region[2] == region[3]:
             return None
         after = self.pixels(region)
-        image, importance = (x.copy() for x in after)
-        for (top, bottom, left, right), pixels in reversed(self._open):
-            part = np.s_[top - region[0] : bottom - region[0], left - region[2] : right - region[2]]
-            image[part], importance[part] = pixels
-        before = image, importance
+        before = self._before(region)
+        if before.at_least is not None:
+            # A stroke changes its mind as long as it lasts: what it left alone means what it did.
+            after = _marked(after, before)
+            self.put(region, after)
         # What is sent again, since its answer was lost, is there already.
-        if all(np.array_equal(a, b) for a, b in zip(before, after, strict=True)):
+        if before.same(after):
             return None
         return Patch(region, before, after, self.view)
+
+    def _before(self, region: Region) -> Pixels:
+        """What there was before the stroke that is open, which is all within `region`."""
+        image, importance, at_least = self.pixels(region)
+        if self.painting.at_least is not None and at_least is None:
+            at_least = np.zeros(image.shape, bool)
+        for (top, bottom, left, right), pixels in reversed(self._open):
+            part = np.s_[top - region[0] : bottom - region[0], left - region[2] : right - region[2]]
+            image[part], importance[part] = pixels.image, pixels.importance
+            if at_least is not None:
+                at_least[part] = False if pixels.at_least is None else pixels.at_least
+        return Pixels(image, importance, at_least).copy()
 
     def close(self) -> None:
         """The stroke that is open is done."""
@@ -138,8 +166,11 @@ class Canvas:
         if importance.size and not (importance.min() >= 0 and importance.max() <= MOST):
             raise PaintError(f"importance beyond 0 to {MOST:g}")
         if image.size and not (image.min() >= 0 and image.max() <= BRIGHTEST):
-            raise PaintError(f"light beyond 0 to {BRIGHTEST:g}")
-        return image.astype(np.float32), importance.astype(np.float32)
+            # A target of a cell may hold such light, which a stroke beside it carries along.
+            beyond = (image < 0) | (image > BRIGHTEST)
+            if not np.array_equal(image[beyond], self.image[slices(region)][beyond]):
+                raise PaintError(f"light beyond 0 to {BRIGHTEST:g}")
+        return Pixels(image.astype(np.float32), importance.astype(np.float32))
 
 
 class Canvases:
@@ -208,16 +239,20 @@ class Canvases:
     def instead(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
         """What it changes to have these, by view, instead of all that is painted."""
         made = []
-        for k, (image, importance) in paintings.items():
+        for k, (image, importance, at_least) in paintings.items():
             view = self[k]
-            given = np.asarray(image, np.float32), np.asarray(importance, np.float32)
+            light, counts = np.asarray(image, np.float32), np.asarray(importance, np.float32)
+            given = Pixels(light, counts, at_least).copy()
             made.append(Patch(view.whole, view.pixels(view.whole), given, k))
         return tuple(made)
 
 
-def _slices(region: Region) -> tuple[slice, slice]:
-    top, bottom, left, right = region
-    return slice(top, bottom), slice(left, right)
+def _marked(pixels: Pixels, before: Pixels) -> Pixels:
+    """Pixels that say "at least" where they are those of before that said so."""
+    if before.at_least is None:
+        return pixels
+    left_alone = (pixels.image == before.image).all(axis=-1) & (pixels.importance > 0)
+    return pixels._replace(at_least=before.at_least & left_alone[..., None])
 
 
 def _around(regions: list[Region]) -> Region:

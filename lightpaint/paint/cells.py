@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
@@ -14,8 +12,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.keeping import check_together
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Pixels
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.wishes import Wishes
 from lightpaint.scene.quality import on_film
@@ -51,9 +49,9 @@ def _painting(session: Session, view: int, target: Any, name: str) -> Pixels:
         kind = type(target).__name__
         raise PaintError(f"painter.{name} is a lp.Target or None, not {kind}")
     if target is None:
-        return its.present, np.zeros(its.size, np.float32)
+        return Pixels.unpainted(its.present)
     target = target.fitted_to(its.size, resize=False)
-    return target.image, target.importance
+    return _pixels_of(target)
 
 
 def of_lighting(session: Session, lighting: Any) -> Loaded:
@@ -88,7 +86,11 @@ def same_paintings(new: Sequence[Target | None], old: Sequence[Target | None]) -
 def _same(new: Target | None, old: Target | None) -> bool:
     if new is None or old is None:
         return new is old
-    return np.array_equal(new.image, old.image) and np.array_equal(new.importance, old.importance)
+    return _pixels_of(new).same(_pixels_of(old))
+
+
+def _pixels_of(target: Target) -> Pixels:
+    return Pixels(target.image, target.importance, target.at_least)
 
 
 def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[Subject, ...]:

@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.packed import packed, unpacked, unpacked_patch
-from lightpaint.paint.steps import Patch, Pixels
+from lightpaint.paint.pixels import Pixels, Region
+from lightpaint.paint.steps import Patch
 from lightpaint.records import strict_json
 
 #: What looks are made of.
@@ -19,22 +20,22 @@ DTYPES = ("float32", "float64", "float16", "uint8", "int16")
 PackedArrays = dict[str, tuple[str, str, bytes]]
 
 
-#: View and region of a patch.
-Place = tuple[int, int, int, int, int]
+#: View and region of a patch, and whether it is marked (`is_marked`).
+Place = tuple[int, Region, bool]
 
 
 class KeptPatch(Patch):
     """A patch that is in a file, the k-th of its step.
 
-    places: view and region of each. read: pixels of all of them before, and how those after differ,
+    places: of each. read: pixels of all of them before, and how those after differ,
     packed.
     """
 
     def __init__(
         self, places: Sequence[Place], k: int, read: Callable[[], tuple[bytes, bytes]]
     ) -> None:
-        view, *region = places[k]
-        vars(self).update(view=view, region=tuple(region), _places=places, _k=k, _read=read)
+        view, region, _ = places[k]
+        vars(self).update(view=view, region=region, _places=places, _k=k, _read=read)
 
     @property
     def before(self) -> Pixels:
@@ -46,8 +47,8 @@ class KeptPatch(Patch):
 
     def _pixels(self) -> tuple[Pixels, Pixels]:
         its = vars(self)
-        regions = [(top, bottom, left, right) for _, top, bottom, left, right in its["_places"]]
-        return unpacked_patch(regions, its["_k"], *its["_read"]())
+        places = [(region, marked) for _, region, marked in its["_places"]]
+        return unpacked_patch(places, its["_k"], *its["_read"]())
 
 
 class LookArrays(Mapping[str, npt.NDArray[Any]]):

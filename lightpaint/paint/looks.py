@@ -11,13 +11,17 @@ import numpy.typing as npt
 from lightpaint.errors import PaintError
 from lightpaint.paint.frames import Message
 from lightpaint.paint.pictures import Pictures, small_picture
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.protocol import CopyLook, DropLook, LoadLook, MixLooks, RenameLook, SaveLook
 from lightpaint.paint.session import Session
-from lightpaint.paint.steps import KeptLook, Pixels, of_view
+from lightpaint.paint.steps import KeptLook, of_view
 from lightpaint.paint.wishes import Wishes
 
 #: Characters of a name, at most.
 LONGEST = 80
+
+#: What says where brighter is as good.
+MARKS = "at_least"
 
 Said = SaveLook | RenameLook | CopyLook | MixLooks | DropLook
 
@@ -74,24 +78,21 @@ class Looks:
         return self._session.load(paintings, wishes, f"look {look.fields['name']}")
 
     def _paintings(self, look: KeptLook) -> list[Pixels]:
-        """Light and importance of each view; of one that came later as before it was painted."""
+        """What is painted in each view; of one that came later as before it was painted."""
         arrays, found = look.arrays, []
         names = set(arrays)
         for k, view in enumerate(self._session.views):
             if of_view("image", k) in names:
-                found.append(
-                    (
-                        np.asarray(arrays[of_view("image", k)]),
-                        np.asarray(arrays[of_view("importance", k)]),
-                    )
-                )
+                image, importance = (arrays[of_view(x, k)] for x in ("image", "importance"))
+                marks = arrays[name].view(bool) if (name := of_view(MARKS, k)) in names else None
+                found.append(Pixels(image, importance, marks))
             else:
-                found.append((view.present, np.zeros(view.size, np.float32)))
+                found.append(Pixels.unpainted(view.present))
         return found
 
     def _now(self, name: str) -> KeptLook:
         session = self._session
-        paintings = [(view.image.copy(), view.importance.copy()) for view in session.views]
+        paintings = [view.pixels(view.whole) for view in session.views]
         return self._made(name, paintings, session.wishes, session.weights.copy())
 
     def _between(self, message: MixLooks) -> KeptLook:
@@ -119,12 +120,14 @@ class Looks:
     ) -> KeptLook:
         fields = {"name": name, "stamp": time.time(), "wishes": wishes.as_json()}
         arrays: dict[str, npt.NDArray[Any]] = {"weights": weights}
-        for view, (image, importance) in zip(self._session.views, paintings, strict=True):
-            its = {
+        for view, (image, importance, marks) in zip(self._session.views, paintings, strict=True):
+            its: dict[str, npt.NDArray[Any]] = {
                 "image": np.asarray(image, np.float32),
                 "importance": np.asarray(importance, np.float32),
                 "thumbnail": small_picture(view.basis.mix(weights), self._session.transform),
             }
+            if marks is not None:
+                its[MARKS] = marks.view(np.uint8)
             arrays |= {of_view(key, view.view): value for key, value in its.items()}
         return KeptLook(self._free(), fields, arrays)
 
@@ -159,10 +162,16 @@ class Looks:
 
 def _mixed(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
     """Two paintings of a view, each as far as it counts."""
-    counts = [share * its[1] for share, its in zip(shares, pair, strict=True)]
+    counts = [share * its.importance for share, its in zip(shares, pair, strict=True)]
     total = counts[0] + counts[1]
     whole = np.where(total > 0, total, 1)[..., None]
     image = np.zeros((*total.shape, 3), np.float32)
     for count, its in zip(counts, pair, strict=True):
-        image += (count[..., None] / whole * its[0]).astype(np.float32)
-    return image, total.astype(np.float32)
+        image += (count[..., None] / whole * its.image).astype(np.float32)
+    # Brighter than the mean is as good where it is of all that counts there.
+    unsure = np.zeros(image.shape, bool)
+    for count, its in zip(counts, pair, strict=True):
+        fixed = True if its.at_least is None else ~its.at_least
+        unsure |= fixed & (count > 0)[..., None]
+    at_least = ~unsure & (total > 0)[..., None]
+    return Pixels(image, total.astype(np.float32), at_least if at_least.any() else None)

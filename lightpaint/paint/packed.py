@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.steps import Patch, Pixels, Region
+from lightpaint.paint.pixels import Pixels, Region
+from lightpaint.paint.steps import Patch
 
 #: Of zlib: quick, which is what counts under the hand.
 LEVEL = 1
@@ -43,50 +44,70 @@ def unpacked(data: bytes, dtype: str, shape: tuple[int, ...]) -> npt.NDArray[np.
     return np.ascontiguousarray(rows.T).reshape(-1).view(kind).reshape(shape)
 
 
+def is_marked(patch: Patch) -> bool:
+    """Whether brighter is as good somewhere in a patch, before or after: its bytes say where."""
+    return patch.before.at_least is not None or patch.after.at_least is not None
+
+
 def packed_patches(patches: Sequence[Patch]) -> tuple[bytes, bytes]:
     """Pixels before a step, and how those after it differ: not at all where it left them."""
-    before = np.concatenate([_bits(patch.before, patch.region) for patch in patches])
-    after = np.concatenate([_bits(patch.after, patch.region) for patch in patches])
+    places = [(patch.region, is_marked(patch)) for patch in patches]
+    before, after = (
+        np.concatenate([_bits(one, *place) for one, place in zip(pixels, places, strict=True)])
+        for pixels in ([x.before for x in patches], [x.after for x in patches])
+    )
     return packed(before), packed(before ^ after)
 
 
 def unpacked_patch(
-    regions: Sequence[Region], k: int, before: bytes, change: bytes
+    places: Sequence[tuple[Region, bool]], k: int, before: bytes, change: bytes
 ) -> tuple[Pixels, Pixels]:
-    """Pixels before and after of patch k, to the last bit. regions: of all patches of the step.
+    """Pixels before and after of patch k, to the last bit.
 
-    Raises PaintError for a damaged file.
+    places: region of each patch of the step, and whether it is marked. Raises PaintError for a
+    damaged file.
     """
-    ends = np.cumsum([0, *(_values(region) for region in regions)]).tolist()
+    ends = np.cumsum([0, *(_values(*place) for place in places)]).tolist()
     was, is_other = (
         np.asarray(unpacked(x, "uint32", (ends[-1],)))[ends[k] : ends[k + 1]]
         for x in (before, change)
     )
-    return _pixels(was, regions[k]), _pixels(was ^ is_other, regions[k])
+    return _pixels(was, *places[k]), _pixels(was ^ is_other, *places[k])
 
 
-def _values(region: Region) -> int:
-    """How many numbers a region has, of light and importance."""
+def _size(region: Region) -> tuple[int, int]:
     top, bottom, left, right = region
-    return 4 * (bottom - top) * (right - left)
+    return bottom - top, right - left
 
 
-def _bits(pixels: Pixels, region: Region) -> npt.NDArray[np.uint32]:
-    image, importance = pixels
-    top, bottom, left, right = region
-    size = (bottom - top, right - left)
-    if image.shape != (*size, 3) or importance.shape != size:
-        raise PaintError(
-            f"pixels of shapes {image.shape} and {importance.shape} for the region {region}"
-        )
-    flat = [np.asarray(x, np.float32).reshape(-1) for x in (image, importance)]
-    return np.concatenate(flat).view(np.uint32)
+def _values(region: Region, marked: bool) -> int:
+    """How many numbers a region has: light, importance, and 32 marks in each."""
+    pixels = math.prod(_size(region))
+    return 4 * pixels + marked * -(-3 * pixels // 32)
 
 
-def _pixels(bits: npt.NDArray[np.generic], region: Region) -> Pixels:
-    top, bottom, left, right = region
-    size = (bottom - top, right - left)
+def _bits(pixels: Pixels, region: Region, marked: bool) -> npt.NDArray[np.uint32]:
+    image, importance, at_least = pixels
+    size = _size(region)
+    marks = at_least if at_least is not None else np.zeros((*size, 3), bool)
+    if image.shape != (*size, 3) or importance.shape != size or marks.shape != image.shape:
+        shapes = " and ".join(str(x.shape) for x in (image, importance, marks))
+        raise PaintError(f"pixels of shapes {shapes} for the region {region}")
+    flat = [np.asarray(x, np.float32).reshape(-1).view(np.uint32) for x in (image, importance)]
+    if marked:
+        padded = np.zeros(32 * -(-marks.size // 32), bool)
+        padded[: marks.size] = marks.reshape(-1)
+        flat.append(np.packbits(padded).view("<u4").astype(np.uint32))
+    return np.concatenate(flat)
+
+
+def _pixels(bits: npt.NDArray[np.generic], region: Region, marked: bool) -> Pixels:
+    size = _size(region)
+    light, end = 3 * math.prod(size), 4 * math.prod(size)
     values = np.ascontiguousarray(bits).view(np.float32)
     values.flags.writeable = False
-    rest = 3 * size[0] * size[1]
-    return values[:rest].reshape(*size, 3), values[rest:].reshape(size)
+    at_least = None
+    if marked:
+        flags = np.unpackbits(np.asarray(bits[end:]).astype("<u4").view(np.uint8), count=light)
+        at_least = flags.view(bool).reshape(*size, 3) if flags.any() else None
+    return Pixels(values[:light].reshape(*size, 3), values[light:end].reshape(size), at_least)

@@ -27,7 +27,8 @@ from lightpaint.paint.answering import Answering
 from lightpaint.paint.canvas import Canvases
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
-from lightpaint.paint.steps import Pixels, Region, Step
+from lightpaint.paint.pixels import Pixels, Region
+from lightpaint.paint.steps import Step
 from lightpaint.paint.store import Store
 from lightpaint.paint.told import answer_fields, unpainted_fields
 from lightpaint.paint.wishes import Wishes
@@ -119,11 +120,13 @@ class Session:
         canvas = self.views[view]
         if not canvas.is_painted:
             return None
+        image, importance, at_least = canvas.pixels(canvas.whole)
         return Target(
             self.name if len(self.views) == 1 else f"{self.name} {canvas.name}",
-            canvas.image.copy(),
-            canvas.importance.copy(),
+            image,
+            importance,
             everything=False,
+            at_least=at_least,
             transform=self.transform,
             through_view=True,
             over_look=True,
@@ -343,7 +346,7 @@ class Session:
         about |= {"mode": self.answering.mode, "views": [view for view, _ in where], **self.about}
         made = []
         for view, region in where or ((0, (0, 0, 0, 0)),):
-            image, importance = self.views[view].pixels(region)
+            image, importance, _ = self.views[view].pixels(region)
             fields = {"region": list(region), "view": view, **about}
             arrays: dict[str, npt.NDArray[Any]] = {"image": image, "importance": importance}
             arrays |= self.weights_array

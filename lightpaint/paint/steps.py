@@ -15,21 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
+from lightpaint.paint.pixels import Pixels, Region, slices
 from lightpaint.records import read_record
-
-#: Light (rows, columns, 3) and importance (rows, columns) of one place, both float32.
-Pixels = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]
-
-#: Rows and columns of the picture, `(top, bottom, left, right)`, the ends not included.
-Region = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
     """The pixels of one region of a view, before a step and after it.
 
-    region: (top, bottom, left, right). before, after: light and importance of its pixels. view: by
-    its place in the session.
+    region: (top, bottom, left, right). before, after: its pixels. view: by its place in the
+    session.
     """
 
     region: Region
@@ -57,8 +52,9 @@ class Step:
 class KeptLook:
     """A look under a name. id: a number that no other look of the session has.
 
-    fields: name, quality, time and the like, as JSON has them. arrays: weights, and image,
-    importance and thumbnail of each view, called as `of_view` says.
+    fields: name, quality, time and the like, as JSON has them. arrays: weights, and of each view
+    image, importance, `at_least` (uint8, where it is so anywhere) and thumbnail, called as
+    `of_view` says.
     """
 
     id: int
@@ -117,22 +113,24 @@ class Identity:
 
 
 def painted_by(steps: Sequence[Step], start: Pixels, view: int = 0) -> Pixels:
-    """The canvas of a view after `steps`, which began at `start`: light (h, w, 3), importance.
+    """The canvas of a view after `steps`, which began at `start`.
 
     The same as every patch put down in order; looks only at those that show.
     """
-    image, importance = start[0].copy(), start[1].copy()
+    image, importance, at_least = start.copy()
     is_open = np.ones(importance.shape, dtype=bool)
     for patch in (patch for step in reversed(steps) for patch in step.patches):
         if patch.view != view:
             continue
-        top, bottom, left, right = patch.region
-        here = np.s_[top:bottom, left:right]
+        here = slices(patch.region)
         shows = is_open[here]
         if not shows.any():
             continue
-        its_image, its_importance = patch.after
-        image[here][shows] = its_image[shows]
-        importance[here][shows] = its_importance[shows]
+        after = patch.after
+        image[here][shows] = after.image[shows]
+        importance[here][shows] = after.importance[shows]
+        if after.at_least is not None:
+            at_least = np.zeros(image.shape, bool) if at_least is None else at_least
+            at_least[here][shows] = after.at_least[shows]
         is_open[here] = False
-    return image, importance
+    return Pixels(image, importance, at_least)

@@ -26,7 +26,7 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.database import damaged, identify, opened, transaction
 from lightpaint.paint.kept import KeptPatch, LookArrays, PackedArrays, Place, packed_arrays
-from lightpaint.paint.packed import packed_patches
+from lightpaint.paint.packed import is_marked, packed_patches
 from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
 from lightpaint.records import strict_json
 
@@ -222,8 +222,9 @@ class Store:
 
     def _step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
         places: list[Place] = []
-        for view, top, bottom, left, right in strict_json(where):
-            places.append((int(view), int(top), int(bottom), int(left), int(right)))
+        for view, top, bottom, left, right, *marked in strict_json(where):
+            region = int(top), int(bottom), int(left), int(right)
+            places.append((int(view), region, bool(marked)))
         read = partial(self._pixels, number)
         patches = tuple(KeptPatch(places, k, read) for k in range(len(places)))
         return Step(str(kind), str(label), strict_json(fields), patches)
@@ -254,10 +255,9 @@ class MemoryStore(Store):
         super().__init__(None, identity)
 
 
-def _place(patch: Patch) -> Place:
-    """View and region, as they are kept."""
-    top, bottom, left, right = map(int, patch.region)
-    return int(patch.view), top, bottom, left, right
+def _place(patch: Patch) -> list[int]:
+    """View and region, as they are kept, and a 1 if it is marked."""
+    return [*map(int, (patch.view, *patch.region)), *([1] if is_marked(patch) else [])]
 
 
 def _text(fields: Mapping[str, Any]) -> str:

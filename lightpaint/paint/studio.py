@@ -29,8 +29,9 @@ from lightpaint.paint.looks import Looks
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.offered import fields_of_views, offer_transforms, offer_view
 from lightpaint.paint.pictures import Picture, Pictures
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Identity, Pixels, of_view
+from lightpaint.paint.steps import Identity, of_view
 from lightpaint.paint.store import Store
 from lightpaint.paint.subject import Subject, bases_of, transform_of
 from lightpaint.paint.told import analysis_fields, answer_fields

@@ -15,6 +15,7 @@ import numpy as np
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.images.picture import AT_LEAST
 from lightpaint.records import fields_of, read_record, strict_json
 from lightpaint.target.target import Target
 
@@ -46,6 +47,8 @@ def write_painting(path: Path, target: Target) -> None:
     name, stops = ("", 0.0) if seen is None else (seen.name, seen.stops)
     painted = Painted(FORMAT, target.over_look, target.through_view, name, stops)
     channels = rgb_channels(target.image) | {"W": target.importance.astype(np.float32)}
+    if target.at_least is not None and target.at_least.any():
+        channels |= rgb_channels(target.at_least.astype(np.float32), AT_LEAST)
     write_parts(path, [Part("rgb", channels, {KEY: json.dumps(fields_of(painted))})])
 
 

@@ -12,6 +12,7 @@ from lightpaint.basis.basis import BasisLight, Origin
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import MemoryStore
@@ -173,7 +174,8 @@ def test_undo_goes_through_views_in_order():
     assert (patch.fields["view"], patch.fields["region"]) == (0, [2, 9, 3, 12])
     assert not session.is_painted
     paintings = {
-        view.view: (np.full((*view.size, 3), 0.5), np.ones(view.size)) for view in session.views
+        view.view: Pixels(np.full((*view.size, 3), 0.5), np.ones(view.size))
+        for view in session.views
     }
     made = session.load(paintings, session.wishes, "look")
     assert [message.fields["view"] for message in made] == [0, 1]

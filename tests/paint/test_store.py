@@ -24,6 +24,7 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint import database
 from lightpaint.paint.database import set_aside
 from lightpaint.paint.packed import packed, unpacked
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.steps import Identity, KeptLook, Patch, Seen, Step, painted_by
 from lightpaint.paint.store import MemoryStore, Store
 
@@ -95,27 +96,31 @@ def test_any_sequence_is_there_again(
 def test_the_canvas_is_every_patch_put_down_in_order(seeds: list[int], view: int) -> None:
     steps = [step(seed) for seed in seeds]
     rng = np.random.default_rng(0)
-    start = rng.random((*SIZE, 3)).astype(np.float32), np.zeros(SIZE, np.float32)
-    image, importance = (x.copy() for x in start)
+    start = Pixels.unpainted(rng.random((*SIZE, 3)).astype(np.float32))
+    image, importance, _ = start.copy()
+    at_least = np.zeros(image.shape, bool)
     for one in steps:
         for its in one.patches:
             if its.view == view:
                 top, bottom, left, right = its.region
-                image[top:bottom, left:right], importance[top:bottom, left:right] = its.after
+                here, after = np.s_[top:bottom, left:right], its.after
+                image[here], importance[here] = after.image, after.importance
+                at_least[here] = False if after.at_least is None else after.at_least
     got = painted_by(steps, start, view)
-    np.testing.assert_array_equal(got[0], image)
-    np.testing.assert_array_equal(got[1], importance)
+    assert got.same(Pixels(image, importance, at_least))
 
 
 def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
     odd = np.array([np.nan, -0.0, np.inf, 1e-45, 3.4e38, 1], np.float32).reshape(1, 2, 3)
     amount = np.array([[0, 1e-45]], np.float32)
     with Store.open(tmp_path / "session.db", IDENTITY) as store:
-        change = Patch((0, 1, 0, 2), (odd, amount), (-odd, amount))
+        marks = np.array([True, False, True, False, False, True]).reshape(1, 2, 3)
+        before, after = Pixels(odd, amount), Pixels(-odd, amount, marks)
+        change = Patch((0, 1, 0, 2), before, after)
         store.append(Step("stroke", "odd", {}, (change,)))
         [kept] = store.steps[0].patches
-        assert told(kept.before) == told((odd, amount))
-        assert told(kept.after) == told((-odd, amount))
+        assert told(kept.before) == told(before)
+        assert told(kept.after) == told(after)
         assert not kept.after[0].flags.writeable
 
 

@@ -1,0 +1,247 @@
+"""What a painting of 8 bits means by its largest code, this or brighter, a session keeps."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import lightpaint as lp
+from lightpaint.basis.basis import BasisLight, Origin
+from lightpaint.images.exr import Part, write_parts
+from lightpaint.paint import cells, protocol
+from lightpaint.paint.looks import Looks
+from lightpaint.paint.pictures import Pictures
+from lightpaint.paint.session import Session
+from lightpaint.paint.steps import Identity
+from lightpaint.paint.store import MemoryStore, Store
+from lightpaint.settings import Settings
+from lightpaint.target.own import write_painting
+
+SIZE = (18, 32)
+WHOLE = (0, *SIZE[:1], 0, SIZE[1])
+#: A region that a stroke paints, in which most is white.
+BRUSH = (2, 9, 3, 12)
+
+LINEAR: dict[str, Any] = {"space": "linear", "colors": "free", "hold": 0.0}
+
+
+@pytest.fixture(scope="module")
+def basis() -> lp.Basis:
+    """Two soft lights, of which one is far too bright for 8 bits."""
+    return _basis()
+
+
+def _basis() -> lp.Basis:
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
+    places = ((0.3, 0.5, 3.0), (0.6, 1.3, 0.6))
+    images = np.stack(
+        [
+            bright * np.exp(-((y - cy) ** 2 + (x - cx) ** 2) / 0.1)[..., None] * [1, 0.9, 0.7]
+            for cy, cx, bright in places
+        ]
+    ).astype(np.float32)
+    lights = [BasisLight(f"lamp {k}", "point", "intensity", "W/sr", (0.5,) * 3) for k in (0, 1)]
+    origin = Origin("made", "made", "camera", 0, "separate", (0, 0), (0, 0))
+    return lp.Basis(tuple(lights), images, np.zeros_like(images), np.zeros(SIZE, bool), origin)
+
+
+def _clipped(basis: lp.Basis) -> lp.Target:
+    """What 8 bits hold of a lighting."""
+    light = basis.mix(np.array([[1.5, 1.2, 1.0], [0.4, 0.6, 0.9]]))
+    image = np.minimum(light, 1).astype(np.float32)
+    importance = np.ones(SIZE, np.float32)
+    return lp.Target("clipped", image, importance, everything=False, at_least=image >= 1)
+
+
+def _session(basis: lp.Basis, store: Store | None = None) -> Session:
+    return Session(
+        [basis],
+        [basis.present_look],
+        store or MemoryStore(Identity.of([basis])),
+        settings=Settings(**LINEAR),
+        transform=lp.ViewTransform(),
+    )
+
+
+def _set(session: Session, target: lp.Target) -> None:
+    session.load(*cells.of_target(session, target))
+
+
+def _paint(session: Session, stroke: int, region: Any, change: Any, *, done: bool = True) -> None:
+    """Send a region, as a page that paints in it."""
+    image, importance, _ = session.views[0].pixels(region)
+    change(image, importance)
+    arrays = {"image": image, "importance": importance}
+    session.said(protocol.Paint(stroke, region, done), arrays)
+
+
+def _corner(image: Any, importance: Any) -> None:
+    """What a brush does in a region: two rows."""
+    image[:2], importance[:2] = 0.25, 1
+
+
+def _marks(session: Session) -> Any:
+    target = session.target()
+    assert target is not None
+    return np.zeros((*SIZE, 3), bool) if target.at_least is None else target.at_least
+
+
+def test_the_answer_is_that_of_the_file(basis: lp.Basis):
+    target, session = _clipped(basis), _session(basis)
+    _set(session, target)
+    solution = session.moment().solution()
+    assert solution is not None
+    expected = lp.solve(basis, target, **LINEAR).weights
+    np.testing.assert_allclose(solution.weights, expected, rtol=1e-9)
+    # And not that of a painting which means what it says.
+    literal = lp.solve(basis, replace(target, at_least=None), **LINEAR).weights
+    assert np.abs(literal / expected - 1).max() > 0.05
+    np.testing.assert_allclose(expected[0], [1.5, 1.2, 1.0], rtol=1e-4)
+
+
+def test_paint_means_what_it_says_and_what_it_leaves_means_what_it_did(basis: lp.Basis):
+    target, session = _clipped(basis), _session(basis)
+    _set(session, target)
+    np.testing.assert_array_equal(_marks(session), target.at_least)
+    _paint(session, 1, BRUSH, _corner)
+    expected = target.at_least.copy()
+    expected[2:4, 3:12] = False
+    assert (expected != target.at_least).any()
+    np.testing.assert_array_equal(_marks(session), expected)
+    session.said(protocol.Undo(), {})
+    np.testing.assert_array_equal(_marks(session), target.at_least)
+    session.said(protocol.Redo(), {})
+    np.testing.assert_array_equal(_marks(session), expected)
+    # What counts more is the same light.
+    _paint(session, 2, WHOLE, lambda _, importance: importance.__imul__(3))
+    np.testing.assert_array_equal(_marks(session), expected)
+    # Nothing is painted there any more.
+    _paint(session, 3, WHOLE, lambda _, importance: importance.__imul__(0))
+    assert session.target() is None
+    session.said(protocol.Undo(), {})
+    np.testing.assert_array_equal(_marks(session), expected)
+
+
+def test_a_stroke_may_change_its_mind(basis: lp.Basis):
+    """As a straight line does, which is somewhere else with each move."""
+    target, session = _clipped(basis), _session(basis)
+    _set(session, target)
+    before = session.views[0].pixels(BRUSH)
+
+    def back(image: Any, importance: Any) -> None:
+        image[...], importance[...] = before.image, before.importance
+        image[-1], importance[-1] = 0.25, 1
+
+    _paint(session, 1, BRUSH, _corner, done=False)
+    assert not _marks(session)[2:4, 3:12].any()
+    session.improve([basis], [basis.present_look])  # more samples come meanwhile
+    assert not _marks(session)[2:4, 3:12].any()
+    _paint(session, 1, BRUSH, back)
+    expected = target.at_least.copy()
+    expected[8, 3:12] = False
+    np.testing.assert_array_equal(_marks(session), expected)
+    _paint(session, 2, BRUSH, _corner, done=False)
+    session.said(protocol.Drop(2), {})
+    np.testing.assert_array_equal(_marks(session), expected)
+
+
+STROKES = st.lists(
+    st.tuples(
+        st.sampled_from(["paint", "erase", "undo", "redo", "drop", "improve", "set"]),
+        st.tuples(st.integers(0, 17), st.integers(1, 9), st.integers(0, 31), st.integers(1, 16)),
+        st.booleans(),
+    ),
+    max_size=12,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(STROKES)
+def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
+    basis = _basis()
+    store = MemoryStore(Identity.of([basis]))
+    target, session = _clipped(basis), _session(basis, store)
+    _set(session, target)
+    for stroke, (what, (top, rows, left, columns), is_done) in enumerate(done):
+        region = top, min(top + rows, SIZE[0]), left, min(left + columns, SIZE[1])
+        try:
+            match what:
+                case "paint":
+                    _paint(session, stroke, region, _corner, done=is_done)
+                case "erase":
+                    erase = lambda _, importance: importance.__imul__(0)  # noqa: E731
+                    _paint(session, stroke, region, erase, done=is_done)
+                case "undo":
+                    session.said(protocol.Undo(), {})
+                case "redo":
+                    session.said(protocol.Redo(), {})
+                case "drop":
+                    session.said(protocol.Drop(stroke), {})
+                case "improve":
+                    session.improve([basis], [basis.present_look])
+                case "set":
+                    _set(session, target)
+        except lp.LightpaintError:
+            pass
+    session.said(protocol.Drop(0), {})
+    canvas, again = session.views[0], _session(basis, store).views[0]
+    assert canvas.pixels(canvas.whole).same(again.pixels(again.whole))
+    _, importance, at_least = canvas.pixels(canvas.whole)
+    if at_least is not None:
+        assert (importance > 0)[at_least.any(axis=-1)].all()
+        assert (canvas.image[at_least] == target.image[at_least]).all()
+        assert target.at_least[at_least].all()
+
+
+def test_it_is_in_files_and_looks(basis: lp.Basis, tmp_path: Path):
+    target = _clipped(basis)
+    with Store.open(tmp_path / "a.db", Identity.of([basis])) as store:
+        session = _session(basis, store)
+        looks = Looks(session, Pictures())
+        _set(session, target)
+        looks.said(protocol.SaveLook("white"))
+        _paint(session, 1, BRUSH, _corner)
+        marks = _marks(session)
+        looks.said(protocol.SaveLook("a corner less"))
+        write_painting(tmp_path / "a.exr", session.target())
+    with Store.open(tmp_path / "a.db", Identity.of([basis])) as store:
+        session = _session(basis, store)
+        np.testing.assert_array_equal(_marks(session), marks)
+        looks = Looks(session, Pictures())
+        first, second = looks.listed()
+        looks.load(protocol.LoadLook(first["id"]))
+        np.testing.assert_array_equal(_marks(session), target.at_least)
+        looks.said(protocol.MixLooks(first["id"], second["id"], 0.5, "between"))
+        looks.load(protocol.LoadLook(looks.listed()[-1]["id"]))
+        np.testing.assert_array_equal(_marks(session), marks)
+    read = lp.read_target(tmp_path / "a.exr")
+    np.testing.assert_array_equal(read.at_least, marks)
+
+
+def test_any_exr_may_say_so(tmp_path: Path):
+    light = {c: np.ones((4, 5), np.float32) for c in "RGB"}
+    green = np.zeros((4, 5), np.float32)
+    green[1, 2:4] = 1
+    write_parts(tmp_path / "a.exr", [Part("", light | {"at_least.G": green})])
+    target = lp.read_target(tmp_path / "a.exr", find=False)
+    assert target.at_least is not None
+    assert not target.at_least[..., [0, 2]].any()
+    np.testing.assert_array_equal(target.at_least[..., 1], green > 0)
+
+
+def test_light_below_zero_stays_beside_a_stroke(basis: lp.Basis):
+    """As a wide gamut has it, in a target that a cell gave."""
+    session, image = _session(basis), np.full((*SIZE, 3), 0.5, np.float32)
+    image[..., 2] = -0.1
+    _set(session, lp.Target.of(image, np.ones(SIZE)))
+    _paint(session, 1, BRUSH, _corner)
+    target = session.target()
+    assert target is not None
+    assert (target.image[2:4, 3:12] == 0.25).all()
+    np.testing.assert_array_equal(target.image[4:], image[4:])
+    with pytest.raises(lp.LightpaintError, match="light beyond 0"):
+        _paint(session, 2, BRUSH, lambda light, _: light.__isub__(1))
