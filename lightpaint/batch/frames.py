@@ -7,7 +7,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.batch.keys import Final
 from lightpaint.scene.render import Stream, pass_sum, passes_of
 from lightpaint.scene.scene import Scene
-from lightpaint.signals import interruptible_between_pieces
+from lightpaint.scene.turns import tracing
 
 
 class Frame:
@@ -24,7 +24,7 @@ class Frame:
         for k in some:
             half, spp = self._passes[k]
             seed, stream = self._final.seed, Stream.VERIFICATION
-            with interruptible_between_pieces():
+            with tracing():
                 its = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
             sums[half] = sums[half] + its if half in sums else its
         return sums

@@ -4,8 +4,8 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from threading import Condition, Thread, get_native_id
 
 from lightpaint.errors import LightpaintError
@@ -67,55 +67,6 @@ class Settling:
             except Exception as error:
                 # A mistake of our own ends no session: the next stroke is answered again.
                 self._say(Message("say", {"text": told(error), "tone": "warn"}))
-
-
-class Turns:
-    """One renders at a time. Two at once in one process spoil what both of them make: Mitsuba asks
-    all materials there are, also those of a scene that another thread is still loading.
-    """
-
-    def __init__(self) -> None:
-        self._changed = Condition()
-        self._is_taken, self._errands = False, 0
-
-    @contextmanager
-    def errand(self) -> Iterator[None]:
-        """Render for somebody who waits for it: before what takes its time goes on."""
-        with self._changed:
-            self._errands += 1
-            self._changed.wait_for(lambda: not self._is_taken)
-            self._is_taken = True
-        try:
-            yield
-        finally:
-            with self._changed:
-                self._errands -= 1
-                self._is_taken = False
-                self._changed.notify_all()
-
-    @contextmanager
-    def at_leisure(self) -> Iterator[Callable[[], None]]:
-        """Render when nobody waits; yields what lets others go first, between two passes."""
-        self._take()
-        try:
-            yield self._let_others
-        finally:
-            self._leave()
-
-    def _let_others(self) -> None:
-        if self._errands:
-            self._leave()
-            self._take()
-
-    def _take(self) -> None:
-        with self._changed:
-            self._changed.wait_for(lambda: not (self._is_taken or self._errands))
-            self._is_taken = True
-
-    def _leave(self) -> None:
-        with self._changed:
-            self._is_taken = False
-            self._changed.notify_all()
 
 
 def later(work: Callable[[], None], name: str, say: Callable[[Message], None]) -> None:

@@ -1,7 +1,6 @@
 """What somebody asks for that takes long: exports, the verifying render, why it is not closer."""
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from threading import Lock
 from typing import Any, Protocol
 
@@ -10,7 +9,7 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import protocol
-from lightpaint.paint.beside import StoppedError, Turns, later
+from lightpaint.paint.beside import StoppedError, later
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.pictures import Picture
@@ -26,7 +25,6 @@ class Place(Protocol):
     """What an errand wants of the studio it goes out from."""
 
     subjects: tuple[Subject, ...]
-    turns: Turns
 
     def now(self) -> tuple[Moment, Lighting]:
         """What is painted and asked, and the last answer."""
@@ -97,8 +95,7 @@ class Errands:
             del label  # what it is at within an export is no news to a page
             self._place.hears("export", done, total, unit)
 
-        renders = self._subject(0).scene is not None and {"relit", "report"} & set(message.what)
-        with self._writes, self._place.turns.errand() if renders else nullcontext():
+        with self._writes:
             files = export(self._place.subjects, moment, lighting, message.what, hears)
         command = self.command(moment.painted_sensors, moment.wishes)
         fields = {"files": [str(x) for x in files], "command": command}
@@ -116,9 +113,8 @@ class Errands:
 
         self._renders = True
         progress: Progress = hears
-        with self._place.turns.errand():
-            basis = moment.bases[asked.view]
-            picture, said, agrees = verified(self._subject(asked.view), basis, lighting, progress)
+        basis = moment.bases[asked.view]
+        picture, said, agrees = verified(self._subject(asked.view), basis, lighting, progress)
         self._place.put(of_view("verified", asked.view), as_halves(picture))
         about = {"agrees": agrees, "text": said, "view": asked.view}
         self._place.tell(Message("verified", about))

@@ -5,7 +5,7 @@ rendered, exact answers, clean planes, exports and the verifying render have thr
 which say what has come of them through `on_message`.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import RLock, Thread
@@ -21,7 +21,7 @@ from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.beside import Settling, StoppedError, Turns, give_way, told
+from lightpaint.paint.beside import Settling, StoppedError, give_way, told
 from lightpaint.paint.canvas import Canvas
 from lightpaint.paint.errands import Errands
 from lightpaint.paint.frames import Message
@@ -37,6 +37,7 @@ from lightpaint.paint.subject import Subject, bases_of, transform_of
 from lightpaint.paint.told import analysis_fields, answer_fields
 from lightpaint.paint.wishes import Wishes
 from lightpaint.progress import while_wanted
+from lightpaint.scene.turns import MITSUBA
 
 
 class OldError(Exception):
@@ -70,7 +71,6 @@ class Studio:
         on_message: Hears what is said unasked, from other threads.
         on_failure: Hears why there is nothing to paint, from another thread.
         failure: The same, afterwards.
-        turns: Of all that render here.
     """
 
     def __init__(
@@ -88,8 +88,6 @@ class Studio:
         self._progress: Mapping[str, Any] | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
         self._settling = Settling(self._find, self.tell)
-        self.turns = Turns()
-        self._let_others: Callable[[], None] = lambda: None
         self._errands = Errands(self)
         works = {"obtain": self._obtain, "settle": self._settling.settle}
         self._threads = [
@@ -238,16 +236,17 @@ class Studio:
         about = {"what": label, "done": done, "total": total, "unit": unit}
         if self._session is None:
             self._progress = about
-        self.tell(Message("progress", about))
+        with MITSUBA.aside():  # whoever hears it may wait for a render of its own
+            self.tell(Message("progress", about))
 
     def _obtain(self) -> None:
         """The bases, better and better."""
         give_way()
         try:
-            coming = bases_of(self.subjects, self._hears_of_basis)
-            while (bases := self._next(coming)) is not None:
-                self._take(bases)
-                self._clean()
+            with MITSUBA.at_leisure():
+                for bases in bases_of(self.subjects, self.hears):
+                    self._take(bases)
+                    self._clean()
             self.tell(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
             self._keep_clean()
         except StoppedError:
@@ -261,14 +260,6 @@ class Studio:
                 self.tell(self.state())
             if is_told and self._is_open:
                 self.on_failure(error)  # type: ignore[misc]
-
-    def _next(self, coming: Iterator[list[Basis]]) -> list[Basis] | None:
-        with self.turns.at_leisure() as self._let_others:
-            return next(coming, None)
-
-    def _hears_of_basis(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        self.hears(label, done, total, unit)
-        self._let_others()
 
     def _take(self, bases: Sequence[Basis]) -> None:
         """Paint on with these bases."""

@@ -14,7 +14,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.threads import kernels
-from lightpaint.signals import interruptible_between_pieces
+from lightpaint.scene.turns import tracing
 
 #: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
 #: memory is taken for, so passes are short.
@@ -111,14 +111,14 @@ def render_loaded(
     passes = passes_of(scene, spp)
     sums = np.zeros((2, *scene.size, 3), np.float64)
     progress(label, 0, len(passes))
-    with interruptible_between_pieces() as let_interrupts_through:
+    with tracing() as let_others_through:
         for some in ranges_of(scene, passes):
             its = np.zeros_like(sums)
             for k in some:
                 half, pass_spp = passes[k]
                 its[half] += pass_sum(loaded, scene, k, pass_spp, seed=seed, stream=stream)
                 progress(label, k + 1, len(passes))
-                let_interrupts_through()
+                let_others_through()
             sums += its
     return estimate_of(sums, passes)
 

@@ -28,6 +28,7 @@ from lightpaint.scene.lights import Light, free_names, light_named, lights_of, s
 from lightpaint.scene.lights_file import Asked, lights_file_beside, lights_file_for
 from lightpaint.scene.parsed import ParsedScene, mitsuba_errors
 from lightpaint.scene.shapes import shape_names
+from lightpaint.scene.turns import MITSUBA
 from lightpaint.scene.variant import use_variant
 from lightpaint.screen import Listed, Shown, some_names, some_of
 
@@ -206,6 +207,7 @@ class Scene(Shown):
         parsed = self._parsed.moved(old, new)
         return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
 
+    @MITSUBA.taken()
     def load(self, emission: Mapping[str, RGB] | None = None) -> Any:
         """The `mi.Scene`, its lights set to `emission` (those not named stay as they are).
 
@@ -217,6 +219,7 @@ class Scene(Shown):
         settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
         return self._parsed.instantiate(settings, self.film)
 
+    @MITSUBA.taken()
     def while_loaded(
         self, work: Callable[[Any], _Made], emission: Mapping[str, RGB] | None = None
     ) -> _Made:
@@ -251,6 +254,7 @@ class Scene(Shown):
         return np.array(rgb)
 
 
+@MITSUBA.taken()
 def load_scene(
     path: str | Path,
     *,

@@ -15,7 +15,7 @@ from lightpaint.images.objects import Objects
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.render import Stream, largest_pass, pass_seed
 from lightpaint.scene.scene import Scene
-from lightpaint.signals import interruptible_between_pieces
+from lightpaint.scene.turns import tracing
 
 #: Samples of a pixel, each by itself: an index of a shape must not be averaged.
 SAMPLES = 16
@@ -72,7 +72,7 @@ def _features(scene: Scene, loaded: Any, seed: int) -> Features:
     spp = min(max(SAMPLES // film.block_pixels, 1), largest_pass(pixels))
     seed = pass_seed(seed, Stream.SURFACES, SAMPLES)
     camera = scene.camera(loaded)
-    with interruptible_between_pieces():
+    with tracing():
         image = mi.render(loaded, sensor=camera, integrator=integrator, spp=spp, seed=seed)
     seen = np.nan_to_num(np.array(image)[..., -6:], nan=0, posinf=1, neginf=0)
     seen = block_mean(seen, film.block)
@@ -87,12 +87,12 @@ def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
 
     integrator = mi.load_dict({"type": "aov", "aovs": "i:shape_index"})
     camera, block, samples = scene.camera(loaded), scene.film.block, []
-    with interruptible_between_pieces() as let_interrupts_through:
+    with tracing() as let_others_through:
         for k in range(-(-VOTES // scene.film.block_pixels)):
             seed_k = pass_seed(seed, Stream.SURFACES, SAMPLES + 1 + k)
             image = mi.render(loaded, sensor=camera, integrator=integrator, spp=1, seed=seed_k)
             samples.append(block_pixels(np.array(image)[..., -1], block))
-            let_interrupts_through()
+            let_others_through()
     indices = _most_frequent(np.concatenate(samples).astype(np.int32))
     names = _names_by_index(loaded, scene.shape_names)
     seen = sorted(set(np.unique(indices).tolist()) - {0})
@@ -120,13 +120,13 @@ def _surfaces(scene: Scene, loaded: Any, seed: int, progress: Progress) -> Surfa
     integrator = mi.load_dict(
         {"type": "aov", "aovs": "a:albedo,n:sh_normal,p:position,i:shape_index"}
     )
-    with interruptible_between_pieces() as let_interrupts_through:
+    with tracing() as let_others_through:
         for k in range(count):
             seed_k = pass_seed(seed, Stream.SURFACES, k)
             image = mi.render(loaded, sensor=camera, integrator=integrator, spp=1, seed=seed_k)
             samples.append(block_pixels(np.array(image), block))
             progress("surfaces", k + 1, count)
-            let_interrupts_through()
+            let_others_through()
     to_world = np.array(camera.world_transform().matrix).reshape(4, 4)
     return _averaged(
         np.concatenate(samples), np.linalg.inv(to_world), _names_by_index(loaded, scene.shape_names)

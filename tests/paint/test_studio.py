@@ -16,7 +16,6 @@ from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint import exports, protocol, studio
-from lightpaint.paint.beside import Turns
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.store import Store
@@ -194,45 +193,6 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
         shown = heard.studio.resource(f"clean/{k}").astype(np.float64) * light["scale"]
         assert shown.mean() == pytest.approx(better.images[k].mean(), rel=0.1)
     heard.studio.close()
-
-
-def test_one_renders_at_a_time_and_who_is_waited_for_goes_first():
-    """Two renders at once spoil each other; an errand is let in between two passes."""
-    turns, at_work, heard = Turns(), 0, []
-    has_begun = threading.Event()
-
-    def work(name: str) -> None:
-        nonlocal at_work
-        at_work += 1
-        heard.append((name, at_work))
-        time.sleep(0.02)
-        at_work -= 1
-
-    def errand() -> None:
-        with turns.errand():
-            work("errand")
-            work("errand")
-
-    def leisure() -> None:
-        with turns.at_leisure() as let_others:
-            for _ in range(6):
-                work("pass")
-                has_begun.set()
-                let_others()
-
-    threads = [threading.Thread(target=leisure)]
-    threads[0].start()
-    has_begun.wait(10)
-    threads += [threading.Thread(target=errand) for _ in range(2)]
-    for thread in threads[1:]:
-        thread.start()
-    for thread in threads:
-        thread.join(10)
-    assert [count for _, count in heard] == [1] * 10
-    names = [name for name, _ in heard]
-    first = names.index("errand")
-    assert names[first : first + 4] == ["errand"] * 4
-    assert names[first + 4 :] == ["pass"] * (6 - first)
 
 
 def test_lights_of_unknown_noise_are_cleaned_too(

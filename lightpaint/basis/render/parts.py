@@ -31,7 +31,7 @@ from lightpaint.basis.render.sums import halves_of, mean_and_half_difference
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.threads import kernels
-from lightpaint.signals import interruptible_between_pieces
+from lightpaint.scene.turns import MITSUBA, tracing
 
 #: Camera samples of a part: some seconds of one processor, which is what an accident costs.
 SAMPLES = SAMPLES_PER_PASS // 2
@@ -117,6 +117,7 @@ def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
     return parts
 
 
+@MITSUBA.taken()
 def lesson(scene: Scene, spp: int, seed: int) -> Floats | None:
     """What parts of `scene` choose emitters by, the same each time; None where nothing is chosen.
 
@@ -130,11 +131,11 @@ def lesson(scene: Scene, spp: int, seed: int) -> Floats | None:
     tracer = Tracer(scene, view_seed(seed, scene.sensor), None)
     try:
         # The order of additions, which only one thread keeps to, decides what is learned.
-        with interruptible_between_pieces() as let_interrupts_through, kernels(threads=1):
+        with tracing() as let_others_through, kernels(threads=1):
             its, step = max(1, LESSON // (height * width)), max(1, height * width // LESSON)
             for k in range(min(max(spp * height * width // PER_LESSON, 1), LESSONS)):
                 # Of a large picture some rows tell enough, each time others.
-                let_interrupts_through()
+                let_others_through()
                 tracer.learn(range(k * step // LESSONS, height, step), k * its, its)
         learned: Floats = tracer.guide.learned()
         return learned
@@ -155,6 +156,7 @@ class PartRenderer:
         self._light: int | None = None
         self._loaded: Any = None
 
+    @MITSUBA.taken()
     def render(self, part: Part) -> tuple[Floats, Floats]:
         """The sums of its samples, (lights, rows, w, 3) float32, and rays that saw an emitter.
 
@@ -167,7 +169,7 @@ class PartRenderer:
 
             self._tracer = Tracer(self._scene, self._seed, self._learned)
             self._tracer.guide.freeze()
-        with interruptible_between_pieces(), kernels():
+        with tracing(), kernels():
             sums: tuple[Floats, Floats] = self._tracer.part(
                 part.half, range(part.top, part.bottom), part.first, part.spp
             )
@@ -183,7 +185,7 @@ class PartRenderer:
             )
             self._light = light
         which = light, part.half, part.number, part.spp, self._seed
-        with interruptible_between_pieces():
+        with tracing():
             image = light_pass(self._loaded, self._scene, *which)
         return image[None], np.zeros(self._scene.size, np.float32)
 

@@ -18,7 +18,7 @@ from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_first_hits
-from lightpaint.signals import interruptible_between_pieces
+from lightpaint.scene.turns import MITSUBA, tracing
 
 #: Camera samples that choices of emitters are learned from before any counts.
 REHEARSAL = 2**18
@@ -216,6 +216,7 @@ def basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
     )
 
 
+@MITSUBA.taken()
 def _render_together(
     scene: Scene,
     budget: Budget,
@@ -247,11 +248,11 @@ def _render_together(
         )
 
     try:
-        with interruptible_between_pieces() as let_interrupts_through:
+        with tracing() as let_others_through:
             for half, spp in passes(height * width, budget, sums.spp, progress):
                 if start is None and not any(sums.spp):
                     tracer.rehearse(max(1, REHEARSAL // (height * width)))
-                let_interrupts_through()
+                let_others_through()
                 tracer.add_pass(sums, half, spp)
                 if all(sums.spp):
                     keeper.now_and_then(basis)
@@ -272,6 +273,7 @@ def _render_together(
         gc.collect()
 
 
+@MITSUBA.taken()
 def _render_one_by_one(
     scene: Scene,
     budget: Budget,

@@ -18,7 +18,7 @@ from lightpaint.images.blocks import block_mean
 from lightpaint.progress import Interrupted, Progress
 from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_pass
 from lightpaint.scene.scene import Scene
-from lightpaint.signals import interruptible_between_pieces
+from lightpaint.scene.turns import MITSUBA, tracing
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)
@@ -98,14 +98,14 @@ def render_separately(
     basis: makes one of the sums so far, to be kept. Raises Interrupted for Ctrl-C.
     """
     try:
-        with interruptible_between_pieces() as let_interrupts_through:
+        with tracing() as let_others_through:
             for light, plan, after_pass in _turns(scene, budget, sums, progress):
                 loaded = _alone(scene, light)
                 for half, pass_spp in plan:
                     _add_pass(loaded, scene, sums, light, half, pass_spp, seed)
                     after_pass()
                     keeper.now_and_then(basis)
-                    let_interrupts_through()
+                    let_others_through()
                 del loaded
                 gc.collect()
     except KeyboardInterrupt:
@@ -195,6 +195,7 @@ def light_pass(
     return spp * as_float32(render_pass(loaded, scene, seed=its, spp=spp))
 
 
+@MITSUBA.taken()
 def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
     """(h, w), where light reaches the camera without a single bounce."""
     import mitsuba as mi

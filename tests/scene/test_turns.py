@@ -1,0 +1,141 @@
+"""One thread has Mitsuba at a time, and those that nobody waits for let others go first."""
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.arrays import Floats
+from lightpaint.scene.render import Stream, render
+from lightpaint.scene.turns import Turns
+
+#: Seconds of a piece of work, and in which a thread surely comes to its turn.
+PIECE_S, SOON_S = 0.02, 10
+
+
+class Work:
+    """Pieces that several threads do, and whether two are ever done at once."""
+
+    def __init__(self, turns: Turns) -> None:
+        self.turns, self.done, self._at_work = turns, list[str](), 0
+        self.has_begun = threading.Event()
+
+    def piece(self, name: str) -> None:
+        assert not self._at_work, "two at once"
+        self._at_work += 1
+        self.done.append(name)
+        self.has_begun.set()
+        time.sleep(PIECE_S)
+        self._at_work -= 1
+
+    def urgent(self) -> None:
+        with self.turns.taken():
+            self.piece("urgent")
+            with self.turns.taken():  # as what is done within it does
+                self.piece("urgent")
+
+    def leisure(self) -> None:
+        with self.turns.at_leisure(), self.turns.taken(), self.turns.taken():
+            for _ in range(6):
+                self.piece("leisure")
+                self.turns.let_others()
+
+
+@pytest.fixture
+def work() -> Work:
+    return Work(Turns())
+
+
+def _together(first: Callable[[], None], *others: Callable[[], None], work: Work) -> None:
+    with ThreadPoolExecutor(1 + len(others)) as threads:
+        running = [threads.submit(first)]
+        assert work.has_begun.wait(SOON_S)
+        running += [threads.submit(other) for other in others]
+        for one in running:
+            one.result(SOON_S)
+
+
+def test_who_is_waited_for_goes_first(work: Work):
+    _together(work.leisure, work.urgent, work.urgent, work=work)
+    assert sorted(work.done) == ["leisure"] * 6 + ["urgent"] * 4
+    first = work.done.index("urgent")
+    assert work.done[first : first + 4] == ["urgent"] * 4
+
+
+def test_nobody_is_passed_over(work: Work):
+    """Not even by somebody who takes turn after turn without a pause."""
+    is_done = threading.Event()
+
+    def again() -> None:
+        while not is_done.is_set():
+            work.urgent()
+
+    def once() -> None:
+        work.urgent()
+        is_done.set()
+
+    _together(again, once, work=work)
+
+
+def test_who_waits_for_another_lets_it(work: Work):
+    """Somebody who hears of progress may wait for a thread that wants its own turn."""
+    turns, is_done = work.turns, threading.Event()
+
+    def tells() -> None:
+        with turns.taken(), turns.taken():
+            work.piece("first")
+            with turns.aside():
+                assert is_done.wait(SOON_S)
+            work.piece("last")
+
+    def heard() -> None:
+        with turns.taken():
+            work.piece("heard")
+        is_done.set()
+
+    _together(tells, work.leisure, heard, work=work)
+    # Who is at leisure does not come in between.
+    assert work.done == ["first", "heard", "last", *["leisure"] * 6]
+
+
+def test_who_is_interrupted_while_waiting_keeps_nobody(work: Work, monkeypatch: pytest.MonkeyPatch):
+    turns = work.turns
+
+    def interrupted(_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(turns._changed, "wait_for", interrupted)
+        with pytest.raises(KeyboardInterrupt), turns.taken():
+            pass
+    _together(work.leisure, work=work)
+    assert work.done == ["leisure"] * 6
+
+
+def test_threads_render_what_one_alone_does(small_room: lp.Scene):
+    """Two scenes in two threads, one of them loaded anew between the passes of the other."""
+    scene, path = small_room, small_room.path
+    alone = lp.render_basis(scene, spp=8)
+    ended = threading.Event()
+
+    def frames() -> list[Floats]:
+        made = []
+        while len(made) < 3 or not ended.is_set():
+            other = lp.load_scene(path)
+            made.append(render(other, spp=4, stream=Stream.VERIFICATION).image)
+        return made
+
+    with ThreadPoolExecutor(1) as threads:
+        others = threads.submit(frames)
+        bases = [lp.render_basis(scene, spp=8) for _ in range(3)]
+        ended.set()
+        pictures = others.result(60)
+    # Sums are added in any order by several threads: float32.
+    for basis in bases:
+        np.testing.assert_allclose(basis.images, alone.images, rtol=1e-4, atol=1e-5)
+    for picture in pictures[1:]:
+        np.testing.assert_allclose(picture, pictures[0], rtol=1e-4, atol=1e-5)
