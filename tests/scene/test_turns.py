@@ -11,7 +11,8 @@ import pytest
 import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.scene.render import Stream, render
-from lightpaint.scene.turns import Turns
+from lightpaint.scene.scene import load_scene
+from lightpaint.scene.turns import MITSUBA, Turns
 
 #: Seconds of a piece of work, and in which a thread surely comes to its turn.
 PIECE_S, SOON_S = 0.02, 10
@@ -116,26 +117,35 @@ def test_who_is_interrupted_while_waiting_keeps_nobody(work: Work, monkeypatch: 
     assert work.done == ["leisure"] * 6
 
 
-def test_threads_render_what_one_alone_does(small_room: lp.Scene):
+def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: pytest.MonkeyPatch):
     """Two scenes in two threads, one of them loaded anew between the passes of the other."""
-    scene, path = small_room, small_room.path
-    alone = lp.render_basis(scene, spp=8)
-    ended = threading.Event()
+    monkeypatch.setattr("lightpaint.scene.render.SAMPLES_PER_PASS", 2**11)
+    alone = lp.render_basis(small_room, spp=64)
+    order: list[str] = []
+    has_begun = threading.Event()
+
+    def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+        order.append("pass")
+        has_begun.set()
+
+    def frame() -> Floats:
+        made = render(load_scene(small_room.path), spp=4, stream=Stream.VERIFICATION)
+        order.append("frame")
+        return made.image
 
     def frames() -> list[Floats]:
-        made = []
-        while len(made) < 3 or not ended.is_set():
-            other = lp.load_scene(path)
-            made.append(render(other, spp=4, stream=Stream.VERIFICATION).image)
-        return made
+        assert has_begun.wait(SOON_S)
+        return [frame() for _ in range(4)]
 
     with ThreadPoolExecutor(1) as threads:
         others = threads.submit(frames)
-        bases = [lp.render_basis(scene, spp=8) for _ in range(3)]
-        ended.set()
+        with MITSUBA.at_leisure():
+            basis = lp.render_basis(small_room, spp=64, progress=hears)
         pictures = others.result(60)
+    first, *more = (k for k, what in enumerate(order) if what == "frame")
+    assert order[:first]
+    assert order[more[-1] + 1 :]  # it was in the middle
     # Sums are added in any order by several threads: float32.
-    for basis in bases:
-        np.testing.assert_allclose(basis.images, alone.images, rtol=1e-4, atol=1e-5)
-    for picture in pictures[1:]:
+    np.testing.assert_allclose(basis.images, alone.images, rtol=1e-4, atol=1e-5)
+    for picture in [*pictures, frame()]:
         np.testing.assert_allclose(picture, pictures[0], rtol=1e-4, atol=1e-5)
