@@ -6,9 +6,9 @@
 
 A basis of soft lights that is made up, the painter's own server, and headless Chromium that
 renders in software. A pointer is moved 60 times a second over the picture. For every answer that
-comes on screen, the time since the last move of the pointer that it answers; Python's part of a
-stroke is timed in this process. Up to a frame of the display, 16.7 ms, of each figure is waiting
-for it. With --minutes, how the memory of page and server grows while somebody paints.
+comes on screen, the time since the last move or press of the pointer that it answers; Python's part
+of a stroke is timed in this process. Up to a frame of the display, 16.7 ms, of each figure is
+waiting for it. With --minutes, how the memory of page and server grows while somebody paints.
 
 With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
 with what that has kept, from the start of its process. The browser is open already.
@@ -49,14 +49,15 @@ from lightpaint.target.target import Target
 
 ARGUMENTS = ["--no-sandbox"]
 
-#: Watches a page: when the last move of the pointer was, of which of them an answer knows, and when
-#: that is drawn.
+#: Watches a page: when the last move or press of the pointer was, of which of them an answer knows,
+#: and when that is drawn.
 WATCH = """() => {
   const { host, engine } = document.getElementById('lightpaint').painter;
   const { screen } = engine;
   const times = [], send = host.send.bind(host), now = screen.now.bind(screen);
   let moved = 0, answered = 0;
-  addEventListener('pointermove', (event) => { moved = event.timeStamp; }, true);
+  for (const kind of ['pointermove', 'pointerdown'])
+    addEventListener(kind, (event) => { moved = event.timeStamp; }, true);
   host.send = async (kind, fields, arrays) => {
     const at = moved;
     const reply = await send(kind, fields, arrays);

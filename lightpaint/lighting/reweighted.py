@@ -16,6 +16,7 @@ from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pixels import Pixels, image_of
+from lightpaint.threads import side_by_side
 
 #: Rounds at most.
 ROUNDS = 100
@@ -139,7 +140,7 @@ def descend(
         x = LitPixels.whole(basis, loss).predicted(led.at)
         image, weight = loss.pixels.squares(x, from_clipping=led.from_clipping)
     share = loss.pixels.shares(x, weight)
-    squares = Squares(*(image_of(planes, basis.size) for planes in (image, weight, share)))
+    squares = Squares(*side_by_side(lambda x: image_of(x, basis.size), (image, weight, share)))
     told = Reweighting(led.at, led.count, led.step, led.converged)
     return Descent(led.weights, squares, led.equations, told)
 
