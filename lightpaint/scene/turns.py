@@ -7,16 +7,20 @@ In between, a thread that nobody waits for lets others go first.
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from threading import Condition, get_ident, local
+from time import monotonic
 
 from lightpaint.signals import interruptible_between_pieces
+
+#: Seconds after which even somebody at leisure gets a turn among others.
+PATIENCE_S = 2.0
 
 
 class Turns:
     """Turns that threads take at something, in the order in which they come.
 
-    One that has its turn may take it again.
+    One that has its turn may take it again. Who is at leisure comes last, but now and then.
     """
 
     def __init__(self) -> None:
@@ -24,6 +28,7 @@ class Turns:
         self._holder: int | None = None
         self._depth = 0
         self._waiting = deque[object]()  # of those that are waited for
+        self._idle: dict[object, float] = {}  # those at leisure that wait, and since when
         self._away = 0  # how many of them let others go on, and come back
         self._own = local()
 
@@ -44,7 +49,7 @@ class Turns:
 
     @contextmanager
     def at_leisure(self) -> Iterator[None]:
-        """Nobody waits for what this thread does meanwhile: all others go first."""
+        """Nobody waits for what this thread does meanwhile: others go first."""
         before, self._own.is_at_leisure = self._is_at_leisure, True
         try:
             yield
@@ -84,24 +89,27 @@ class Turns:
 
     def _take(self, depth: int) -> None:
         ticket = object()
-
-        def is_next() -> bool:
-            if self._holder is not None:
-                return False
-            if self._is_at_leisure:
-                return not (self._waiting or self._away)
-            return self._waiting[0] is ticket
-
         with self._changed:
-            if not self._is_at_leisure:
+            if self._is_at_leisure:
+                self._idle[ticket] = monotonic()
+            else:
                 self._waiting.append(ticket)
             try:
-                self._changed.wait_for(is_next)
+                self._changed.wait_for(lambda: self._holder is None and self._next() is ticket)
                 self._holder, self._depth = get_ident(), depth
             finally:
-                with suppress(ValueError):  # at leisure
+                if self._idle.pop(ticket, None) is None:
                     self._waiting.remove(ticket)
                 self._changed.notify_all()  # whoever is interrupted keeps nobody waiting
+
+    def _next(self) -> object | None:
+        """Whose turn it is, once nobody has one."""
+        idle = next(iter(self._idle), None)
+        if idle is not None and monotonic() - self._idle[idle] > PATIENCE_S:
+            return idle
+        if self._waiting:
+            return self._waiting[0]
+        return None if self._away else idle
 
     def _leave(self, away: bool = False) -> None:
         with self._changed:

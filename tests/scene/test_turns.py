@@ -82,6 +82,23 @@ def test_nobody_is_passed_over(work: Work):
     _together(again, once, work=work)
 
 
+def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.MonkeyPatch):
+    """Somebody may render in a notebook one picture after the other."""
+    monkeypatch.setattr("lightpaint.scene.turns.PATIENCE_S", 5 * PIECE_S)
+    is_done = threading.Event()
+
+    def again() -> None:
+        while not is_done.is_set():
+            work.urgent()
+
+    def leisure() -> None:
+        work.leisure()
+        is_done.set()
+
+    _together(again, leisure, work=work)
+    assert work.done.count("leisure") == 6
+
+
 def test_who_waits_for_another_lets_it(work: Work):
     """Somebody who hears of progress may wait for a thread that wants its own turn."""
     turns, is_done = work.turns, threading.Event()
