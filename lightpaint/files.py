@@ -3,6 +3,7 @@
 import errno
 import os
 import re
+import shutil
 import stat
 import tempfile
 import threading
@@ -29,6 +30,9 @@ LONGEST_NAME = 255 - 32
 #: Characters of what others say that an error repeats.
 MAX_QUOTED = 400
 
+#: How a folder is called in which a file is written: by the file, and as tempfile ends names.
+_BESIDE = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -49,6 +53,18 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"cannot write {path}: {reason}") from error
+
+
+def sweep(folder: Path) -> None:
+    """Delete what stays in `folder` of writing to files there when a process was killed meanwhile.
+
+    To be called where nobody else writes.
+    """
+    for path in folder.glob(".*"):
+        name = _BESIDE.fullmatch(path.name)
+        with suppress(OSError):
+            if name and path.is_dir() and {x.name for x in path.iterdir()} <= {name[1]}:
+                shutil.rmtree(path)
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -2,12 +2,15 @@
 
 import errno
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.files import check_files, check_writable, replacing, write_bytes, write_text
+from lightpaint.files import check_files, check_writable, replacing, sweep, write_bytes, write_text
 
 
 @pytest.fixture
@@ -53,6 +56,26 @@ def test_an_interrupted_write_leaves_old_content_and_no_debris(
         _fail_halfway(old, problem())
     assert old.read_bytes() == b"old"
     assert os.listdir(old.parent) == [old.name]
+
+
+@pytest.mark.parametrize("has_begun", [False, True])
+def test_what_a_kill_leaves_is_swept_up_and_nothing_else(old: Path, has_begun: bool):
+    script = "import sys; from pathlib import Path; from lightpaint.files import replacing\n"
+    script += "with replacing(Path(sys.argv[1])) as beside:\n"
+    script += "    beside.touch()\n" * has_begun + "    import os; os.kill(os.getpid(), 9)"
+    done = subprocess.run([sys.executable, "-c", script, str(old)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert len(os.listdir(old.parent)) == 2
+    others = [old.parent / f".{name}" for name in ("git", "a.txt.12345678", "b.json.abcdefgh")]
+    for other in others:
+        other.mkdir()
+        (other / "somebody's").touch()
+    (old.parent / ".c.txt.12345678").touch()
+    before = set(old.parent.iterdir())
+    sweep(old.parent)
+    [gone] = before - set(old.parent.iterdir())
+    assert gone.name.startswith(f".{old.name}.")
+    sweep(old.parent / "nowhere")
 
 
 def test_a_full_disk_is_an_output_error_that_names_the_file(old: Path):

@@ -24,10 +24,12 @@ from lightpaint.batch.planes import keep_all_planes
 from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases, waves
 from lightpaint.batch.processes import Processes
 from lightpaint.batch.spread import rendered_by
+from lightpaint.batch.summary import THUMBNAILS
 from lightpaint.batch.sums import solved_by_sums
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of, final_render, is_full
 from lightpaint.errors import BatchError, LightpaintError, OutputError
+from lightpaint.files import sweep
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
 from lightpaint.scene.quality import on_film, samples
@@ -56,6 +58,9 @@ def run_batch(
     """
     how = how or How()
     with alone(plan.folder, may_share=how.apart), ExitStack() as stack:
+        if not how.apart:
+            for place in (plan.folder, plan.folder / THUMBNAILS):
+                sweep(place)
         run = _Run(plan, how, listener(progress), told or (lambda look, done: None))
         try:
             run.all(stack)
