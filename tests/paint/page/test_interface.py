@@ -576,6 +576,23 @@ def test_around_it_nothing_hears_its_keys(opened: Any) -> None:
     assert painter.ui("tool") == "brush"
 
 
+def test_a_window_is_open_before_the_next_key(opened: Any) -> None:
+    """An Escape that comes at once closes it, and is not lost."""
+    painter = opened()
+    painter.page.evaluate(
+        """() => {
+          const press = (key) => document.body.dispatchEvent(
+            new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
+          press('?');
+          window.isOpen = new Promise((tell) => setTimeout(() =>
+            tell(document.querySelector('dialog')?.open ?? null)));
+        }"""
+    )
+    assert painter.page.evaluate("() => window.isOpen") is True
+    painter.page.keyboard.press("Escape")
+    painter.page.wait_for_function("() => !document.querySelector('dialog')")
+
+
 def test_windows_lie_over_it(opened: Any) -> None:
     """In a frame as high as all of a notebook; over the frame where hardly any of it is seen."""
     painter = opened("shadow", viewport={"width": 1280, "height": 5000})

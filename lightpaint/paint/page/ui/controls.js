@@ -1,6 +1,6 @@
 /** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
 
-import { html, useEffect, useRef, useState } from '../vendor/preact.js';
+import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Icon } from './icons.js';
 
 let counter = 0;
@@ -196,7 +196,8 @@ function placeOver(element) {
 export function Dialog({ title, close, children, class: name }) {
   const ref = useRef(/** @type {HTMLDialogElement | null} */ (null));
   const id = useId();
-  useEffect(() => {
+  // At once: the next key is Escape, maybe.
+  useLayoutEffect(() => {
     const element = ref.current;
     const before = /** @type {HTMLElement | null} */ (
       /** @type {Document | ShadowRoot | undefined} */ (element?.getRootNode())?.activeElement
