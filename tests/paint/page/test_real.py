@@ -649,6 +649,20 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
         served.close()
 
 
+def test_what_comes_at_rest_is_drawn_sharply_at_once(served: Served, opened: Any) -> None:
+    """As each round of samples does: a picture that is looked at does not turn coarse for it."""
+    me = opened(served).ready()
+    me.stroke((20, 20), (40, 20)).still("brush")
+    me.look(
+        "const draw = screen.view.draw.bind(screen.view); window.drawn = [];"
+        "screen.view.draw = (params) => { window.drawn.push(params.live); draw(params); }"
+    )
+    served.studio._settling.ring()
+    until(lambda: me.page.evaluate("() => window.drawn.length"), "nothing is drawn")
+    me.still("brush")
+    assert not any(me.page.evaluate("() => window.drawn"))
+
+
 def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
     served: Served, opened: Any
 ) -> None:

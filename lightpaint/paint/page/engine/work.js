@@ -128,7 +128,8 @@ export class Work {
     if (!weights) return;
     this.weights = Float64Array.from(weights);
     this.weigh();
-    this.screen.request(true);
+    // The exact one comes at rest, and is to be looked at.
+    this.screen.request(!message.exact);
   }
 
   /** @param {Message} message */
