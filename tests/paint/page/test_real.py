@@ -327,6 +327,7 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     me.still()
     assert not session.wishes.lights
     # A page that goes in the middle of it leaves nothing.
+    me.page.get_by_text("Nothing is painted").wait_for()  # what rows said of it is gone, too
     box = slider.bounding_box()
     y = box["y"] + box["height"] / 2
     me.drag((box["x"] + 40, y), (box["x"] + box["width"], y), hold=True)
