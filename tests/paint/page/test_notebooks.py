@@ -163,6 +163,9 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
     (folder / "paint.ipynb").write_text(json.dumps({**notebook, "cells": cells}))
     options = ["--no-browser", "--allow-root", "--ServerApp.token=", "--ServerApp.password="]
     with served(folder, "jupyterlab", *options) as url, tab(browser) as page:
+        # A slow JupyterLab may ask which kernel it is, before it has read that: it knows by then.
+        asks = page.locator(".jp-Dialog .jp-mod-accept")
+        page.add_locator_handler(asks, lambda: asks.click())
         page.goto(f"{url}/lab/tree/paint.ipynb?reset")
         run_cell(page, 0, lambda: page.locator(".lightpaint").count() == 1)
         paint(page, folder)
