@@ -140,7 +140,8 @@ class Canvas:
             image[part], importance[part] = pixels.image, pixels.importance
             if at_least is not None:
                 at_least[part] = False if pixels.at_least is None else pixels.at_least
-        return Pixels(image, importance, at_least).copy()
+        is_marked = at_least is not None and at_least.any()
+        return Pixels(image, importance, at_least if is_marked else None)
 
     def close(self) -> None:
         """The stroke that is open is done."""

@@ -84,7 +84,7 @@ class Looks:
         for k, view in enumerate(self._session.views):
             if of_view("image", k) in names:
                 image, importance = (arrays[of_view(x, k)] for x in ("image", "importance"))
-                marks = arrays[name].view(bool) if (name := of_view(MARKS, k)) in names else None
+                marks = arrays[name] > 0 if (name := of_view(MARKS, k)) in names else None
                 found.append(Pixels(image, importance, marks))
             else:
                 found.append(Pixels.unpainted(view.present))
