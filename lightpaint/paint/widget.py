@@ -250,11 +250,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     @contextmanager
     def _telling(self) -> Iterator[None]:
-        before, self._is_telling = self._is_telling, True
-        try:
-            yield
-        finally:
-            self._is_telling = before
+        with self._lock:  # two threads that tell would each take the other's word for a cell's
+            before, self._is_telling = self._is_telling, True
+            try:
+                yield
+            finally:
+                self._is_telling = before
 
     def _lighting(self, moment: Moment) -> Lighting:
         solution = self.solution

@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -169,6 +170,34 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Pa
     painter.target = None
     assert painter.target is None
     assert painter.solution is None
+
+
+def test_two_threads_may_tell_at_once(
+    basis: lp.Basis, open_: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As at the start, where the exact answer comes while the first one is told."""
+    painter = open_()
+    set_trait, pauses_s = painter.set_trait, threading.local()
+
+    def slowly(name: str, value: Any) -> None:
+        time.sleep(getattr(pauses_s, "each", 0))
+        set_trait(name, value)
+
+    def tell(pause_s: float) -> None:
+        pauses_s.each = pause_s
+        time.sleep(pause_s)  # one begins, and ends, before the other
+        weights = np.full((3, 3), pause_s)
+        asked = lp.Constraints.of({"key": {"lock": pause_s}})
+        painter._follow({"lighting": lp.Lighting.of_weights(basis, weights), "constraints": asked})
+
+    monkeypatch.setattr(painter, "set_trait", slowly)
+    with ThreadPoolExecutor(2) as threads:
+        for told in [threads.submit(tell, pause_s) for pause_s in (0.02, 0.03)]:
+            told.result()
+    # What was told is no wish of a cell, and a cell is heard again.
+    assert not painter._studio.session.store.steps
+    painter.constraints = lp.Constraints.of({"fill": {"off": True}})
+    assert len(painter._studio.session.store.steps) == 1
 
 
 def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> None:
