@@ -4,11 +4,9 @@ It knows nothing of light. The page is a table of files; pictures are raw bytes 
 generation; all else goes over one WebSocket. `guard.py` says who may ask.
 """
 
-import signal
 import socket
-import threading
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -172,18 +170,13 @@ class Server:
         # Whoever comes meanwhile waits at the socket.
         import uvicorn
 
-        line = self._line
-        self._guard.app = page_app(line)
+        from lightpaint.paint.goodbye import EndingServer, PageSocket, hanging_up
 
-        class Ending(uvicorn.Server):
-            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-                await line.end()  # while pages can still be told
-                await super().shutdown(sockets)
-
+        self._guard.app = page_app(self._line)
         config = uvicorn.Config(
             self._guard,
             http="h11",
-            ws="websockets-sansio",
+            ws=PageSocket,
             ws_max_size=self._largest,
             ws_per_message_deflate=False,
             ws_ping_interval=10.0,
@@ -194,9 +187,9 @@ class Server:
             limit_concurrency=256,
             timeout_graceful_shutdown=5,
         )
-        self._serving = Ending(config)
+        self._serving = EndingServer(config, self._line)
         self._serving.should_exit = self._is_to_stop
-        with _hanging_up(self._serving):
+        with hanging_up(self._serving):
             self._serving.run(sockets=[self._socket])
 
     def stop(self, why: str = "") -> None:
@@ -213,20 +206,6 @@ class Server:
 
 async def _nothing_yet(scope: Any, receive: Any, send: Any) -> None:
     """What is behind the guard before anybody serves."""
-
-
-@contextmanager
-def _hanging_up(server: "uvicorn.Server") -> Iterator[None]:
-    """A terminal that closes ends `server` as SIGTERM does, unless that is ignored (nohup)."""
-    before = signal.getsignal(signal.SIGHUP)
-    is_heard = threading.current_thread() is threading.main_thread() and callable(before)
-    if is_heard:
-        signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
-    try:
-        yield
-    finally:
-        if is_heard:
-            signal.signal(signal.SIGHUP, before)
 
 
 def _shown(host: str | None) -> str:
