@@ -314,10 +314,13 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     me = opened(served).ready()
     session = served.studio.session
     me.press("0").stroke((60, 30), (80, 30)).still("brush")
+    slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
+    box = slider.bounding_box()
     me.button("Hold light 1 as it is in the answer").click()
     me.still("brush", "light 1")
     held = session.weights[1].copy()
-    slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
+    me.page.get_by_text("held", exact=True).wait_for()
+    assert slider.bounding_box() == box  # what is said of a light moves no row
     slider.focus()
     slider.press("ArrowRight")
     me.still("brush", "light 1", "light 1")
@@ -327,8 +330,6 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     me.still()
     assert not session.wishes.lights
     # A page that goes in the middle of it leaves nothing.
-    me.page.get_by_text("Nothing is painted").wait_for()  # what rows said of it is gone, too
-    box = slider.bounding_box()
     y = box["y"] + box["height"] / 2
     me.drag((box["x"] + 40, y), (box["x"] + box["width"], y), hold=True)
     until(lambda: session.is_open, "the slider is not heard")

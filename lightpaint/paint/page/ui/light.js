@@ -42,6 +42,7 @@ export class LightRow extends Component {
       <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
         <${Thumb} name=${this.props.picture} generation=${this.props.thumb} hands=${hands} />
         <${Share} share=${this.props.lit?.share ?? 0} here=${here} />
+        <${Badge} ...${this.props} />
       </div>
       <div class="light-main">
         <div class="light-head">
@@ -90,9 +91,8 @@ export class LightRow extends Component {
   }
 
   numbers() {
-    const { light, rgb, lit, isLive, asked, tied } = this.props;
+    const { light, rgb, lit, isLive } = this.props;
     const level = luminance(rgb);
-    const said = notes({ light, lit, asked, tied });
     const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
     const hue = white ? kelvinText(white) : (lit?.hue ?? '');
     const parts = [
@@ -104,13 +104,7 @@ export class LightRow extends Component {
         style=${{ background: level > 0 ? toHex(scaled(rgb)) : 'none' }}></span>
       <span class="values">${level > 0 ? parts.join(' · ') : 'off'}</span>
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
-    </div>
-    ${
-      said.length > 0 &&
-      html`<div class="badges">${said.map(
-        (note) => html`<span class="badge" key=${note}>${note}</span>`,
-      )}</div>`
-    }`;
+    </div>`;
   }
 
   dimmer() {
@@ -140,6 +134,20 @@ function Share({ share, here }) {
     <i style=${{ '--share': String(value) }}></i><span>${percent(value)}</span></span>`;
 }
 
+/** What is worth a word, below the picture: the rows keep their height while lights change.
+ * @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} props */
+function Badge(props) {
+  const { lit, asked = {} } = props;
+  const isBack = Boolean(lit?.held) && asked.lock === undefined && !asked.off;
+  const said = notes(props);
+  if (isBack) said.push(['bound', 'This holds it back']);
+  if (!said.length) return null;
+  const tip = said.map(([, words]) => `${words}.`).join(' ');
+  const more = said.length > 1 + Number(isBack) ? ` +${said.length - 1 - Number(isBack)}` : '';
+  return html`<span class=${`badge ${isBack ? 'is-back' : ''}`} data-tip=${tip}
+    >${said[0][0]}${more}</span>`;
+}
+
 /** @param {import("./model.js").UiStore} store @param {number} k */
 function unfold(store, k) {
   store.set(({ unfolded }) => ({
@@ -147,21 +155,21 @@ function unfold(store, k) {
   }));
 }
 
-/** What is worth a word. @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} about
- * @returns {string[]} */
+/** In a word, and in words. @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} about
+ * @returns {string[][]} */
 function notes({ light, lit, asked = {}, tied }) {
-  return [
-    light.is_fixed && 'stays as it is',
-    asked.off && 'off',
-    asked.lock !== undefined && 'held',
-    asked.limits && 'limits',
-    (asked.color ?? asked.kelvin ?? asked.primaries) && 'colour',
-    tied && 'tied',
-    lit?.unreached && 'not in the picture',
-    lit?.held && asked.lock === undefined && !asked.off && 'held back',
-  ]
-    .filter(Boolean)
-    .map(String);
+  const colour = asked.color ?? asked.kelvin ?? asked.primaries;
+  /** @type {[unknown, string, string][]} */
+  const all = [
+    [light.is_fixed, 'fixed', 'It stays as it is'],
+    [asked.off, 'off', 'You have put it out'],
+    [asked.lock !== undefined, 'held', 'You hold it at this level'],
+    [asked.limits, 'limits', 'You have set limits to its level'],
+    [colour, 'colour', 'You have said what colour it may have'],
+    [tied, 'tied', `It goes with ${tied?.filter((name) => name !== light.name).join(', ')}`],
+    [lit?.unreached, 'unseen', 'None of its light reaches the picture'],
+  ];
+  return all.filter(([isSo]) => isSo).map(([, ...words]) => words);
 }
 
 /** @param {RGB} rgb @returns {RGB} */
