@@ -53,6 +53,9 @@ class Heard:
 class Client:
     """One page. page: a name that it has made up for itself, by which it is known when it is back
     after a dropped connection; "" if it has none.
+
+    Attributes:
+        has_left: Whether it says no more; what it has said may wait to be answered.
     """
 
     def __init__(self, socket: Socket, page: str = "") -> None:
@@ -62,30 +65,48 @@ class Client:
         self._unsent: list[tuple[Message, int | None]] = []
         self._is_heard, self._is_taken = asyncio.Event(), asyncio.Event()
         self._is_to_send, self._is_sent = asyncio.Event(), asyncio.Event()
+        self._is_answered = asyncio.Event()
         self._is_sent.set()
+        self._is_answered.set()
         self._is_gone = False
+        self.has_left = False
 
     async def keep_hearing(self) -> None:
         """Take what the page says until it leaves, but no more than waits already."""
-        while not self._is_gone:
-            message = await self._socket.receive()
-            if message["type"] != "websocket.receive":
-                return
-            heard = _heard(message.get("bytes"))
-            if not self._covers_last(heard):
-                self._heard.append(heard)
-            self._is_heard.set()
-            while len(self._heard) >= MOST_HEARD and not self._is_gone:
-                self._is_taken.clear()
-                await self._is_taken.wait()
+        try:
+            while not self._is_gone:
+                message = await self._socket.receive()
+                if message["type"] != "websocket.receive":
+                    return
+                await self._takes(_heard(message.get("bytes")))
+        finally:
+            self.has_left = True
+
+    async def _takes(self, heard: Heard) -> None:
+        """Have it answered, in its turn."""
+        if not self._covers_last(heard):
+            self._heard.append(heard)
+        self._is_answered.clear()
+        self._is_heard.set()
+        while len(self._heard) >= MOST_HEARD and not self._is_gone:
+            self._is_taken.clear()
+            await self._is_taken.wait()
 
     async def next_heard(self) -> Heard:
-        """What is to be answered next."""
+        """What is to be answered next; what was before it has been."""
         while not self._heard:
+            self._is_answered.set()
             self._is_heard.clear()
             await self._is_heard.wait()
         self._is_taken.set()
         return self._heard.pop(0)
+
+    def give_up(self) -> None:
+        """Say no more to it, and take no more from it."""
+        self._is_gone = True
+        self._unsent.clear()
+        for event in (self._is_sent, self._is_to_send, self._is_taken):
+            event.set()
 
     def _covers_last(self, heard: Heard) -> bool:
         """Put `heard` in the place of live paint that waits and that it covers, if it does."""
@@ -116,7 +137,7 @@ class Client:
         self._is_sent.clear()
         self._is_to_send.set()
         if len(self._unsent) > MOST_UNSENT:
-            self._gone()
+            self.give_up()
 
     async def keep_sending(self) -> None:
         """Send until the page has gone."""
@@ -134,8 +155,12 @@ class Client:
             try:
                 await asyncio.wait_for(self._socket.send_bytes(frame), SLOWEST_S)
             except Exception:  # whatever a socket says that has nobody at its end
-                self._gone()
+                self.give_up()
         await self.leave(1013)
+
+    async def answered(self) -> None:
+        """Wait until all that the page has said is answered."""
+        await self._is_answered.wait()
 
     async def sent(self) -> None:
         """Wait until the page has heard everything."""
@@ -143,17 +168,11 @@ class Client:
 
     async def leave(self, code: int) -> None:
         """Close the socket, if it is still there."""
-        self._gone()
+        self.give_up()
         try:
             await asyncio.wait_for(self._socket.close(code), 1.0)
         except Exception:  # it is not
             return
-
-    def _gone(self) -> None:
-        self._is_gone = True
-        self._unsent.clear()
-        for event in (self._is_sent, self._is_to_send, self._is_taken):
-            event.set()
 
 
 def _heard(frame: bytes | None) -> Heard:

@@ -10,7 +10,7 @@ Whatever happens in the session is an answer to the page, and never the end of t
 
 import asyncio
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
@@ -87,16 +87,15 @@ class Line:
         return self._holder is not None
 
     async def end(self) -> None:
-        """Tell all pages, and finish what the session is at."""
+        """Finish what pages have said, tell them, and finish what the session is at."""
+        await _all([client.answered() for client in self._clients])
         self._is_over = True
         self.session.on_message = None
         if self._watch is not None:
             self._watch.cancel()
         for client in self._clients:
             client.send(Message("closed", {"reason": "ended", "text": self.farewell}))
-        leaving = [asyncio.ensure_future(client.sent()) for client in self._clients]
-        if leaving:
-            await asyncio.wait(leaving, timeout=GOODBYE_S)
+        await _all([client.sent() for client in self._clients])
         await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
 
     async def serve(self, client: Client) -> None:
@@ -109,10 +108,15 @@ class Line:
         answering = asyncio.create_task(self._answering(client))
         try:
             await client.keep_hearing()
+            # The last stroke of a page counts, though nobody is there for the answer.
+            last = asyncio.ensure_future(client.answered())
+            await asyncio.wait((last, answering), return_when=asyncio.FIRST_COMPLETED)
+            last.cancel()
         finally:
             self._clients.discard(client)
             if self._holder is client:
                 self._holder = None
+            client.give_up()  # a task may be at the end of a wait, which swallows the cancelling
             for task in (sending, answering):
                 task.cancel()
             await asyncio.gather(sending, answering, return_exceptions=True)
@@ -147,8 +151,9 @@ class Line:
             if heard.refusal is not None:
                 return [heard.refusal]
             if heard.asks_for_session:
-                if self._holder not in (None, client) and not (
-                    heard.takes_over or _same_page(self._holder, client)
+                holder = await self._present_holder(client)
+                if holder not in (None, client) and not (
+                    heard.takes_over or _same_page(holder, client)
                 ):
                     return [_taken("another tab has this session")]
                 is_back = self._last is client or _same_page(self._last, client)
@@ -165,6 +170,14 @@ class Line:
             self.say("".join(traceback.format_exception(error)))
             text = f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
             return [Message("failed", {"text": text})]
+
+    async def _present_holder(self, client: Client) -> Client | None:
+        """Who has the session when `client` asks: what one that has left had said is done first."""
+        while (holder := self._holder) not in (None, client) and holder.has_left:
+            await holder.answered()
+            if self._holder is holder:
+                self._holder = None
+        return holder
 
     def _give(self, client: Client) -> None:
         """`client` has the session from now on."""
@@ -205,6 +218,15 @@ class Line:
         self.say(text)
         tone = "info" if unsaved is None else "warn"
         self._post(Message("say", {"text": text, "tone": tone}))
+
+
+async def _all(waits: list[Coroutine[Any, Any, None]]) -> None:
+    """Wait for all of them, but not for those who are too slow."""
+    tasks = [asyncio.ensure_future(wait) for wait in waits]
+    if tasks:
+        await asyncio.wait(tasks, timeout=GOODBYE_S)
+    for task in tasks:
+        task.cancel()
 
 
 def _taken(text: str) -> Message:

@@ -1,8 +1,10 @@
 """The painter's server: who may ask, what strangers and junk are told, who has the session."""
 
+import asyncio
 import json
 import re
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,7 +23,7 @@ from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.guard import Guard
 from lightpaint.paint.line import Line
 from lightpaint.paint.page_files import page_files
-from lightpaint.paint.protocol import VERSION
+from lightpaint.paint.protocol import VERSION, Paint
 from lightpaint.paint.server import Server, listening, page_app
 
 PORT = 8421
@@ -470,6 +472,91 @@ def test_all_are_told_of_the_end(stranger: Served) -> None:
         stranger.browser.portal.call(stranger.line.end)
         assert heard(socket)["reason"] == "ended"
     assert stranger.session.on_message is None
+
+
+# Last words
+
+
+class Scripted:
+    """A socket whose other end has said all it will say at once."""
+
+    def __init__(self, *frames: bytes, leaves: bool = True) -> None:
+        goodbye = [{"type": "websocket.disconnect", "code": 1001}] if leaves else []
+        said = [{"type": "websocket.receive", "bytes": frame} for frame in frames]
+        self.to_hear, self.sent = [*said, *goodbye], list[dict[str, Any]]()
+
+    async def receive(self) -> Any:
+        if not self.to_hear:
+            await asyncio.Event().wait()
+        return self.to_hear.pop(0)
+
+    async def send_bytes(self, data: bytes) -> None:
+        self.sent.append(of_frame(data)[0])
+
+    async def close(self, code: int = 1000) -> None:
+        """There is nothing to close."""
+
+
+HELLO = frame("hello", 0, version=VERSION)
+
+
+def strokes_of(session: FakeSession) -> list[int]:
+    return [said.stroke for said in session.heard if isinstance(said, Paint)]
+
+
+def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
+    session = FakeSession()
+    session.before_paint = lambda: time.sleep(0.02)
+
+    async def trial() -> None:
+        its = Line(session, None)
+        its.begin()
+        strokes = [paint(k, stroke=k, done=True) for k in (1, 2, 3)]
+        page = asyncio.ensure_future(its.serve(client.Client(Scripted(HELLO, *strokes), "a")))
+        await asyncio.sleep(0.03)  # it has left, and is not done with
+        after = Scripted(HELLO, paint(4, stroke=4, done=True), leaves=False)
+        other = asyncio.ensure_future(its.serve(client.Client(after, "b")))
+        await page
+        while 4 not in strokes_of(session):
+            await asyncio.sleep(0.01)
+        other.cancel()
+        assert after.sent[0]["kind"] == "state"  # and not: another tab has this session
+        await its.end()
+
+    asyncio.run(asyncio.wait_for(trial(), 20))
+    assert strokes_of(session) == [1, 2, 3, 4]
+
+
+def test_a_page_that_greets_and_goes_is_not_waited_for() -> None:
+    session = FakeSession()
+
+    async def trial() -> None:
+        its = Line(session, None)
+        its.begin()
+        await its.serve(client.Client(Scripted(HELLO, HELLO, paint(1), HELLO), "a"))
+        await its.end()
+
+    asyncio.run(asyncio.wait_for(trial(), 20))
+    assert strokes_of(session) == [1]
+
+
+def test_what_was_said_before_the_end_is_done() -> None:
+    session = FakeSession()
+    session.before_paint = lambda: time.sleep(0.02)
+
+    async def trial() -> None:
+        its = Line(session, None)
+        its.begin()
+        socket = Scripted(HELLO, *(paint(k, stroke=k, done=True) for k in (1, 2, 3)), leaves=False)
+        serving = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
+        while not strokes_of(session):
+            await asyncio.sleep(0.001)
+        await its.end()
+        serving.cancel()
+        assert socket.sent[-1]["reason"] == "ended"
+
+    asyncio.run(asyncio.wait_for(trial(), 20))
+    assert strokes_of(session) == [1, 2, 3]
 
 
 # Pages that are slow
