@@ -123,6 +123,18 @@ def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
     assert stranger.browser.get(f"/?token={token}").status_code == 403
 
 
+@pytest.mark.parametrize(
+    "other", ['prefs={"a":"b"}', "name=John Smith", "flag", "x[]=1", 'q="', "é=é"]
+)
+def test_cookies_of_other_servers_of_the_machine_shut_nobody_out(
+    served: Served, other: str
+) -> None:
+    [own] = served.browser.cookies.jar
+    for said in (f"{other}; {own.name}={own.value}", f"{own.name}={own.value}; {other}"):
+        served.browser.cookies.clear()
+        assert served.browser.get("/", headers={"cookie": said.encode()}).status_code == 200
+
+
 def test_a_cookie_of_another_launch_is_worth_nothing(stranger: Served) -> None:
     for value in ("", "wrong", "é", '"'):
         headers = {"cookie": f"lightpaint_{PORT}={value}".encode()}
