@@ -10,6 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live_view import LiveView
+from lightpaint.paint.open_stroke import OpenStroke
 from lightpaint.paint.pixels import Pixels, Region, slices
 from lightpaint.paint.steps import Patch, Step, painted_by
 
@@ -30,20 +31,21 @@ class Canvas:
 
     def __init__(self, view: int, basis: Basis, present: Floats, steps: Sequence[Step]) -> None:
         self.view = view
-        self._open: list[tuple[Region, Pixels]] = []
+        self._open = OpenStroke()
         self.improve(basis, present, steps)
 
     def improve(self, basis: Basis, present: Floats, steps: Sequence[Step]) -> None:
         """Go on with a basis of more samples, from steps that are done; an open stroke stays."""
-        painted = [(region, self.pixels(region)) for region, _ in self._open]
+        region = self._open.region
+        painted = self.pixels(region) if self._open else None
         self.basis, self.present = basis, np.asarray(present, np.float32)
         self.painting = painted_by(steps, Pixels.unpainted(self.present), self.view)
         unpainted = self.importance == 0
         self.image[unpainted] = self.present[unpainted]
         self.live = LiveView(basis, self.image, self.importance)
-        self._open = []
-        for region, pixels in painted:
-            self._lay(region, pixels)
+        self._open = OpenStroke()
+        if painted is not None:
+            self._lay(region, painted)
 
     @property
     def image(self) -> npt.NDArray[np.float32]:
@@ -103,24 +105,22 @@ class Canvas:
         self._lay(region, _marked(pixels, self.painting.part(region)))
 
     def _lay(self, region: Region, pixels: Pixels) -> None:
-        self._open.append((region, self.pixels(region)))
+        self._open.touches(region, self.painting)
         self.put(region, pixels)
 
     def drop(self) -> Region:
         """The stroke that is open is forgotten; where it was."""
-        region = _around([one for one, _ in self._open])
-        for one, pixels in reversed(self._open):
-            self.put(one, pixels)
-        self._open = []
+        region = self._open.region
+        self.put(region, self._open.before(self.painting))
+        self.close()
         return region
 
     def stroke(self) -> Patch | None:
         """What the stroke that is open has changed, if anything."""
-        region = _around([one for one, _ in self._open])
-        if region[0] == region[1] or region[2] == region[3]:
+        if not self._open:
             return None
+        region, before = self._open.region, self._open.before(self.painting)
         after = self.pixels(region)
-        before = self._before(region)
         if before.at_least is not None:
             # A stroke changes its mind as long as it lasts: what it left alone means what it did.
             after = _marked(after, before)
@@ -130,22 +130,9 @@ class Canvas:
             return None
         return Patch(region, before, after, self.view)
 
-    def _before(self, region: Region) -> Pixels:
-        """What there was before the stroke that is open, which is all within `region`."""
-        image, importance, at_least = self.pixels(region)
-        if self.painting.at_least is not None and at_least is None:
-            at_least = np.zeros(image.shape, bool)
-        for (top, bottom, left, right), pixels in reversed(self._open):
-            part = np.s_[top - region[0] : bottom - region[0], left - region[2] : right - region[2]]
-            image[part], importance[part] = pixels.image, pixels.importance
-            if at_least is not None:
-                at_least[part] = False if pixels.at_least is None else pixels.at_least
-        is_marked = at_least is not None and at_least.any()
-        return Pixels(image, importance, at_least if is_marked else None)
-
     def close(self) -> None:
         """The stroke that is open is done."""
-        self._open = []
+        self._open = OpenStroke()
 
     def checked(self, region: Region, arrays: Mapping[str, npt.NDArray[Any]]) -> Pixels:
         """What a page says of a region. Raises PaintError for what cannot be painted there."""
@@ -254,11 +241,3 @@ def _marked(pixels: Pixels, before: Pixels) -> Pixels:
         return pixels
     left_alone = (pixels.image == before.image).all(axis=-1) & (pixels.importance > 0)
     return pixels._replace(at_least=before.at_least & left_alone[..., None])
-
-
-def _around(regions: list[Region]) -> Region:
-    """The smallest region that holds all."""
-    if not regions:
-        return (0, 0, 0, 0)
-    tops, bottoms, lefts, rights = zip(*regions, strict=True)
-    return min(tops), max(bottoms), min(lefts), max(rights)

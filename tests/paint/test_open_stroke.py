@@ -1,0 +1,53 @@
+"""What there was before a stroke, however it went: against a copy of the whole picture."""
+
+from unittest.mock import patch
+
+import numpy as np
+import numpy.typing as npt
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.paint import open_stroke
+from lightpaint.paint.open_stroke import OpenStroke
+from lightpaint.paint.pixels import Pixels, Region, slices
+
+HEIGHT, WIDTH = 21, 34
+
+
+def spans(most: int) -> st.SearchStrategy[tuple[int, int]]:
+    return st.tuples(st.integers(0, most), st.integers(0, most)).map(lambda s: (min(s), max(s)))
+
+
+REGIONS = st.builds(lambda y, x: (*y, *x), spans(HEIGHT), spans(WIDTH))
+
+
+def picture(seed: int, marks: npt.NDArray[np.bool_] | None = None) -> Pixels:
+    random = np.random.default_rng(seed)
+    image = random.random((HEIGHT, WIDTH, 3), np.float32)
+    return Pixels(image, random.random((HEIGHT, WIDTH), np.float32), marks)
+
+
+@given(regions=st.lists(REGIONS, max_size=8), is_marked=st.booleans(), side=st.sampled_from([4, 7]))
+def test_what_was_before_is_given_back(regions: list[Region], is_marked: bool, side: int) -> None:
+    marks = np.random.default_rng(1).random((HEIGHT, WIDTH, 3)) > 0.5 if is_marked else None
+    painting = picture(0, marks)
+    before = painting.copy()
+    with patch.object(open_stroke, "SIDE", side):
+        stroke = OpenStroke()
+        for k, region in enumerate(regions):
+            stroke.touches(region, painting)
+            new = picture(k + 1).part(region)
+            painting.image[slices(region)] = new.image
+            painting.importance[slices(region)] = new.importance
+            if marks is not None:
+                marks[slices(region)] = False
+        found = stroke.before(painting)
+    real = [(a, b, c, d) for a, b, c, d in regions if a < b and c < d]
+    assert bool(stroke) == bool(real)
+    if real:
+        tops, bottoms, lefts, rights = zip(*real, strict=True)
+        assert stroke.region == (min(tops), max(bottoms), min(lefts), max(rights))
+    assert found.same(before.part(stroke.region))
+    # However often a stroke goes over a place, it is kept once.
+    kept = sum(pixels.importance.size for pixels in stroke._before.values())
+    assert kept <= HEIGHT * WIDTH
