@@ -52,6 +52,11 @@ class Answering:
         self._live.prepare()
 
     @property
+    def at_rest(self) -> Wishes:
+        """What is asked but for a slider that still moves."""
+        return self.kept or self.wishes
+
+    @property
     def mode(self) -> str:
         """In which space answers are found."""
         return self._live.mode
@@ -81,22 +86,25 @@ class Answering:
         reduced_by(self._constraints(wishes), self._basis, self._fit(wishes))
 
     def ask(self, wishes: Wishes) -> None:
-        """This from now on."""
+        """This from now on; a slider that moved has come to rest."""
+        self._ask(wishes)
+        self.kept = None
+
+    def _ask(self, wishes: Wishes) -> None:
         self.wishes = wishes
         self._live.asks(self.fit, self._constraints(wishes))
 
     def move(self, wishes: Wishes) -> None:
         """This, as long as a slider moves. Raises LightpaintError, and changes nothing then."""
         self.check(wishes)
-        self.kept = self.kept or self.wishes
-        self.ask(wishes)
+        self.kept = self.at_rest
+        self._ask(wishes)
 
     def move_back(self) -> bool:
         """Whether there was a slider that somebody has left; what was asked before is asked."""
         if self.kept is None:
             return False
-        wishes, self.kept = self.kept, None
-        self.ask(wishes)
+        self.ask(self.kept)
         return True
 
     def solve(self) -> None:

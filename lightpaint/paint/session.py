@@ -142,7 +142,22 @@ class Session:
     # What is said
 
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
-        """What has come of a message. Raises LightpaintError, and has changed nothing then."""
+        """What has come of a message. Raises LightpaintError, and has changed nothing then.
+
+        A slider that is being moved moves back before anything else is done, and where what it is
+        left at cannot be.
+        """
+        if not isinstance(message, protocol.Ask):
+            self._leave_slider()
+        try:
+            return self._done(message, arrays)
+        except LightpaintError:
+            self._leave_slider()
+            raise
+
+    def _done(
+        self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]
+    ) -> list[Message]:
         match message:
             case protocol.Paint():
                 return [self._paint(message, arrays)]
@@ -237,17 +252,22 @@ class Session:
 
         with_stroke: whether a stroke that is open is as it will stay, and kept so.
         """
-        if self.answering.move_back():
-            self._changed()
+        self._leave_slider()
         if with_stroke and self.is_open:
             self._close("stroke")
             self._changed()
 
+    def _leave_slider(self) -> None:
+        """One that is being moved moves back."""
+        if self.answering.move_back():
+            self._changed()
+
     def load(self, paintings: Mapping[int, Pixels], wishes: Wishes, label: str) -> list[Message]:
         """Go on from other paintings, by view, and what was asked with them: one step."""
+        self._leave_slider()
+        self.answering.check(wishes)
         if self.views.is_open:
             self._drop()
-        self.answering.check(wishes)
         patches = self.views.instead(paintings)
         fields = {"before": self.wishes.as_json(), "after": wishes.as_json()}
         self.store.append(Step("look_loaded", label, fields, patches))
@@ -276,8 +296,7 @@ class Session:
         return self.answer(**(self.about if said.done else {}))
 
     def _close(self, label: str) -> None:
-        """Make a step of the stroke that is open, if one is; a slider that was left moves back."""
-        self.answering.move_back()
+        """Make a step of the stroke that is open, if one is."""
         if patches := self.views.strokes():
             self.store.append(Step("stroke", label, {}, patches))
         self.views.close()
@@ -292,7 +311,9 @@ class Session:
 
     def _step(self, by: int) -> list[Message]:
         """Back or forth by one."""
-        self._close("stroke")
+        if self.views.is_open:
+            self._close("stroke")
+            self._changed()
         steps, now = self.store.steps, self.store.position
         position, is_back = now + by, by < 0
         if not 0 <= position <= len(steps):
@@ -313,18 +334,17 @@ class Session:
             raise PaintError(f"{light.name} is kept as it is, and cannot be asked for anything")
         asked = self.wishes.of_light(light.name, said.asked)
         if said.done:
-            before, self.answering.kept = self.answering.kept or self.wishes, None
-            return self._wish(light.name, asked, before=before)
+            return self._wish(light.name, asked)
         # While a slider moves nothing is kept.
         self.answering.move(asked)
         self._changed()
         return self.answer()
 
-    def _wish(self, label: str, wishes: Wishes, *, before: Wishes | None = None) -> Message:
+    def _wish(self, label: str, wishes: Wishes) -> Message:
         """Ask for something from now on: a step."""
-        self._close("stroke")
         self.answering.check(wishes)
-        fields = {"before": (before or self.wishes).as_json(), "after": wishes.as_json()}
+        self._close("stroke")
+        fields = {"before": self.answering.at_rest.as_json(), "after": wishes.as_json()}
         self.store.append(Step("asked", label, fields))
         self.answering.ask(wishes)
         self._changed()

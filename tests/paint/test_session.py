@@ -1,5 +1,7 @@
 """Whatever is done in a session, and in whichever order, equals what is built from scratch."""
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.wishes import Wishes
 from lightpaint.settings import Settings
 
 SIZE = (18, 32)
@@ -208,7 +211,9 @@ DONE = st.one_of(
     st.tuples(
         st.just("ask"), st.integers(0, 2), st.sampled_from([{}, {"lock": True}, {"off": True}])
     ),
-    st.tuples(st.just("slide"), st.integers(0, 2), st.floats(0, 2, width=16)),
+    st.tuples(st.just("slide"), st.integers(0, 2), st.floats(-1, 2, width=16), st.booleans()),
+    st.tuples(st.just("load"), st.floats(0, 2, width=16), st.sampled_from([{}, {"off": True}])),
+    st.tuples(st.just("leave"), st.booleans()),
     st.tuples(st.just("set"), st.sampled_from(["free", "white", None])),
     st.tuples(st.sampled_from(["undo", "redo", "drop"])),
 )
@@ -230,8 +235,12 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
                 case "ask":
                     session.said(protocol.Ask(its[0], its[1]), {})
                 case "slide":
-                    session.said(protocol.Ask(its[0], {"lock": its[1]}, done=False), {})
-                    session.said(protocol.Ask(its[0], {"lock": its[1]}), {})
+                    session.said(protocol.Ask(its[0], {"lock": its[1]}, done=its[2]), {})
+                case "load":
+                    pixels = Pixels(np.full((*SIZE, 3), its[0]), np.ones(SIZE))
+                    session.load({0: pixels}, Wishes({"lamp 0": its[1]} if its[1] else {}), "look")
+                case "leave":
+                    session.left(with_stroke=its[0])
                 case "set":
                     session.said(protocol.Set({"colors": its[0]}), {})
                 case "undo":
@@ -289,6 +298,37 @@ def test_what_cannot_be_is_said_and_changes_nothing(
     np.testing.assert_array_equal(session.views[0].image, before[0])
     assert (session.wishes, session.version) == before[1:]
     session.said(*paint(1, (2, 9, 3, 12), 0.9))
+
+
+SLIDING = protocol.Ask(0, {"lock": [2.0, 2.0, 2.0]}, done=False)
+OTHERS: list[tuple[str, Callable[[Session], object]]] = [
+    ("set", lambda session: session.said(protocol.Set({"colors": "free"}), {})),
+    ("tie", lambda session: session.said(protocol.Tie((("lamp 0", "lamp 1"),)), {})),
+    ("load", lambda session: session.load({}, Wishes({"lamp 1": {"off": True}}), "look")),
+    ("undo", lambda session: session.said(protocol.Undo(), {})),
+    ("refused", lambda session: session.said(protocol.Ask(0, {"limits": {"min": -1}}), {})),
+    ("paint", lambda session: session.said(*paint(1, (2, 9, 3, 12), 0.8))),
+]
+
+
+@pytest.mark.parametrize("other", [act for _, act in OTHERS], ids=[name for name, _ in OTHERS])
+def test_a_slider_that_is_being_moved_is_in_nothing_else(
+    basis: lp.Basis, other: Callable[[Session], object]
+):
+    sessions = session_of(basis), session_of(basis)
+    sessions[0].said(SLIDING, {})
+    for session in sessions:
+        with suppress(lp.LightpaintError):
+            other(session)
+    slid, still = sessions
+    assert not slid.is_open
+    assert slid.wishes == still.wishes
+    assert [step.fields for step in slid.store.steps] == [s.fields for s in still.store.steps]
+    np.testing.assert_allclose(slid.weights, still.weights, rtol=1e-9)
+    # What is there is there after the next stroke, too.
+    for session in sessions:
+        session.said(*paint(2, (4, 9, 3, 9), 0.5))
+    assert slid.wishes == still.wishes
 
 
 def test_who_leaves_in_the_middle_leaves_a_stroke_and_no_slider(basis: lp.Basis):
