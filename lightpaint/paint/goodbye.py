@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 import uvicorn
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
@@ -37,6 +38,14 @@ class EndingServer(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, line: Line) -> None:
         super().__init__(config)
         self._line = line
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End; whoever asks for it again, while pages are told, does not make it any sooner.
+
+        uvicorn would leave out the rest, and show in which line it was.
+        """
+        if not self.should_exit:
+            super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the pages, then end."""

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import urllib.request
 from collections import deque
 from collections.abc import Iterator
@@ -204,6 +205,19 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         assert "the earlier session is kept as room.paint/session-1.db" in process.stderr.read()
     with Store.open(path.with_name("session-1.db"), identity) as store:
         assert [step.label for step in store.steps] == ["mine"]
+
+
+@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
+def test_who_asks_twice_for_the_end_gets_one(here: Path, second: signal.Signals) -> None:
+    with painting(here, "room.basis.exr") as (process, url), live(url):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.05)  # while the page is told
+        process.send_signal(second)
+        assert process.wait(timeout=60) == 0
+        assert process.stderr is not None
+        said = process.stderr.read()
+    assert "Traceback" not in said
+    assert said.endswith("what was painted is kept in room.paint\n")
 
 
 def live(url: str) -> ClientConnection:
