@@ -10,8 +10,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.images.blocks import block_mean
-from lightpaint.report.figures import thumbnail
+from lightpaint.report.figures import resized, thumbnail
 
 #: Pixels of a thumbnail's longer side, about.
 THUMBNAIL = 192
@@ -83,9 +82,8 @@ def small(basis: Basis, k: int) -> Picture:
 
 def small_picture(light: Floats, transform: ViewTransform) -> Picture:
     """A thumbnail of a picture (h, w, 3), as a display shows it."""
-    factor = max(1, round(max(light.shape[:2]) / THUMBNAIL))
-    rows, columns = (n // factor * factor for n in light.shape[:2])
-    shown = transform.encode(block_mean(light[:rows, :columns], factor))
+    factor = min(1, THUMBNAIL / max(light.shape[:2]))
+    shown = transform.encode(resized(light, factor) if factor < 1 else light)
     return np.round(shown * 255).astype(np.uint8)
 
 

@@ -89,20 +89,25 @@ def thumbnail(
     image: (h, w, 3) linear. The 98th percentile of what it lights, seen emitters aside, is
     brought to white; reduced in linear light. is_clean: whether it is denoised then.
     """
-    height, width = image.shape[:2]
+    width = image.shape[1]
     stops = exposure_of(image, emitters_seen)
     if width > THUMBNAIL:
-        size = (THUMBNAIL, max(1, round(height * THUMBNAIL / width)))
-        box = Image.Resampling.BOX
-        planes = [
-            np.asarray(Image.fromarray(image[..., c].astype(np.float32)).resize(size, box))
-            for c in range(3)
-        ]
-        image = np.stack(planes, axis=-1)
+        image = resized(image, THUMBNAIL / width)
     # Where many pixels make one, their mean has hardly any noise left to take out.
     if is_clean and width < ENOUGH * THUMBNAIL:
         image = denoised(image)
     return encode_display(image, stops=stops), stops
+
+
+def resized(image: Floats, factor: float) -> Floats:
+    """An (h, w, 3) picture at `factor` of its size, box-filtered; no side is less than a pixel."""
+    height, width = (max(1, round(side * factor)) for side in image.shape[:2])
+    box = Image.Resampling.BOX
+    planes = [
+        np.asarray(Image.fromarray(image[..., c].astype(np.float32)).resize((width, height), box))
+        for c in range(3)
+    ]
+    return np.stack(planes, axis=-1)
 
 
 def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
