@@ -30,6 +30,7 @@ class Turns:
         self._waiting = deque[object]()  # of those that are waited for
         self._idle: dict[object, float] = {}  # those at leisure that wait, and since when
         self._away = 0  # how many of them let others go on, and come back
+        self._called: object | None = None  # whose turn it is, and who has not taken it yet
         self._own = local()
 
     @contextmanager
@@ -75,7 +76,7 @@ class Turns:
             finally:
                 with self._changed:
                     self._away -= urgent
-                    self._changed.notify_all()
+                    self._call()
 
     def let_others(self) -> None:
         """Between two pieces: whoever is at leisure waits until no other wants a turn."""
@@ -95,12 +96,23 @@ class Turns:
             else:
                 self._waiting.append(ticket)
             try:
-                self._changed.wait_for(lambda: self._holder is None and self._next() is ticket)
+                self._call()
+                self._changed.wait_for(lambda: self._called is ticket)
                 self._holder, self._depth = get_ident(), depth
             finally:
                 if self._idle.pop(ticket, None) is None:
                     self._waiting.remove(ticket)
-                self._changed.notify_all()  # whoever is interrupted keeps nobody waiting
+                if self._called is ticket:
+                    self._called = None
+                self._call()  # whoever is interrupted keeps nobody waiting
+
+    def _call(self) -> None:
+        """Say whose turn it is, if nobody has one: once, since by the clock of each who waits it
+        might be another's.
+        """
+        if self._holder is None and self._called is None:
+            self._called = self._next()
+            self._changed.notify_all()
 
     def _next(self) -> object | None:
         """Whose turn it is, once nobody has one."""
@@ -115,7 +127,7 @@ class Turns:
         with self._changed:
             self._holder, self._depth = None, 0
             self._away += away
-            self._changed.notify_all()
+            self._call()
 
 
 #: At Mitsuba, of all threads of this process.

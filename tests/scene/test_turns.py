@@ -12,7 +12,7 @@ import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import load_scene
-from lightpaint.scene.turns import MITSUBA, Turns
+from lightpaint.scene.turns import MITSUBA, PATIENCE_S, Turns
 
 #: Seconds of a piece of work, and in which a thread surely comes to its turn.
 PIECE_S, SOON_S = 0.02, 10
@@ -97,6 +97,30 @@ def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.Mo
 
     _together(again, leisure, work=work)
     assert work.done.count("leisure") == 6
+
+
+def test_two_who_wait_agree_whose_turn_it_is(work: Work, monkeypatch: pytest.MonkeyPatch):
+    """One looks just before the patience of who is at leisure ends, the other just after."""
+    turns, idle = work.turns, threading.local()
+    monkeypatch.setattr(
+        "lightpaint.scene.turns.monotonic",
+        lambda: (
+            0.0 if not turns._idle else PATIENCE_S * (0.99 if hasattr(idle, "is_one") else 1.01)
+        ),
+    )
+
+    def leisure() -> None:
+        idle.is_one = True
+        work.leisure()
+
+    def holds() -> None:
+        with turns.taken():
+            work.piece("first")
+            while not (turns._waiting and turns._idle):
+                time.sleep(PIECE_S)
+
+    _together(holds, leisure, work.urgent, work=work)
+    assert sorted(work.done) == ["first", *["leisure"] * 6, "urgent", "urgent"]
 
 
 def test_who_waits_for_another_lets_it(work: Work):
