@@ -201,6 +201,37 @@ def _spoken(path: Path | None, error: sqlite3.Error) -> LightpaintError:
     return OutputError(f"cannot write {path}: {first_line(error)}")
 
 
+def place_of(path: Path | None) -> tuple[int, int] | None:
+    """Which file is there, by the system's own name for it; None if there is none."""
+    try:
+        about = None if path is None else path.stat()
+    except OSError:
+        return None
+    return None if about is None else (about.st_dev, about.st_ino)
+
+
+def rewritten(
+    database: sqlite3.Connection, path: Path, identity: Identity | None
+) -> sqlite3.Connection:
+    """All of an open database whose file was removed, at `path` again; the old one is closed.
+
+    The system keeps a file that somebody has open. Raises LightpaintError where it cannot be
+    written; the old one is open then.
+    """
+    beside = path.with_name(f".{path.name}.new")
+    with _told(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.unlink(missing_ok=True)
+        try:
+            database.execute("VACUUM INTO ?", (str(beside),))
+            os.replace(beside, path)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+    database.close()  # before its place is taken: it removes what is called like its own log
+    return opened(path, identity)
+
+
 def set_aside(path: Path) -> Path | None:
     """Give the session at `path` another name. Returns it; None where there is no session.
 

@@ -1,14 +1,14 @@
 """What a session file holds and is read when somebody asks for it: pixels of steps and of looks."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.packed import packed, unpacked, unpacked_patch
+from lightpaint.paint.packed import packed, unpacked
 from lightpaint.paint.pixels import Pixels, Region
 from lightpaint.paint.steps import Patch
 from lightpaint.records import strict_json
@@ -16,26 +16,18 @@ from lightpaint.records import strict_json
 #: What looks are made of.
 DTYPES = ("float32", "float64", "float16", "uint8", "int16")
 
-#: Arrays of a look by name: dtype, shape as JSON, data.
-PackedArrays = dict[str, tuple[str, str, bytes]]
-
-
-#: View and region of a patch, and whether it is marked (`is_marked`).
-Place = tuple[int, Region, bool]
+#: An array of a look: dtype, shape as JSON, data; and all of them by name.
+PackedArray = tuple[str, str, bytes]
+PackedArrays = dict[str, PackedArray]
 
 
 class KeptPatch(Patch):
-    """A patch that is in a file, the k-th of its step.
-
-    places: of each. read: pixels of all of them before, and how those after differ,
-    packed.
-    """
+    """A patch that is in a file. read: its pixels before and after."""
 
     def __init__(
-        self, places: Sequence[Place], k: int, read: Callable[[], tuple[bytes, bytes]]
+        self, view: int, region: Region, read: Callable[[], tuple[Pixels, Pixels]]
     ) -> None:
-        view, region, _ = places[k]
-        vars(self).update(view=view, region=region, _places=places, _k=k, _read=read)
+        vars(self).update(view=view, region=region, _read=read)
 
     @property
     def before(self) -> Pixels:
@@ -46,32 +38,41 @@ class KeptPatch(Patch):
         return self._pixels()[1]
 
     def _pixels(self) -> tuple[Pixels, Pixels]:
-        its = vars(self)
-        places = [(region, marked) for _, region, marked in its["_places"]]
-        return unpacked_patch(places, its["_k"], *its["_read"]())
+        found: tuple[Pixels, Pixels] = vars(self)["_read"]()
+        return found
+
+
+class LookFile(Protocol):
+    """What a file of looks is asked for."""
+
+    def look_names(self, number: int) -> list[str]:
+        """Names of the arrays of a look, in order."""
+
+    def look_array(self, number: int, name: str) -> PackedArray:
+        """One of them. Raises KeyError if there is none."""
 
 
 class LookArrays(Mapping[str, npt.NDArray[Any]]):
-    """Arrays of a look that are in a file. read: those of the look of a number."""
+    """Arrays of the look of a number that are in a file."""
 
-    def __init__(self, read: Callable[[int], PackedArrays], number: int) -> None:
-        self._read, self._number = read, number
+    def __init__(self, file: LookFile, number: int) -> None:
+        self._file, self._number = file, number
 
-    def is_of(self, read: Callable[[int], PackedArrays], number: int) -> bool:
+    def is_of(self, file: LookFile, number: int) -> bool:
         """Whether these are of that look in that file."""
-        return (self._read, self._number) == (read, number)
+        return (self._file, self._number) == (file, number)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        dtype, shape, data = self._read(self._number)[name]
+        dtype, shape, data = self._file.look_array(self._number, name)
         if dtype not in DTYPES:
             raise PaintError(f"a damaged look: {dtype}")
         return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._read(self._number))
+        return iter(self._file.look_names(self._number))
 
     def __len__(self) -> int:
-        return len(self._read(self._number))
+        return len(self._file.look_names(self._number))
 
 
 def packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> PackedArrays:

@@ -40,8 +40,7 @@ class Looks:
             {
                 "id": look.id,
                 "name": look.fields["name"],
-                "stamp": look.fields["stamp"],
-                "delta_e": look.fields.get("delta_e"),
+                "stamp": look.fields.get("stamp"),
                 "weights": np.asarray(look.arrays["weights"]).tolist(),
                 "thumbnail": f"look/{look.id}",
             }

@@ -10,7 +10,8 @@ stand in two tables. An append-only journal would need all of that built.
 Pixels are kept packed (`packed.py`) and read when somebody asks for them, so that a history
 without limit takes no memory.
 
-A full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
+A file that somebody removes is written anew with the next step: the system keeps what is open. A
+full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
 `flush` or the next step writes it.
 """
 
@@ -22,11 +23,18 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from lightpaint.errors import OutputError, PaintError
+from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
-from lightpaint.paint.database import damaged, identify, opened, transaction
-from lightpaint.paint.kept import KeptPatch, LookArrays, PackedArrays, Place, packed_arrays
-from lightpaint.paint.packed import is_marked, packed_patches
+from lightpaint.paint.database import damaged, identify, opened, place_of, rewritten, transaction
+from lightpaint.paint.kept import (
+    KeptPatch,
+    LookArrays,
+    PackedArray,
+    PackedArrays,
+    packed_arrays,
+)
+from lightpaint.paint.packed import is_marked, packed_patches, unpacked_patch
+from lightpaint.paint.pixels import Pixels, Region
 from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
 from lightpaint.records import strict_json
 
@@ -58,6 +66,8 @@ class Store:
         self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
         self._arrays: dict[int, PackedArrays] = {}  # the same of looks
         self._database = opened(path, identity)
+        self._file = None if path is None else path.absolute()  # also from another folder
+        self._place = place_of(self._file)
         try:
             self._read()
         except (sqlite3.Error, ArithmeticError, KeyError, TypeError, ValueError) as error:
@@ -127,12 +137,10 @@ class Store:
         with self._lock:
             fields, arrays = _text(look.fields), look.arrays
             number, blobs = look.id, None
-            if not (isinstance(arrays, LookArrays) and arrays.is_of(self._look_arrays, number)):
+            if not (isinstance(arrays, LookArrays) and arrays.is_of(self, number)):
                 blobs = packed_arrays(arrays)
                 self._arrays[number] = blobs
-            self._looks[number] = KeptLook(
-                number, strict_json(fields), LookArrays(self._look_arrays, number)
-            )
+            self._looks[number] = self._look(number, fields)
 
             def write(database: sqlite3.Connection) -> None:
                 said = (number, fields)
@@ -160,14 +168,18 @@ class Store:
     def flush(self) -> str | None:
         """Write what is in memory only. Returns why that is not possible, or None."""
         with self._lock:
-            if not self._waiting:
+            if not self._waiting and self._is_there():
                 return self.unsaved
             try:
+                self._come_back()
                 with transaction(self._database):
                     for write in self._waiting:
                         write(self._database)
                     about = ("position", self.position)
                     self._database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", about)
+            except LightpaintError as error:
+                self.unsaved = f"what was done last is in memory only: {error}"
+                return self.unsaved
             except sqlite3.Error as error:
                 self.unsaved = (
                     f"what was done last is in memory only, since {self.path} cannot be written "
@@ -187,6 +199,7 @@ class Store:
         with self._lock:
             unsaved = self.flush()
             self._waiting, self.unsaved = [], None  # closed again, there is nothing left to say
+            self._file = self._place = None
             try:
                 self._database.close()
             except sqlite3.Error as error:  # what is beside the file goes into it next time
@@ -199,6 +212,18 @@ class Store:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _is_there(self) -> bool:
+        return place_of(self._file) == self._place
+
+    def _come_back(self) -> None:
+        """Write it anew where somebody has removed it. Raises LightpaintError if that fails."""
+        if self._file is None or self._is_there():
+            return
+        if place_of(self._file) is not None:
+            raise PaintError(f"{self.path} is another file now: move that one away")
+        self._database = rewritten(self._database, self._file, self.identity)
+        self._place = place_of(self._file)
 
     def _write(self, write: _Write) -> None:
         self._waiting.append(write)
@@ -216,20 +241,26 @@ class Store:
         for (position,) in ask("SELECT value FROM about WHERE name = 'position'"):
             self.position = min(int(position), len(self.steps))
         for number, fields in ask("SELECT id, fields FROM look ORDER BY id").fetchall():
-            self._looks[number] = KeptLook(
-                number, strict_json(fields), LookArrays(self._look_arrays, number)
-            )
+            self._looks[number] = its = self._look(number, fields)
+            if not isinstance(its.fields["name"], str):
+                raise TypeError("a look without a name")
 
     def _step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
-        places: list[Place] = []
+        views, places = list[int](), list[tuple[Region, bool]]()
         for view, top, bottom, left, right, *marked in strict_json(where):
             region = int(top), int(bottom), int(left), int(right)
-            places.append((int(view), region, bool(marked)))
-        read = partial(self._pixels, number)
-        patches = tuple(KeptPatch(places, k, read) for k in range(len(places)))
+            views.append(int(view))
+            places.append((region, bool(marked)))
+        patches = tuple(
+            KeptPatch(view, region, partial(self._pixels, number, places, k))
+            for k, (view, (region, _)) in enumerate(zip(views, places, strict=True))
+        )
         return Step(str(kind), str(label), strict_json(fields), patches)
 
-    def _pixels(self, number: int) -> tuple[bytes, bytes]:
+    def _pixels(
+        self, number: int, places: list[tuple[Region, bool]], k: int
+    ) -> tuple[Pixels, Pixels]:
+        """Before and after step `number`, at its place k. Raises PaintError for a damaged file."""
         with self._lock:
             blobs = self._blobs.get(number)
             if blobs is None:
@@ -237,15 +268,33 @@ class Store:
                 blobs = self._database.execute(found, (number,)).fetchone()
         if blobs is None:
             raise PaintError(f"a step that was cut off: {number}")
-        return blobs
+        try:
+            return unpacked_patch(places, k, *blobs)
+        except (PaintError, TypeError) as error:
+            raise damaged(self.path, error) from None
 
-    def _look_arrays(self, number: int) -> PackedArrays:
+    def _look(self, number: int, fields: str) -> KeptLook:
+        return KeptLook(number, strict_json(fields), LookArrays(self, number))
+
+    def look_names(self, number: int) -> list[str]:
+        """Names of the arrays of a look, in order."""
         with self._lock:
             if number in self._arrays:
-                return self._arrays[number]
-            found = "SELECT name, dtype, shape, data FROM look_array WHERE look = ? ORDER BY rowid"
-            rows = self._database.execute(found, (number,)).fetchall()
-        return {name: (dtype, shape, data) for name, dtype, shape, data in rows}
+                return list(self._arrays[number])
+            found = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
+            return [name for (name,) in self._database.execute(found, (number,))]
+
+    def look_array(self, number: int, name: str) -> PackedArray:
+        """One of them, and no other is read. Raises KeyError if there is none."""
+        with self._lock:
+            if number in self._arrays:
+                return self._arrays[number][name]
+            found = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
+            row = self._database.execute(found, (number, name)).fetchone()
+        if row is None:
+            raise KeyError(name)
+        dtype, shape, data = row
+        return dtype, shape, data
 
 
 class MemoryStore(Store):

@@ -394,6 +394,9 @@ def _done(path: Path, statement: str) -> None:
         lambda path: _done(path, "UPDATE step SET fields='{'"),
         lambda path: _done(path, "UPDATE step SET places='[1]'"),
         lambda path: _done(path, "UPDATE about SET value='x'"),
+        lambda path: _done(path, "UPDATE pixels SET before=x'00'"),
+        lambda path: _done(path, "UPDATE pixels SET change=NULL"),
+        lambda path: _done(path, "INSERT INTO look VALUES (1, '{}')"),
     ],
 )
 def test_a_damaged_file_is_said_in_one_line_and_can_be_put_aside(
@@ -412,6 +415,79 @@ def test_a_damaged_file_is_said_in_one_line_and_can_be_put_aside(
     assert "\n" not in str(refusal.value)
     assert set_aside(path) is not None
     Store.open(path, IDENTITY).close()
+
+
+# A file that is removed while it is painted on
+
+
+@pytest.mark.parametrize("is_all", [True, False])
+def test_a_session_whose_file_is_removed_is_written_anew(tmp_path: Path, is_all: bool) -> None:
+    path = tmp_path / "s" / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        store.append(step(1))
+        store.put_look(look(1, 1))
+        shutil.rmtree(path.parent) if is_all else path.unlink()
+        store.append(step(2))
+        assert store.unsaved is None
+        was = content(store)
+        copy = tmp_path / "copy.db"
+        for ending in ("", "-wal"):  # as if it were killed now
+            shutil.copy(f"{path}{ending}", f"{copy}{ending}")
+        with Store.open(copy, IDENTITY) as left:
+            assert content(left) == was
+        path.unlink()  # at the end, too
+    with Store.open(path, IDENTITY) as again:
+        assert content(again) == was
+        again.append(step(3))
+    assert [file.name for file in path.parent.iterdir()] == ["session.db"]
+
+
+def test_another_file_in_its_place_is_left_alone_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "session.db"
+    store = Store.open(path, IDENTITY)
+    store.append(step(1))
+    path.unlink()
+    path.write_bytes(b"of somebody else")
+    store.append(step(2))
+    assert store.unsaved is not None
+    assert f"{path} is another file now: move that one away" in store.unsaved
+    assert path.read_bytes() == b"of somebody else"
+    path.unlink()
+    assert store.flush() is None
+    was = content(store)
+    store.close()
+    with Store.open(path, IDENTITY) as again:
+        assert content(again) == was
+
+
+def test_a_place_that_is_gone_and_cannot_be_made_is_said(tmp_path: Path) -> None:
+    folder = tmp_path / "s"
+    store = Store.open(folder / "session.db", IDENTITY)
+    store.append(step(1))
+    shutil.rmtree(folder)
+    folder.write_text("a file", "utf-8")
+    store.append(step(2))
+    assert store.unsaved is not None
+    assert "in memory only: cannot write" in store.unsaved
+    assert len(content(store)[1]) == 2
+    with pytest.raises(OutputError, match="the last steps are lost"):
+        store.close()
+
+
+def test_one_array_of_a_look_is_read_alone(tmp_path: Path) -> None:
+    """A list of looks has the weights of each, and no picture."""
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        store.put_look(look(1, 1))
+    with Store.open(path, IDENTITY) as store:
+        asked: list[str] = []
+        store._database.set_trace_callback(asked.append)
+        [kept] = store.looks()
+        assert kept.arrays["weights"].size
+        [one] = asked
+        assert "name = 'weights'" in one
+        with pytest.raises(KeyError):
+            kept.arrays["no such array"]
 
 
 def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:

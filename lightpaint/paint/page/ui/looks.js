@@ -4,7 +4,6 @@ import { inView } from '../engine/protocol.js';
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
 import { mixOf } from './model.js';
-import { number } from './format.js';
 import { Thumb } from './thumb.js';
 import { look } from './tools.js';
 
@@ -30,9 +29,8 @@ function Kept({ one, ui, hands }) {
   const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
   const its = inView(one.thumbnail, ui.view);
   const picture = its in ui.resources ? its : one.thumbnail;
-  const about = one.delta_e === null ? one.name : `${one.name}, ΔE ${number(one.delta_e, 2)}`;
   return html`<li class="look" onPointerLeave=${() => setSure(false)}>
-    <button type="button" class="look-picture" aria-label=${`Go on from ${about}`}
+    <button type="button" class="look-picture" aria-label=${`Go on from ${one.name}`}
       data-tip="Go on from this look; undo comes back"
       onClick=${() => session.send('load_look', { look: one.id })}>
       <${Thumb} name=${picture} generation=${ui.resources[picture] ?? 0} hands=${hands} />

@@ -11,8 +11,7 @@ import { ofKelvin } from './colours.js';
  *   is_scalar: boolean, scale?: number}} Light */
 /** @typedef {{emission: RGB, stops: number | null, kelvin: number | null, hue: string | null,
  *   swatch: string, share: number, error: string | null, held: boolean, unreached: boolean}} Lit */
-/** @typedef {{id: number, name: string, weights: RGB[], delta_e: number | null, stamp: string,
- *   thumbnail: string}} Look */
+/** @typedef {{id: number, name: string, weights: RGB[], stamp: number | null, thumbnail: string}} Look */
 /** @typedef {Record<string, any>} Asked */
 /** @typedef {{headline: string, delta_e: number, delta_e_asked: number, sentences: string[]}}
  * Seen */
