@@ -93,7 +93,7 @@ def verified(
 ) -> tuple[Floats, str, bool]:
     """The scene as it is relit, rendered: (h, w, 3) clean, what that says, whether it agrees."""
     scene = subject.loaded
-    with tempfile.TemporaryDirectory(dir=scene.path.parent, prefix=".lightpaint-") as place:
+    with tempfile.TemporaryDirectory(prefix="lightpaint-") as place:
         relit = relight(scene, lighting, Path(place) / RELIT)
         if relit.sensor != scene.sensor:
             relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False)

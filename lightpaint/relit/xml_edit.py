@@ -42,11 +42,15 @@ class Element:
 class XmlFile:
     """The text of an XML file, and the edits to be made in it.
 
-    Raises SceneError if a tag cannot be read, lacks its end or is closed by another's.
+    Raises SceneError if it is not there any more, or if a tag cannot be read, lacks its end or is
+    closed by another's.
     """
 
     def __init__(self, path: Path) -> None:
-        raw = path.read_bytes()
+        try:
+            raw = path.read_bytes()
+        except OSError as error:
+            raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
         self._encoding = encoding_of(raw)
         try:
             # Like Mitsuba, take any other bytes for UTF-8 as they are.

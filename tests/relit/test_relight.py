@@ -209,6 +209,15 @@ def test_wrong_lights_and_the_scene_itself_are_refused(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
+def test_a_scene_that_is_gone_by_then_is_said(tmp_path: Path) -> None:
+    scene = load_scene(write_room(tmp_path))
+    lighting = random_lighting(scene, 1)
+    scene.path.rename(tmp_path / "elsewhere.xml")
+    with pytest.raises(SceneError, match=r"cannot read .*\.xml: No such file"):
+        relight(scene, lighting, tmp_path / "out" / "relit.xml")
+    assert not (tmp_path / "out").exists()
+
+
 def test_includes_and_images_of_the_scene_are_never_overwritten(tmp_path: Path) -> None:
     include = tmp_path / "lights.xml"
     include.write_text(f'<scene version="3.0.0">{LIGHTS["bulb"]}</scene>', encoding="utf-8")
