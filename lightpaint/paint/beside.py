@@ -70,14 +70,14 @@ class Settling:
 
 
 def later(work: Callable[[], None], name: str, say: Callable[[Message], None]) -> None:
-    """Do it in a thread of its own; what fails is said."""
+    """Do it in a thread of its own, until somebody stops it; what fails is said."""
 
     def run() -> None:
         give_way()
         try:
             work()
         except StoppedError:
-            say(Message("progress", {"what": "", "done": 1, "total": 1}))
+            pass
         except Exception as error:
             say(Message("say", {"text": told(error), "tone": "warn"}))
 

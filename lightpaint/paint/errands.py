@@ -16,7 +16,7 @@ from lightpaint.paint.pictures import Picture
 from lightpaint.paint.steps import of_view
 from lightpaint.paint.subject import Subject, painting_of
 from lightpaint.paint.wishes import Wishes
-from lightpaint.progress import Progress
+from lightpaint.progress import Progress, while_wanted
 
 Asked = protocol.Export | protocol.Verify | protocol.Explain
 
@@ -40,11 +40,15 @@ class Place(Protocol):
 
 
 class Errands:
-    """Those of one studio; one of them renders or writes at a time."""
+    """Those of one studio; one of them writes at a time, and one verifies.
+
+    Of two that verify the later one counts: the answer may be another by then.
+    """
 
     def __init__(self, place: Place) -> None:
         self._place = place
-        self._writes, self._renders = Lock(), False
+        self._writes, self._renders = Lock(), Lock()
+        self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
 
     def said(self, message: Asked) -> list[Message]:
         """Begin with it. Raises PaintError for what there is not."""
@@ -55,10 +59,12 @@ class Errands:
         }
         if isinstance(message, protocol.Verify):
             if not message.run:
-                self._renders = False
+                self._wanted = None
                 return [Message("started", {"what": "stop"})]
             if self._subject(message.view).scene is None:
                 raise PaintError("there is no scene to render: it was opened from a saved basis")
+            # Here, and not in its thread: what is said next may be that it is to stop.
+            self._wanted = message
         elif isinstance(message, protocol.Explain):
             self._subject(message.view)
         what = type(message).__name__.lower()
@@ -102,21 +108,35 @@ class Errands:
         self._place.tell(Message("exported", fields))
 
     def _verified(self, asked: protocol.Verify) -> None:
+        def check() -> None:
+            if self._wanted is not asked:
+                raise StoppedError
+
+        try:
+            # Also the exact answer, which may take longer than somebody waits, is given up.
+            with self._renders, while_wanted(check):
+                check()
+                self._verify(asked.view, check)
+        except StoppedError:
+            if self._wanted is None:  # else a page waits for the next one
+                self._place.tell(Message("progress", {"what": "", "done": 1, "total": 1}))
+
+    def _verify(self, view: int, check: Callable[[], None]) -> None:
+        """Render the answer in a view. check: raises StoppedError once nobody wants that."""
         from lightpaint.paint.exports import verified
 
-        moment, lighting = self._answer()
-
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
-            if not self._renders:
-                raise StoppedError
+            check()
             self._place.hears(label, done, total, unit)
 
-        self._renders = True
+        moment, lighting = self._answer()
         progress: Progress = hears
-        basis = moment.bases[asked.view]
-        picture, said, agrees = verified(self._subject(asked.view), basis, lighting, progress)
-        self._place.put(of_view("verified", asked.view), as_halves(picture))
-        about = {"agrees": agrees, "text": said, "view": asked.view}
+        picture, said, agrees = verified(
+            self._subject(view), moment.bases[view], lighting, progress
+        )
+        check()
+        self._place.put(of_view("verified", view), as_halves(picture))
+        about = {"agrees": agrees, "text": said, "view": view}
         self._place.tell(Message("verified", about))
 
     def _explain(self, asked: protocol.Explain) -> None:

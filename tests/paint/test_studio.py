@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,10 +29,10 @@ SIZE = (18, 32)
 class Heard:
     """A studio of saved bases, and all that it says."""
 
-    def __init__(self, folder: Path, *bases: lp.Basis) -> None:
+    def __init__(self, folder: Path, *bases: lp.Basis, scene: Any = None) -> None:
         command = partial(solve_command, "room.basis.exr")
-        how = {"command": lambda paths, wishes: command(paths, (), wishes)}
-        subjects = [Subject("room.basis.exr", folder, basis=basis, **how) for basis in bases]
+        how = {"command": lambda paths, wishes: command(paths, (), wishes), "scene": scene}
+        subjects = [Subject(f"view {k}", folder, basis=its, **how) for k, its in enumerate(bases)]
         self.messages: list[Message] = []
         self.studio = Studio(subjects, lambda its: Store.open(folder / "session.db", its))
         self.studio.on_message = self.messages.append
@@ -342,6 +343,100 @@ def test_without_a_scene_there_is_nothing_to_render(heard: Heard):
         heard.studio.said(protocol.Verify(), {})
     with pytest.raises(lp.LightpaintError, match="no picture"):
         heard.studio.resource("../secret")
+
+
+class Renders:
+    """Stands for the verifying render: it goes on for as long as it is wanted."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.views: list[str] = []  # of those that have begun
+        self.at_work = self.most = 0
+        self.is_enough = threading.Event()
+        monkeypatch.setattr(exports, "verified", self.verified)
+
+    def verified(self, subject: Subject, basis: lp.Basis, _: Any, progress: Any) -> Any:
+        self.views.append(subject.source)
+        self.at_work += 1
+        self.most = max(self.most, self.at_work)
+        try:
+            while not self.is_enough.wait(0.01):
+                progress("verify", 1, 4)
+        finally:
+            self.at_work -= 1
+        return np.zeros((*basis.size, 3), np.float32), "A render confirms it.", True
+
+
+@pytest.fixture
+def with_scenes(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[Heard, Renders]]:
+    """A studio of two views, and what stands for their renders."""
+    side = replace(basis, origin=replace(basis.origin, sensor="side"))
+    scene: Any = SimpleNamespace(spp=4)
+    made = Renders(monkeypatch)
+    heard = Heard(tmp_path, basis, side, scene=scene)
+    yield heard, made
+    made.is_enough.set()
+    heard.studio.close()
+
+
+def is_stopped(message: Message) -> bool:
+    """Whether it says that a render has been stopped."""
+    return message.kind == "progress" and not message.fields["what"]
+
+
+def test_a_verifying_render_can_be_stopped(with_scenes: tuple[Heard, Renders]):
+    heard, renders = with_scenes
+    heard.studio.said(protocol.Verify(), {})
+    heard.wait(lambda m: m.kind == "progress" and m.fields["what"] == "verify")
+    [told] = heard.studio.said(protocol.Verify(run=False), {})
+    assert (told.kind, told.fields["what"]) == ("started", "stop")
+    heard.wait(is_stopped)
+    assert renders.at_work == 0
+    # And there can be another.
+    heard.studio.said(protocol.Verify(view=1), {})
+    renders.is_enough.set()
+    assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
+    assert heard.studio.resource("verified@1").shape == (*SIZE, 3)
+
+
+def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
+    with_scenes: tuple[Heard, Renders], monkeypatch: pytest.MonkeyPatch
+):
+    """The exact answer comes first, and may take longer than somebody waits."""
+    heard, renders = with_scenes
+    heard.paint(1, 0.8)
+    heard.exact()
+    begun, goes_on = threading.Event(), threading.Event()
+    solution = Moment.solution
+
+    def slow(moment: Moment) -> Any:
+        begun.set()
+        goes_on.wait(30)
+        return solution(moment)
+
+    monkeypatch.setattr(Moment, "solution", slow)
+    heard.studio.said(protocol.Verify(), {})
+    assert begun.wait(30)
+    heard.studio.said(protocol.Verify(run=False), {})
+    goes_on.set()
+    heard.wait(is_stopped)
+    assert not renders.views
+
+
+def test_who_verifies_again_stops_the_render_before(with_scenes: tuple[Heard, Renders]):
+    """Somebody has painted on, or come back with another page."""
+    heard, renders = with_scenes
+    heard.studio.said(protocol.Verify(), {})
+    heard.wait(lambda _: renders.at_work)
+    for view in (0, 1):
+        heard.studio.said(protocol.Verify(view=view), {})
+    heard.wait(lambda _: renders.views[-1] == "view 1")
+    renders.is_enough.set()
+    assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
+    assert renders.most == 1
+    # The page was not told that nothing is rendered while the last one was still to come.
+    assert not any(is_stopped(message) for message in heard.messages)
 
 
 def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
