@@ -6,7 +6,7 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from threading import Condition, Thread, get_native_id
+from threading import Condition, Thread, current_thread, get_native_id
 
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line
@@ -17,6 +17,9 @@ REST_S = 0.2
 
 #: How much less urgent than strokes all else is, where threads can be told apart: on Linux.
 NICE = 10
+
+#: Seconds in which a pass of a render ends.
+PATIENCE_S = 60.0
 
 
 class StoppedError(Exception):
@@ -69,19 +72,40 @@ class Settling:
                 self._say(Message("say", {"text": told(error), "tone": "warn"}))
 
 
-def later(work: Callable[[], None], name: str, say: Callable[[Message], None]) -> None:
-    """Do it in a thread of its own, until somebody stops it; what fails is said."""
+class Threads:
+    """Those of one studio, which are waited for at its end. say: hears what fails in one."""
 
-    def run() -> None:
-        give_way()
-        try:
-            work()
-        except StoppedError:
-            pass
-        except Exception as error:
-            say(Message("say", {"text": told(error), "tone": "warn"}))
+    def __init__(self, say: Callable[[Message], None]) -> None:
+        self._say = say
+        self._all: list[Thread] = []
 
-    Thread(target=run, name=f"lightpaint-{name}", daemon=True).start()
+    def begin(self, work: Callable[[], None], name: str) -> None:
+        """Do it in a thread of its own."""
+        thread = Thread(target=work, name=f"lightpaint-{name}", daemon=True)
+        self._all = [one for one in self._all if one.is_alive()] + [thread]
+        thread.start()
+
+    def later(self, work: Callable[[], None], name: str) -> None:
+        """The same at leisure, until somebody stops it; what fails is said."""
+
+        def run() -> None:
+            give_way()
+            try:
+                work()
+            except StoppedError:
+                pass
+            except Exception as error:
+                self._say(Message("say", {"text": told(error), "tone": "warn"}))
+
+        self.begin(run, name)
+
+    def wait(self) -> None:
+        """Until all of them have come to an end, but for the one that asks, or patience has."""
+        end_s = time.monotonic() + PATIENCE_S
+        for thread in self._all:
+            # Who is being started, as where Ctrl-C comes just then, cannot be waited for.
+            if thread is not current_thread() and thread.is_alive():
+                thread.join(max(0.0, end_s - time.monotonic()))
 
 
 def told(error: Exception, *, at_length: bool = True) -> str:

@@ -9,7 +9,7 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import protocol
-from lightpaint.paint.beside import StoppedError, later
+from lightpaint.paint.beside import StoppedError, Threads
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.pictures import Picture
@@ -45,8 +45,8 @@ class Errands:
     Of two that verify the later one counts: the answer may be another by then.
     """
 
-    def __init__(self, place: Place) -> None:
-        self._place = place
+    def __init__(self, place: Place, threads: Threads) -> None:
+        self._place, self._threads = place, threads
         self._writes, self._renders = Lock(), Lock()
         self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
 
@@ -68,7 +68,7 @@ class Errands:
         elif isinstance(message, protocol.Explain):
             self._subject(message.view)
         what = type(message).__name__.lower()
-        later(lambda: works[type(message)](message), what, self._place.tell)
+        self._threads.later(lambda: works[type(message)](message), what)
         return [Message("started", {"what": what})]
 
     def command(self, sensors: Sequence[str], wishes: Wishes) -> str:

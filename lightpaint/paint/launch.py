@@ -2,7 +2,6 @@
 
 import gc
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -40,9 +39,6 @@ from lightpaint.sources import (
 
 #: The session in the folder of what is painted.
 SESSION = "session.db"
-
-#: Seconds in which a pass of a render ends.
-PATIENCE_S = 60.0
 
 
 def subject_of(
@@ -183,21 +179,10 @@ def _failed(server: Server, error: Exception) -> None:
 
 
 def _end(studio: Studio, store: Store | None) -> None:
-    """Close both, and the store also where the studio fails; then let renders come to an end.
-
-    What Mitsuba is at in another thread cannot be left alone at the end of a process.
-    """
+    """Close both, and the store also where the studio fails; then let renders come to an end."""
     try:
         studio.close()
     finally:
         if store is not None:
             store.close()
-    wait_for_renders()
-
-
-def wait_for_renders() -> None:
-    """Until what renders beside a painter has come to an end."""
-    end_s = time.monotonic() + PATIENCE_S
-    for thread in threading.enumerate():
-        if thread.name.startswith("lightpaint-") and thread.is_alive():
-            thread.join(max(0.0, end_s - time.monotonic()))
+    studio.wait()

@@ -8,7 +8,7 @@ which say what has come of them through `on_message`.
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from threading import RLock, Thread
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.beside import Settling, StoppedError, give_way, told
+from lightpaint.paint.beside import Settling, StoppedError, Threads, give_way, told
 from lightpaint.paint.canvas import Canvas
 from lightpaint.paint.errands import Errands
 from lightpaint.paint.frames import Message
@@ -88,12 +88,8 @@ class Studio:
         self._progress: Mapping[str, Any] | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
         self._settling = Settling(self._find, self.tell)
-        self._errands = Errands(self)
-        works = {"obtain": self._obtain, "settle": self._settling.settle}
-        self._threads = [
-            Thread(target=work, name=f"lightpaint-{name}", daemon=True)
-            for name, work in works.items()
-        ]
+        self._threads = Threads(self.tell)
+        self._errands = Errands(self, self._threads)
 
     @property
     def session(self) -> Session:
@@ -114,8 +110,8 @@ class Studio:
 
     def start(self) -> None:
         """Begin to obtain the bases."""
-        for thread in self._threads:
-            thread.start()
+        self._threads.begin(self._obtain, "obtain")
+        self._threads.begin(self._settling.settle, "settle")
 
     def close(self) -> None:
         """End; all that was done is kept."""
@@ -124,6 +120,13 @@ class Studio:
         with self._lock:
             if self._session is not None:
                 self._session.store.close()
+
+    def wait(self) -> None:
+        """Until what went on beside it has come to an end, once it is closed.
+
+        What Mitsuba is at in another thread cannot be left alone at the end of a process.
+        """
+        self._threads.wait()
 
     # What a page asks
 

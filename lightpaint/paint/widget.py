@@ -26,7 +26,6 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.paint import cells
 from lightpaint.paint.bundle import widget_script, widget_style
 from lightpaint.paint.frames import Message
-from lightpaint.paint.launch import wait_for_renders
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.places import Places
 from lightpaint.paint.session import Session
@@ -195,7 +194,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._studio.close()
             super().close()
             if self._studio.renders:
-                wait_for_renders()
+                self._studio.wait()
 
     # What is set from a cell
 

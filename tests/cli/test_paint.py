@@ -28,8 +28,9 @@ from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.spelling import solve_command
+from lightpaint.paint.beside import Threads
 from lightpaint.paint.frames import Message, of_frame, to_frame
-from lightpaint.paint.launch import subject_of, subjects_of, wait_for_renders
+from lightpaint.paint.launch import subject_of, subjects_of
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.steps import Identity, Step
 from lightpaint.paint.store import Store
@@ -249,8 +250,15 @@ def greeted(socket: ClientConnection) -> dict[str, Any]:
 
 def test_who_is_being_started_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C may come just then; Python refuses to wait for a thread that has not begun."""
-    monkeypatch.setattr(threading, "enumerate", lambda: [threading.Thread(name="lightpaint-x")])
-    wait_for_renders()
+
+    def interrupted(_: threading.Thread) -> None:
+        raise KeyboardInterrupt
+
+    threads = Threads(lambda _: None)
+    monkeypatch.setattr(threading.Thread, "start", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        threads.begin(lambda: None, "x")
+    threads.wait()
 
 
 def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:

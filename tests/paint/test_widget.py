@@ -17,6 +17,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
 from lightpaint.paint import bundle, protocol
+from lightpaint.paint.studio import Studio
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
@@ -339,6 +340,17 @@ def test_a_cell_with_a_file_runs_again(
     again = open_(store="evening.db")
     assert painter.comm is None
     np.testing.assert_array_equal(again.target.image, basis.images[2])
+
+
+def test_who_closes_waits_for_no_other_painter(open_: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whose renders may go on for as long as they like."""
+    monkeypatch.setattr(Studio, "renders", property(lambda _: True))
+    one, _ = open_(), open_()
+    mine = list(one._studio._threads._all)
+    begun_s = time.monotonic()
+    one.close()
+    assert time.monotonic() - begun_s < 30
+    assert not any(thread.is_alive() for thread in mine)
 
 
 def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
