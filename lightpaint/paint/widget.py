@@ -188,10 +188,17 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             write_painting(path, target)
 
     def close(self) -> None:
-        """End it; a session with a file can be gone on with."""
-        if "_studio" in vars(self):  # else it has never begun
-            self._studio.on_message = None
+        """End it; a session with a file can be gone on with.
+
+        Raises OutputError if what was done last could not be written; it has ended all the same.
+        """
+        if "_studio" not in vars(self):  # it has never begun
+            return
+        atexit.unregister(self.close)  # which would keep it, and its pictures, until then
+        self._studio.on_message = None
+        try:
             self._studio.close()
+        finally:
             super().close()
             if self._studio.renders:
                 self._studio.wait()

@@ -1,6 +1,7 @@
 """The painter of a notebook, over a comm that only notes: what it hears, what it says."""
 
 import asyncio
+import gc
 import importlib
 import sys
 import threading
@@ -10,13 +11,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import pytest
 
 import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
+from lightpaint.errors import OutputError
 from lightpaint.paint import bundle, protocol
+from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 
 pytest.importorskip("anywidget", reason="anywidget")
@@ -351,6 +355,34 @@ def test_who_closes_waits_for_no_other_painter(open_: Any, monkeypatch: pytest.M
     one.close()
     assert time.monotonic() - begun_s < 30
     assert not any(thread.is_alive() for thread in mine)
+
+
+def test_who_is_closed_is_let_go_of(basis: lp.Basis, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A notebook whose cells run again keeps no painter of before, nor its pictures."""
+    monkeypatch.setattr(Studio, "renders", property(lambda _: True))
+
+    def closed() -> Any:
+        painter = lp.Painter(basis)
+        painter.close()
+        return ref(painter)
+
+    its = closed()
+    gc.collect()
+    assert its() is None
+
+
+def test_who_cannot_keep_what_was_done_has_ended_all_the_same(
+    open_: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: Store) -> None:
+        raise OutputError("the last steps are lost")
+
+    painter = open_()
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "close", full)
+        with pytest.raises(OutputError, match="are lost"):
+            painter.close()
+    assert painter.comm is None
 
 
 def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
