@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_planes
 from lightpaint.errors import PaintError
@@ -266,8 +267,8 @@ class Studio:
 
     def _take(self, bases: Sequence[Basis]) -> None:
         """Paint on with these bases."""
-        first = self.subjects[0]
-        cleans = [kept_planes(basis) if first.settings.use_cache else None for basis in bases]
+        use_cache = self.subjects[0].settings.use_cache
+        cleans = [kept_planes(basis) if use_cache else None for basis in bases]
         presents = [
             denoised(basis.present_look, basis.features) if clean is None else clean.present
             for basis, clean in zip(bases, cleans, strict=True)
@@ -283,16 +284,7 @@ class Studio:
             if not self._is_open:
                 raise StoppedError
             if self._session is None:
-                store = self._open_store(Identity.of(bases))
-                self._session = Session(
-                    bases,
-                    presents,
-                    store,
-                    settings=first.settings,
-                    transform=transform_of(self.subjects, bases),
-                    constraints=first.constraints,
-                )
-                self._looks = Looks(self._session, self.pictures)
+                self._session, self._looks = self._begun(bases, presents)
             else:
                 self._session.improve(bases, presents)
             session = self._session
@@ -301,6 +293,23 @@ class Studio:
             offer_transforms(self.pictures, self._transforms(session))
         self.tell(self.state())
         self._settling.ring()
+
+    def _begun(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> tuple[Session, Looks]:
+        """What is painted of the first bases, and looks of it. Raises LightpaintError."""
+        store = self._open_store(Identity.of(bases))
+        try:
+            session = Session(
+                bases,
+                presents,
+                store,
+                settings=self.subjects[0].settings,
+                transform=transform_of(self.subjects, bases),
+                constraints=self.subjects[0].constraints,
+            )
+            return session, Looks(session, self.pictures)
+        except BaseException:
+            store.close()  # whoever tries again, as with other constraints, finds it free
+            raise
 
     def _transforms(self, session: Session) -> list[Any]:
         own = session.transform.name

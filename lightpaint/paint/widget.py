@@ -142,6 +142,14 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         super().__init__(height=height)
         self.on_msg(self._said)
         self._studio.on_message = self._hears
+        try:
+            self._begin(target)
+        except BaseException:
+            self.close()  # the cell runs again, and finds its file free
+            raise
+
+    def _begin(self, target: Target | Sequence[Target | None] | None) -> None:
+        """Paint, at once where nothing is to be rendered. Raises LightpaintError."""
         self._studio.start()
         if self._studio.renders:
             atexit.register(self.close)  # what renders cannot be left alone at the end

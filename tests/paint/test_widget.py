@@ -20,6 +20,7 @@ import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
 from lightpaint.errors import OutputError
 from lightpaint.paint import bundle, protocol
+from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 
@@ -383,6 +384,24 @@ def test_who_cannot_keep_what_was_done_has_ended_all_the_same(
         with pytest.raises(OutputError, match="are lost"):
             painter.close()
     assert painter.comm is None
+
+
+def test_a_cell_that_is_put_right_finds_its_file(
+    basis: lp.Basis, open_: Any, tmp_path: Path
+) -> None:
+    """Whatever was wrong with it, and also where an exception keeps what it was raised in."""
+    path = tmp_path / "evening.db"
+    open_(store=path)._studio.said(protocol.Tie((("key", "fill"),)), {})
+    asked = {"key": {"lock": [1, 1, 1]}, "fill": {"lock": [3, 1, 1]}}
+    with pytest.raises(lp.LightpaintError, match="tied") as kept:
+        open_(store=path, constraints=lp.Constraints.of(asked))
+    small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
+    with pytest.raises(lp.LightpaintError, match="3x3") as also_kept:
+        open_(store=path, target=small)
+    # It is anybody's, not only the next painter's of this kernel.
+    with Store.open(path, Identity.of([basis])) as store:
+        assert [step.kind for step in store.steps] == ["asked"]
+    del kept, also_kept
 
 
 def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
