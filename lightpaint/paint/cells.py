@@ -30,27 +30,44 @@ Loaded = tuple[Mapping[int, Pixels], Wishes, str]
 
 def of_targets(session: Session, targets: Any) -> Loaded:
     """These paintings, one for each view; None leaves a view unpainted. Raises LightpaintError."""
-    if not isinstance(targets, Sequence) or len(targets) != len(session.views):
-        raise PaintError(
-            f"painter.targets is a list of {len(session.views)}, a lp.Target or None for each view"
-        )
-    paintings = {k: _painting(session, k, one, "targets") for k, one in enumerate(targets)}
+    fitted = _fitted_targets(targets, [view.size for view in session.views])
+    paintings = {k: _painting(session, k, one) for k, one in enumerate(fitted)}
     return paintings, session.wishes, "paintings from a cell"
 
 
 def of_target(session: Session, target: Any) -> Loaded:
     """This painting of the first view. Raises LightpaintError."""
-    return {0: _painting(session, 0, target, "target")}, session.wishes, "painting from a cell"
+    fitted = _fitted(target, session.views[0].size, "target")
+    return {0: _painting(session, 0, fitted)}, session.wishes, "painting from a cell"
 
 
-def _painting(session: Session, view: int, target: Any, name: str) -> Pixels:
-    its = session.views[view]
+def check_given(target: Any, subjects: Sequence[Subject]) -> None:
+    """Raise LightpaintError for what cannot be painted on, also while its lights are rendered."""
+    sizes = [(subject.basis or subject.loaded).size for subject in subjects]
+    if isinstance(target, Target):
+        _fitted(target, sizes[0], "target")
+    else:
+        _fitted_targets(target, sizes)
+
+
+def _fitted_targets(targets: Any, sizes: Sequence[tuple[int, int]]) -> list[Target | None]:
+    if not isinstance(targets, Sequence) or len(targets) != len(sizes):
+        raise PaintError(
+            f"painter.targets is a list of {len(sizes)}, a lp.Target or None for each view"
+        )
+    return [_fitted(one, size, "targets") for one, size in zip(targets, sizes, strict=True)]
+
+
+def _fitted(target: Any, size: tuple[int, int], name: str) -> Target | None:
     if not isinstance(target, Target | None):
         kind = type(target).__name__
         raise PaintError(f"painter.{name} is a lp.Target or None, not {kind}")
+    return None if target is None else target.fitted_to(size, resize=False)
+
+
+def _painting(session: Session, view: int, target: Target | None) -> Pixels:
     if target is None:
-        return Pixels.unpainted(its.present)
-    target = target.fitted_to(its.size, resize=False)
+        return Pixels.unpainted(session.views[view].present)
     return _pixels_of(target)
 
 

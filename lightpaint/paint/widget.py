@@ -24,6 +24,7 @@ from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import cells
+from lightpaint.paint.beside import told
 from lightpaint.paint.bundle import widget_script, widget_style
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
@@ -123,12 +124,14 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         **settings: Any,
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
-        self._waiting = list[Callable[[], None]]()
+        self._waiting: dict[str, Any] = {}  # what is to be set, by name, as soon as it can be
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
         asked = {"settings": Settings(**settings), "constraints": constraints}
         subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
+        if target is not None:
+            cells.check_given(target, subjects)
         place = None if store is None else Path(store)
         if place is not None:
             if (before := KEPT_IN.get(place.resolve())) is not None:
@@ -159,8 +162,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                 raise PaintError(self._failed)
             self._follow()
         if target is not None:
-            name = "target" if isinstance(target, Target) else "targets"
-            self._when_there(lambda: setattr(self, name, target))
+            self._set_once_there("target" if isinstance(target, Target) else "targets", target)
 
     def __repr__(self) -> str:
         return f"Painter({self._studio.subjects[0].name})"
@@ -304,18 +306,28 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     def _heard(self, message: Message) -> None:
         self._places.tell(message)
         if message.kind == "state":
-            waiting, self._waiting = self._waiting, []
-            for act in waiting:
-                act()
+            waiting, self._waiting = self._waiting, {}
+            for name, value in waiting.items():
+                self._set_late(name, value)
         if message.kind == "state" or message.fields.get("exact"):
             self._follow()
 
-    def _when_there(self, act: Callable[[], None]) -> None:
-        """Now, or as soon as there is something to paint on."""
-        if self._studio.store is not None:
-            act()
-        else:
-            self._waiting.append(act)
+    def _set_once_there(self, name: str, value: Any) -> None:
+        """Now, or as soon as there is something to paint on. Raises LightpaintError if now."""
+        with self._lock:
+            if self._studio.store is None:
+                self._waiting[name] = value
+            else:
+                setattr(self, name, value)
+
+    def _set_late(self, name: str, value: Any) -> None:
+        """What fails is shown, and ends nothing: the cell that set it has ended."""
+        try:
+            setattr(self, name, value)
+        except Exception as error:
+            traceback.print_exc()
+            text = f"painter.{name} was not set: {told(error, at_length=False)}"
+            self._places.tell(Message("say", {"text": text, "tone": "warn"}))
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from weakref import ref
 
@@ -18,11 +19,13 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
-from lightpaint.errors import OutputError
-from lightpaint.paint import bundle, protocol
+from lightpaint.errors import OutputError, PaintError
+from lightpaint.paint import bundle, cells, protocol, studio
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.settings import Settings
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
@@ -255,6 +258,79 @@ def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_: Any)
     assert painter.target is None
     with pytest.raises(lp.LightpaintError, match="not int"):
         lp.Painter(3)
+
+
+class Rendered:
+    """Stands for a scene whose basis is rendered meanwhile: a first one, and then a better one."""
+
+    def __init__(self, basis: lp.Basis, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.basis, self.better = basis, replace(basis, images=basis.images * np.float32(1.5))
+        self.goes_on = threading.Event()
+        scene: Any = SimpleNamespace(spp=4, size=basis.size)
+        subject = Subject("room.xml", folder, scene=scene, settings=Settings(use_cache=False))
+        monkeypatch.setattr(cells, "subjects_given", lambda *_, **__: (subject,))
+        monkeypatch.setattr(studio, "bases_of", self._bases)
+
+    def _bases(self, *_: Any) -> Iterator[list[lp.Basis]]:
+        self.goes_on.wait(30)
+        yield [self.basis]
+        yield [self.better]
+
+
+def test_what_cannot_be_set_is_said_while_it_still_renders(
+    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Rendered(basis, tmp_path, monkeypatch)
+    small = lp.Target("s", np.ones((3, 3, 3), np.float32), np.ones((3, 3), np.float32), True)
+    for target, said in (
+        (small, "3x3"),
+        ([small], "3x3"),
+        ([None, None], "list of 1"),
+        (small.image, "list of 1"),
+        ([small.image], "lp.Target or None, not ndarray"),
+    ):
+        with pytest.raises(lp.LightpaintError, match=said):
+            open_(target=target)
+
+
+def test_what_cannot_be_set_later_ends_no_render(
+    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    def no(*_: Any) -> Any:
+        raise PaintError("no room for it")
+
+    rendered = Rendered(basis, tmp_path, monkeypatch)
+    whole = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
+    painter = open_(target=whole)
+    with monkeypatch.context() as patch:
+        patch.setattr(Studio, "load", no)
+        rendered.goes_on.set()
+        wait_for(
+            lambda: (
+                painter._studio.store is not None
+                and painter._studio.session.basis is rendered.better
+            )
+        )
+    text = "painter.target was not set: no room for it"
+    assert "PaintError: no room for it" in capsys.readouterr().err
+    assert text in wait_for(
+        lambda: [x["text"] for x, _ in painter.comm.messages if x["kind"] == "say"]
+    )
+    assert painter.target is None
+    painter.target = whole
+    np.testing.assert_array_equal(painter.target.image, whole.image)
+
+
+def test_what_is_set_while_it_renders_is_set_once_it_can_be(
+    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered = Rendered(basis, tmp_path, monkeypatch)
+    whole = lp.Target("s", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), True)
+    painter = open_(target=whole)
+    assert painter.target is None
+    rendered.goes_on.set()
+    wait_for(lambda: painter.target is not None)
+    np.testing.assert_array_equal(painter.target.image, whole.image)
 
 
 def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any) -> None:
