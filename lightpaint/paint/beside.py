@@ -1,4 +1,4 @@
-"""What goes on beside the brush: threads that give way to it, and the exact answer at rest."""
+"""What goes on beside the brush: threads that give way to it, the exact answer, a full disk."""
 
 import os
 import sys
@@ -6,20 +6,28 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from threading import Condition, Thread, current_thread, get_native_id
+from threading import Condition, Event, Thread, current_thread, get_native_id
+from typing import Literal
 
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line
 from lightpaint.paint.frames import Message
+from lightpaint.paint.store import Store
 
 #: Seconds of rest after a stroke before the exact answer is looked for.
 REST_S = 0.2
+
+#: Seconds after which what could not be written is tried again.
+TRY_S = 2.0
 
 #: How much less urgent than strokes all else is, where threads can be told apart: on Linux.
 NICE = 10
 
 #: Seconds in which a pass of a render ends.
 PATIENCE_S = 60.0
+
+#: How something is said to a page.
+Tone = Literal["info", "warn"]
 
 
 class StoppedError(Exception):
@@ -70,6 +78,34 @@ class Settling:
             except Exception as error:
                 # A mistake of our own ends no session: the next stroke is answered again.
                 self._say(Message("say", {"text": told(error), "tone": "warn"}))
+
+
+class Writing:
+    """Tries again to write what a full disk keeps in memory, in a thread of its own.
+
+    store: what is to be written; None before there is one. say: hears, with a tone, that it cannot
+    be, and that it is.
+    """
+
+    def __init__(self, store: Callable[[], Store | None], say: Callable[[str, Tone], None]) -> None:
+        self._store, self._say = store, say
+        self._is_over = Event()
+
+    def end(self) -> None:
+        """Whoever closes the store says what is lost."""
+        self._is_over.set()
+
+    def watch(self) -> None:
+        """Until the end."""
+        is_told = False
+        while not self._is_over.wait(TRY_S):
+            store = self._store()
+            unsaved = None if store is None else store.flush()
+            if unsaved is not None and not is_told:
+                self._say(unsaved, "warn")
+            elif unsaved is None and is_told:
+                self._say("all that was painted is kept again", "info")
+            is_told = unsaved is not None
 
 
 class Threads:

@@ -22,7 +22,7 @@ from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
-from lightpaint.paint.beside import Settling, StoppedError, Threads, give_way, told
+from lightpaint.paint.beside import Settling, StoppedError, Threads, Tone, Writing, give_way, told
 from lightpaint.paint.canvas import Canvas
 from lightpaint.paint.errands import Errands
 from lightpaint.paint.frames import Message
@@ -89,6 +89,7 @@ class Studio:
         self._progress: Mapping[str, Any] | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
         self._settling = Settling(self._find, self.tell)
+        self._writing = Writing(lambda: self.store, self._tell_kept)
         self._threads = Threads(self.tell)
         self._errands = Errands(self, self._threads)
 
@@ -113,11 +114,13 @@ class Studio:
         """Begin to obtain the bases."""
         self._threads.begin(self._obtain, "obtain")
         self._threads.begin(self._settling.settle, "settle")
+        self._threads.begin(self._writing.watch, "write")
 
     def close(self) -> None:
         """End; all that was done is kept."""
         self._is_open = False
         self._settling.end()
+        self._writing.end()
         with self._lock:
             if self._session is not None:
                 self._session.store.close()
@@ -242,6 +245,10 @@ class Studio:
             self._progress = about
         with MITSUBA.aside():  # whoever hears it may wait for a render of its own
             self.tell(Message("progress", about))
+
+    def _tell_kept(self, text: str, tone: Tone) -> None:
+        """Whether what is done can be written."""
+        self.tell(Message("say", {"text": text, "tone": tone}))
 
     def _obtain(self) -> None:
         """The bases, better and better."""

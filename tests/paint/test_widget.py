@@ -3,11 +3,13 @@
 import asyncio
 import gc
 import importlib
+import sqlite3
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +22,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint import bundle, cells, protocol, studio
+from lightpaint.paint import beside, bundle, cells, protocol, store, studio
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
@@ -408,6 +410,32 @@ def test_a_session_with_a_file_goes_on(basis: lp.Basis, open_: Any, tmp_path: Pa
     painter.close()
     again = open_(store=tmp_path / "evening.db")
     np.testing.assert_array_equal(again.target.image, basis.images[2])
+
+
+def test_a_full_disk_is_said_and_tried_again(
+    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def full(_: Any) -> Iterator[None]:
+        raise sqlite3.OperationalError("database or disk is full")
+        yield
+
+    def said(tone: str) -> Any:
+        return [x["text"] for x, _ in page.heard() if x["kind"] == "say" and x["tone"] == tone]
+
+    monkeypatch.setattr(beside, "TRY_S", 0.01)
+    painter = open_(store=tmp_path / "evening.db")
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "transaction", full)
+        assert page.paint(basis.images[2])["kind"] == "answer"
+        [why] = wait_for(lambda: said("warn"))
+        assert "evening.db cannot be written (database or disk is full)" in why
+        assert not said("info")
+    assert wait_for(lambda: said("info")) == ["all that was painted is kept again"]
+    assert painter._studio.store.unsaved is None
+    assert said("warn") == [why]  # once, however often it was tried
 
 
 def test_a_cell_with_a_file_runs_again(
