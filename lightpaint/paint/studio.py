@@ -88,6 +88,7 @@ class Studio:
         self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
         self._progress: Mapping[str, Any] | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
+        self._telling = RLock()  # taken before the other, by whoever tells of what it made
         self._settling = Settling(self._find, self.tell)
         self._writing = Writing(lambda: self.store, self._tell_kept)
         self._threads = Threads(self.tell)
@@ -229,12 +230,21 @@ class Studio:
         if message is not None and self.on_message is not None and self._is_open:
             self.on_message(message)
 
+    def _tell_of(self, make: Callable[[], Message | None]) -> None:
+        """Say what is made of what there is, in the order in which it came about."""
+        with self._telling:
+            with self._lock:
+                message = make()
+            self.tell(message)
+
     def put(self, name: str, picture: Picture) -> None:
         """A picture from now on, of which the page is told."""
-        with self._lock:
+
+        def renewed() -> Message:
             self.pictures.put(name, picture)
-            new = {name: self.pictures.generations[name]}
-        self.tell(Message("renewed", {"resources": new}))
+            return Message("renewed", {"resources": {name: self.pictures.generations[name]}})
+
+        self._tell_of(renewed)
 
     def hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """How far something is. Raises StoppedError where it has ended."""
@@ -268,7 +278,7 @@ class Studio:
             self.tell(Message("say", {"text": self._failed, "tone": "warn"}))
             if self._session is None:
                 self.failure = error
-                self.tell(self.state())
+                self._tell_of(self.state)
             if is_told and self._is_open:
                 self.on_failure(error)  # type: ignore[misc]
 
@@ -298,7 +308,7 @@ class Studio:
             for view, clean in zip(session.views, shown, strict=True):
                 offer_view(self.pictures, view, session.transform, clean)
             offer_transforms(self.pictures, self._transforms(session))
-        self.tell(self.state())
+        self._tell_of(self.state)
         self._settling.ring()
 
     def _begun(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> tuple[Session, Looks]:
@@ -395,7 +405,9 @@ class Studio:
             self._tell_answer(lambda: session.settled(moment, solution, **known))
 
     def _tell_answer(self, make: Callable[[], Message | None]) -> None:
-        with self._lock:
+        def known() -> Message | None:
             message = make()
             self._known = message.fields if message is not None else self._known
-        self.tell(message)
+            return message
+
+        self._tell_of(known)

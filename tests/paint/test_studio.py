@@ -210,6 +210,42 @@ def test_lights_of_unknown_noise_are_cleaned_too(
     heard.studio.close()
 
 
+def test_what_is_said_comes_in_the_order_in_which_it_came_about(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Else a page forgets a picture that another thread made while all there is was told."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    goes_on, is_telling, better = threading.Event(), threading.Event(), replace(basis)
+    tell = Studio.tell
+
+    def bases_of(*_: Any) -> Iterator[list[lp.Basis]]:
+        yield [basis]
+        assert goes_on.wait(30)
+        yield [better]
+
+    def slow(self: Studio, message: Message | None) -> None:
+        if message is not None and message.kind == "state" and goes_on.is_set():
+            is_telling.set()
+            time.sleep(0.2)
+        tell(self, message)
+
+    monkeypatch.setattr(Studio, "tell", slow)
+    monkeypatch.setattr(studio, "bases_of", bases_of)
+    heard = Heard(tmp_path, basis)
+    goes_on.set()
+    assert is_telling.wait(30)
+    heard.studio.put("verified", np.zeros((*SIZE, 3), np.float16))
+    heard.wait(lambda _: sum(m.kind == "state" for m in heard.messages) == 2)
+    heard.wait(lambda m: m.kind == "renewed" and "verified" in m.fields["resources"])
+    known: dict[str, int] = {}
+    for message in heard.messages:
+        if message.kind in ("state", "renewed"):
+            its = message.fields["resources"]
+            known = its if message.kind == "state" else known | its
+    assert "verified" in known
+    heard.studio.close()
+
+
 def test_clean_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
