@@ -285,3 +285,46 @@ def test_a_gpu_that_does_not_come_back_is_done_without(run: Any):
     )
     assert name == "cpu"
     np.testing.assert_allclose(after, before, atol=1)
+
+
+def test_a_view_that_is_closed_is_no_gpu_that_is_lost(run: Any):
+    """It gives its context up, and is told so when the next view is there already."""
+    names, canvases = run(
+        """
+        const { screen } = engine;
+        screen.patience = 1;
+        const [first, names] = [screen.view, []];
+        screen.begin([H, W], 3, first.name);
+        const second = screen.view;
+        let told = 0;
+        for (const { canvas } of [first, second])
+            canvas.addEventListener("webglcontextlost", () => told++);
+        await until(() => told === 1);
+        await new Promise((done) => setTimeout(done, 20));
+        names.push(screen.view.name);
+        screen.close();
+        await until(() => told === 2);
+        await new Promise((done) => setTimeout(done, 20));
+        names.push(screen.view?.name);
+        return [names, engine.element.querySelectorAll("canvas").length];
+        """,
+        "gl",
+    )
+    assert (names, canvases) == (["gl", None], 0)
+
+
+def test_another_view_does_not_wait_for_the_gpu_of_the_one_before(run: Any):
+    name = run(
+        """
+        const { screen } = engine;
+        const before = screen.view;
+        screen.patience = 20;
+        before.gl.getExtension("WEBGL_lose_context").loseContext();
+        await until(() => before.isLost);
+        screen.begin([H, W], 3, before.name);
+        await new Promise((done) => setTimeout(done, 2 * screen.patience));
+        return screen.view.name;
+        """,
+        "gl",
+    )
+    assert name == "gl"

@@ -46,18 +46,22 @@ export class Screen {
    * @param {[height: number, width: number]} size @param {number} count
    * @param {'gl' | 'cpu' | null} [which] */
   begin(size, count, which = this.options.view ?? null) {
+    clearTimeout(this.waiting);
     this.view?.close();
     this.view?.canvas.remove();
     this.size = size;
     this.count = count;
-    const onRestored = () => this.restored();
-    this.view = chooseView(this.element, size, count, { view: which, onRestored });
-    this.view.canvas.addEventListener('webglcontextlost', () => this.lost());
+    const onRestored = () => this.restored(view);
+    const view = chooseView(this.element, size, count, { view: which, onRestored });
+    view.canvas.addEventListener('webglcontextlost', () => this.lost(view));
+    this.view = view;
     this.fit();
   }
 
-  /** The GPU has gone; without it, if it does not come back. */
-  lost() {
+  /** The GPU has gone; without it, if it does not come back. @param {PictureView} view */
+  lost(view) {
+    // One that is closed gives its context up, and is told so when the next one is there already.
+    if (view !== this.view) return;
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => {
       this.begin(this.size, this.count, 'cpu');
@@ -65,9 +69,11 @@ export class Screen {
     }, this.patience);
   }
 
-  restored() {
+  /** @param {PictureView} view */
+  restored(view) {
+    if (view !== this.view) return;
     clearTimeout(this.waiting);
-    this.view?.setCount(this.count);
+    view.setCount(this.count);
     this.options.refill();
   }
 
