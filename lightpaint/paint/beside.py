@@ -122,7 +122,7 @@ class Threads:
         thread.start()
 
     def later(self, work: Callable[[], None], name: str) -> None:
-        """The same at leisure, until somebody stops it; what fails is said."""
+        """The same at leisure, until somebody stops it; what fails is said, and that it was this."""
 
         def run() -> None:
             give_way()
@@ -131,7 +131,7 @@ class Threads:
             except StoppedError:
                 pass
             except Exception as error:
-                self._say(Message("say", {"text": told(error), "tone": "warn"}))
+                self._say(Message("say", {"text": told(error), "tone": "warn", "what": name}))
 
         self.begin(run, name)
 

@@ -549,7 +549,8 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     solution = correct_noise(lp.solve(both, [lp.read_target(file) for file in files]))
     np.testing.assert_allclose(solution.weights, exact.arrays["weights"], rtol=1e-9)
     studio.said(protocol.Export(("report",)), {})
-    heard.wait(lambda m: m.kind == "say" and "needs their scene" in m.fields["text"])
+    said = heard.wait(lambda m: m.kind == "say" and "needs their scene" in m.fields["text"])
+    assert said.fields["what"] == "export"
     with pytest.raises(lp.LightpaintError, match="no view 2"):
         studio.said(protocol.Explain(2), {})
     studio.close()

@@ -508,6 +508,66 @@ def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
     assert not painter.page.get_by_role("alert").is_visible()
 
 
+def under_way(painter: Painter) -> set[str]:
+    """What is shown to be: writing files, rendering, finding out why it is not closer."""
+    ui = painter.page.evaluate("() => painter.store.value")
+    flags = {"export": ui["isWriting"], "verify": ui["verifying"], "explain": ui["explaining"]}
+    return {name for name, is_so in flags.items() if is_so}
+
+
+def ask_for_all(painter: Painter) -> None:
+    """Ask for everything that takes long."""
+    painter.page.evaluate(
+        "() => { const { session, store } = painter; store.set({ isWriting: true });"
+        " session.send('export', { what: [] }); session.verify(); session.explain(); }"
+    )
+    painter.still()
+
+
+LOST = "Promise.reject(new Error('there is no connection to the painter'))"
+
+
+def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
+    painter.page.evaluate(f"() => {{ host.send = () => {LOST}; }}")
+    ask_for_all(painter)
+    assert under_way(painter) == set()
+    painter.button("Write files").click()
+    painter.button("Write", exact=True).click()
+    assert painter.button("Write", exact=True).is_enabled()
+    painter.page.keyboard.press("Escape")
+    painter.button("How true?").click()
+    painter.button("Out of reach").click()  # asks for what it shows, and once
+    painter.page.wait_for_function("() => painter.store.value.show.overlay === null")
+
+
+def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> None:
+    painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
+    ask_for_all(painter)
+    assert under_way(painter) == {"export", "verify", "explain"}
+    painter.tell(kind="say", text="The scene does not load.", tone="warn")
+    painter.tell(kind="failed", text="A stroke is too large.")
+    assert under_way(painter) == {"export", "verify", "explain"}
+    for what in ("verify", "explain", "export"):
+        assert what in under_way(painter)
+        painter.tell(kind="say", text="It does not render.", tone="warn", what=what)
+        assert what not in under_way(painter)
+
+
+def test_what_ended_while_the_connection_was_lost_is_not_waited_for(painter: Painter) -> None:
+    painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
+    ask_for_all(painter)
+    painter.page.evaluate("() => host.tell(host.state())")  # another round of samples is there
+    assert under_way(painter) == {"export", "verify", "explain"}
+    painter.tell(kind="connection", state="lost")
+    painter.page.evaluate("() => host.tell(host.state())")
+    assert under_way(painter) == set()
+    painter.tell(kind="progress", what="verification", done=5, total=16, unit="passes")
+    assert under_way(painter) == {"verify"}  # which still goes on
+    painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+    painter.page.evaluate("() => host.tell(host.state())")
+    assert under_way(painter) == set()
+
+
 def test_by_keyboard_alone(painter: Painter) -> None:
     """All controls are reached by Tab, each says what it is, and the pictures take paint."""
     reached = []

@@ -6,8 +6,20 @@
 
 import { stateOfView } from '../engine/protocol.js';
 
+/** What is shown while something that was asked for is under way, as it is when nothing is.
+ * @type {Record<string, Partial<Ui>>} */
+export const ENDED = {
+  export: { isWriting: false, writing: null },
+  verify: { verifying: null },
+  explain: { explaining: false },
+};
+
+/** When nothing is known to be under way. */
+export const IDLE = { ...ENDED.export, ...ENDED.verify, ...ENDED.explain };
+
 /** @param {any} message @returns {Partial<Ui>} */
 export function stateOf(message, /** @type {import('./model.js').Ui} */ before) {
+  const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
   const view = before.view < views.length ? before.view : 0;
   const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
@@ -27,6 +39,8 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
     hint: Boolean(message.first),
     connection: 'open',
     closed: null,
+    // What came of it meanwhile was not heard; of what still goes on more is said.
+    ...(isBack ? IDLE : {}),
     basis:
       basis && !basis.done
         ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }

@@ -1,6 +1,6 @@
 /** Talks with the session: what it says becomes state, what a person does becomes messages. */
 
-import { answerOf, explainedOf, progressOf, stateOf, verifiedOf } from './heard.js';
+import { ENDED, IDLE, answerOf, explainedOf, progressOf, stateOf, verifiedOf } from './heard.js';
 import { look } from './tools.js';
 
 /** @typedef {import("./engine.js").Host} Host */
@@ -50,8 +50,10 @@ export class Session {
     try {
       const reply = await this.host.send(kind, fields);
       this.receive(reply, reply);
+      if (reply.kind === 'failed' || reply.kind === 'closed') this.ended(kind);
       return reply;
     } catch (error) {
+      this.ended(kind);
       this.toast(error instanceof Error ? error.message : String(error), 'warn');
       return null;
     }
@@ -68,6 +70,7 @@ export class Session {
         state: null,
         waiting: m.text ?? '',
         basis: m.progress ?? null,
+        ...IDLE,
       }),
       answer: (/** @type {any} */ m) => answerOf(m, this.store.value),
       patch: (/** @type {any} */ m) => answerOf(m, this.store.value),
@@ -75,13 +78,13 @@ export class Session {
         resources: { ...this.store.value.resources, ...m.resources },
       }),
       progress: progressOf,
-      say: (/** @type {any} */ m) => this.say(m.text, m.tone),
-      failed: (/** @type {any} */ m) => this.failed(m.text),
+      say: (/** @type {any} */ m) => this.say(m),
+      failed: (/** @type {any} */ m) => this.toast(m.text, 'warn'),
       looks: (/** @type {any} */ m) => ({
         looks: m.looks,
         resources: { ...this.store.value.resources, ...m.resources },
       }),
-      exported: (/** @type {any} */ m) => ({ exported: m, isWriting: false, writing: null }),
+      exported: (/** @type {any} */ m) => ({ exported: m, ...ENDED.export }),
       verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
       explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
@@ -101,18 +104,18 @@ export class Session {
     }
   }
 
-  /** @param {string} text */
-  failed(text) {
-    this.store.set({ verifying: null, explaining: false, isWriting: false, writing: null });
+  /** Nothing more comes of what was asked for. @param {string} kind of the message that did */
+  ended(kind) {
+    this.store.set(ENDED[kind] ?? {});
     // It would be asked for again and again.
-    if (this.store.value.show.overlay === 'beyond') look(this.store, { overlay: null });
-    this.toast(text, 'warn');
+    const isShown = kind === 'explain' && this.store.value.show.overlay === 'beyond';
+    if (isShown) look(this.store, { overlay: null });
   }
 
-  /** What goes wrong beside the painting comes so, too. @param {string} text
-   * @param {'info' | 'warn'} tone */
-  say(text, tone) {
-    if (tone === 'warn') this.store.set({ isWriting: false, writing: null });
+  /** What goes wrong beside the painting comes so, too. what: which errand that was.
+   * @param {{text: string, tone: 'info' | 'warn', what?: string}} said */
+  say({ text, tone, what }) {
+    if (what) this.ended(what);
     this.toast(text, tone);
   }
 
