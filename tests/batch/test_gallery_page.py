@@ -18,7 +18,8 @@ from lightpaint.batch.planes import keep_planes, planes_name, read_planes
 from lightpaint.batch.summary import LightRow, Row
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.file import read_lighting, write_lighting
+from lightpaint.lighting.lighting import Lighting
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +175,61 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
     page.locator(".mixer-light").first.wait_for()
     assert page.locator(".mixer-light").count() == 40
     assert page.locator(".mixer-name").first.text_content() == "lamp 20"
+
+
+def two_mixers(folder: Path) -> tuple[Path, dict[str, str]]:
+    """A gallery of two looks, `slow` and `quick`, and the planes of each."""
+    rows, names = [], {}
+    for name in ("slow", "quick"):
+        basis, key = small_basis(), json.dumps({"view": name})
+        keep_planes(folder, key, basis)
+        lights = tuple(LightRow(one.name, 1.0, (1.0, 1.0, 1.0)) for one in basis.lights)
+        (folder / name).mkdir()
+        write_lighting(folder / name / "lighting.json", Lighting.present(basis))
+        rows.append(Row(name, "done", "", name, lights=lights))
+        names[name] = planes_name(folder, key)
+    index = folder / "index.html"
+    index.write_text(gallery_page(folder, "two", rows, names), encoding="utf-8")
+    return index, names
+
+
+#: What is unpacked while `isHeld` waits for `go()`, which is over when its readers have it.
+HELD = """{
+  const { arrayBuffer } = Response.prototype, read = [];
+  let open;
+  const gate = new Promise((done) => { open = done; });
+  window.isHeld = true;
+  Response.prototype.arrayBuffer = function () {
+    const made = (isHeld ? gate : Promise.resolve()).then(() => arrayBuffer.call(this));
+    read.push(made);
+    return made;
+  };
+  window.go = async () => {
+    open();
+    await Promise.all(read);
+    await new Promise((done) => setTimeout(done));
+  };
+}"""
+
+
+def test_of_two_mixers_the_one_that_was_asked_for_last_is_shown(page: Any, tmp_path: Path) -> None:
+    page.add_init_script(HELD)
+    index, names = two_mixers(tmp_path)
+    page.goto(index.as_uri())
+    page.get_by_role("tab", name="Mixer").click()
+    page.evaluate("() => { isHeld = false; }")
+    page.locator("#from").select_option(label="quick")
+    page.locator(".mixer-body").wait_for()
+    page.evaluate("() => go()")
+    visible = page.locator(".mixer:visible")
+    assert [one.get_attribute("data-basis") for one in visible.all()] == [names["quick"]]
+
+
+def test_what_a_browser_lacks_for_a_mixer_is_said(page: Any, tmp_path: Path) -> None:
+    page.add_init_script("delete window.DecompressionStream")
+    page.goto(two_mixers(tmp_path)[0].as_uri())
+    page.get_by_role("tab", name="Mixer").click()
+    page.get_by_text("lacks DecompressionStream").wait_for()
 
 
 def test_planes_are_written_once_and_follow_their_basis(tmp_path: Path) -> None:

@@ -386,12 +386,13 @@ find('unit').addEventListener('input', () => {
 
 // ------------------------------------------------------------------------------------- mixer
 
-let isBegun = false;
+/** How often a mixer was asked for: one that is slow to unpack does not come after another. */
+let asked = 0;
 /** The mixer that begins from a look. @param {Look} look */
 function mix(look) {
   const root = mixers.get(look.basis ?? '');
   if (!root) return;
-  isBegun = true;
+  const turn = ++asked;
   select('mixer');
   for (const other of mixers.values()) if (other !== root) other.hidden = true;
   field('from').value = String(looks.indexOf(look));
@@ -399,12 +400,14 @@ function mix(look) {
   const transform = { ...(transforms[view] ?? transforms.srgb), stops };
   const lights = look.lights ?? [];
   const isWhite = (/** @type {LookLight} */ { duv }) => duv !== undefined && Math.abs(duv) <= WHITE;
-  begin(root, {
+  /** @type {import("./mixer.js").Look} */
+  const its = {
     name: look.look,
     emission: new Map(lights.map((light) => [light.name, light.emission ?? [0, 0, 0]])),
     kelvin: new Map(lights.map((x) => [x.name, (isWhite(x) && x.kelvin) || null])),
     transform,
-  });
+  };
+  begin(root, its, () => turn === asked);
   scrollTo(0, 0);
 }
 /** Those that can be mixed. */
@@ -434,7 +437,7 @@ function select(name) {
   find('size').hidden = name !== 'looks';
   tray();
   if (name === 'lights') tabulate();
-  if (name === 'mixer' && !isBegun && mixed.length) mix(mixed[0]);
+  if (name === 'mixer' && !asked && mixed.length) mix(mixed[0]);
 }
 tabs.forEach((tab, k) => {
   tab.addEventListener('click', () => select(tab.id.replace('-tab', '')));

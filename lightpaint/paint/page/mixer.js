@@ -327,10 +327,25 @@ function contents(root) {
   return made;
 }
 
-/** Show a mixer as its answer has it, or as a look has its lights.
- * @param {HTMLElement} root @param {Look} [look] */
-export async function begin(root, look) {
+/** Show a mixer as its answer has it, or as a look has its lights; or say why there is none.
+ * @param {HTMLElement} root @param {Look} [look]
+ * @param {() => boolean} [isWanted] whether nothing else has been asked for while it was unpacked */
+export async function begin(root, look, isWanted = () => true) {
   root.dataset.ready = '';
+  const body = made('div', 'mixer-body');
+  try {
+    await fill(body, root, look);
+  } catch (error) {
+    body.append(made('p', 'mixer-said', whyNone(error)));
+  }
+  if (!isWanted()) return;
+  root.querySelector('.mixer-body')?.remove();
+  root.append(body);
+  root.hidden = false;
+}
+
+/** @param {HTMLElement} body @param {HTMLElement} root @param {Look} [look] */
+async function fill(body, root, look) {
   let [data, planes] = await contents(root);
   if (look) {
     const lights = data.lights.map((light) => {
@@ -341,11 +356,14 @@ export async function begin(root, look) {
     const lighting = { ...data.lighting, target: `${look.name}-mix` };
     data = { ...data, lights, lighting, transform: look.transform };
   }
-  const body = made('div', 'mixer-body');
   new Mixer(body, data, planes, await lutOf(data.transform));
-  root.querySelector('.mixer-body')?.remove();
-  root.append(body);
-  root.hidden = false;
+}
+
+/** @param {unknown} error */
+function whyNone(error) {
+  if (typeof DecompressionStream === 'undefined')
+    return 'The mixer is not here: this browser lacks DecompressionStream, which newer ones have.';
+  return `The mixer is not here: ${error instanceof Error ? error.message : error}`;
 }
 
 for (const root of document.querySelectorAll('.mixer:not([data-ready])'))
