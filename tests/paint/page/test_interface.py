@@ -338,6 +338,31 @@ def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     assert [max(rgb) > 0 for rgb in shown["other"]] == [k == 1 for k in range(7)]
 
 
+@pytest.mark.parametrize("way", ["panels", "fold", "search"])
+def test_a_light_is_shown_alone_until_its_row_is_gone(painter: Painter, way: str) -> None:
+    painter.page.locator(".light-thumb").nth(1).hover()
+    painter.page.wait_for_function("() => engine.shown.right === 'other'")
+    if way == "panels":
+        painter.page.keyboard.press("p")
+    elif way == "fold":
+        painter.page.locator(".is-lights button").first.focus()
+        painter.page.keyboard.press("Enter")
+    else:
+        painter.page.evaluate("() => painter.store.set({ search: 'key' })")
+    painter.page.locator(".light").nth(1).wait_for(state="detached")
+    painter.page.wait_for_function("() => engine.shown.right === 'solution'")
+
+
+def test_space_is_not_held_in_a_window_that_is_left(painter: Painter) -> None:
+    painter.page.mouse.move(*painter.place())
+    painter.page.keyboard.down("Space")
+    assert painter.page.locator(".stage.is-panning").count() == 1
+    painter.page.evaluate("() => window.dispatchEvent(new Event('blur'))")
+    assert painter.page.locator(".stage.is-panning").count() == 0
+    painter.stroke()
+    assert painter.calls("begin")
+
+
 def test_what_is_under_the_pointer(painter: Painter) -> None:
     painter.page.mouse.move(*painter.place())
     painter.page.wait_for_timeout(80)

@@ -32,6 +32,12 @@ export class LightRow extends Component {
     );
   }
 
+  /** A row that goes away under the pointer is not told that the pointer has left. */
+  componentWillUnmount() {
+    const { k, hands } = this.props;
+    if (hands.store.value.hovered === k) hands.store.set({ hovered: null });
+  }
+
   render() {
     const { k, light, hands, isOpen, readonly, hasSlider, here, isMute, asked } = this.props;
     const { store } = hands;

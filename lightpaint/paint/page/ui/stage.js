@@ -234,18 +234,23 @@ function useSurface(frame, pointer, hands) {
       if (rings && !pointer.doing) rings.hidden = true;
     });
     on('keydown', (event) => byKeys(event, pointer, engine, store));
+    const pan = (/** @type {boolean} */ isSpace) => {
+      pointer.isSpace = isSpace;
+      element.classList.toggle('is-panning', isSpace);
+    };
     const over = (/** @type {KeyboardEvent} */ event) => {
       const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
       if (event.code !== 'Space' || isTyping(event)) return;
       const isHere = element.matches(':hover') || inner === element;
-      pointer.isSpace = event.type === 'keydown' && isHere;
-      element.classList.toggle('is-panning', pointer.isSpace);
+      pan(event.type === 'keydown' && isHere);
       if (isHere) event.preventDefault();
     };
     // On its way there, since the painter keeps its keys from what is around it.
     const early = { signal: ends.signal, capture: true };
     window.addEventListener('keydown', over, early);
     window.addEventListener('keyup', over, early);
+    // Where the key is let go in another window, this one does not hear of it.
+    window.addEventListener('blur', () => pan(false), { signal: ends.signal });
     return () => ends.abort();
   }, []);
 }
