@@ -55,10 +55,6 @@ export class Strokes {
       this.isTaken = false;
       if (isBack === false) this.forget();
     });
-    // With another basis, a session begins anew with what is done.
-    host.on('renewed', () => {
-      if (this.live) this.live.dirty = this.live.whole;
-    });
     host.on('state', ({ stroke }) => {
       this.count = Math.max(this.count, Number(stroke) || 0);
     });
