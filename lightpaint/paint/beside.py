@@ -122,7 +122,7 @@ class Threads:
         thread.start()
 
     def later(self, work: Callable[[], None], name: str) -> None:
-        """The same at leisure, until somebody stops it; what fails is said, and that it was this."""
+        """The same at leisure, until somebody stops it; of what fails it is said what that was."""
 
         def run() -> None:
             give_way()

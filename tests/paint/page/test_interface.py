@@ -290,6 +290,38 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
 
 
+def test_an_answer_to_what_was_undone_says_nothing(painter: Painter) -> None:
+    asked, history = {"key": {"lock": 1}}, {"undo": ["brush"], "redo": []}
+    painter.tell(kind="answer", version=6, asked=asked, history=history)
+    assert (painter.ui("asked"), painter.ui("history")) == (asked, history)
+    undone = {"undo": [], "redo": ["brush"]}
+    painter.tell(kind="patch", version=7, asked={}, history=undone)
+    painter.tell(kind="answer", version=6, exact=True, asked=asked, history=history, headline="Old")
+    assert (painter.ui("asked"), painter.ui("history")) == ({}, undone)
+    painter.page.evaluate("() => host.tell({ ...host.state(), headline: '' })")  # counts anew
+    painter.tell(kind="answer", version=1, asked=asked, history=history)
+    assert (painter.ui("asked"), painter.ui("history")) == (asked, history)
+
+
+@pytest.mark.parametrize("way", ["off", "slider"])
+def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, way: str) -> None:
+    """Also where an answer of before comes while the session has not heard of the hand."""
+    limits = {"limits": {"max": "150%"}}
+    painter.page.evaluate(
+        """async ([limits, way]) => {
+          const { session } = painter;
+          await session.ask(0, limits);
+          const asked = way === 'off' ? session.turn(0, true) : session.hold(0, [1, 1, 1], true);
+          host.tell({ kind: 'answer', exact: true, asked: { key: limits }, arrays: {} });
+          await asked;
+        }""",
+        [limits, way],
+    )
+    painter.still()
+    painter.page.evaluate("() => painter.session.release(0)")
+    assert painter.said("ask")[-1]["asked"] == limits
+
+
 def test_what_a_light_may_do(painter: Painter) -> None:
     page = painter.page
     page.get_by_role("button", name="key", exact=True).click()

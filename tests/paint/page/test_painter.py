@@ -255,6 +255,18 @@ def test_old_answers_do_not_come_back(run: Any):
     assert weights == [1] * 9
 
 
+def test_an_answer_to_what_was_undone_does_not_come_back(run: Any):
+    weights = run(
+        """
+        const say = (kind, version, value) => host.tell(kind, { kind, version, region: [0, 0, 0, 0],
+            arrays: { weights: { data: new Float64Array(9).fill(value), shape: [3, 3] } } });
+        say("patch", 7, 1); say("answer", 6, 2); say("patch", 6, 3);
+        return Array.from(engine.work.weights);
+        """
+    )
+    assert weights == [1] * 9
+
+
 def test_a_gpu_that_comes_back_is_filled_again(run: Any):
     before, after = run(
         """

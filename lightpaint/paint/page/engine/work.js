@@ -50,6 +50,7 @@ export class Work {
     /** @type {Show | null} */
     this.shown = null;
     this.weights = new Float64Array();
+    /** How often the session had changed, as its last message says. */
     this.version = -1;
     /** @type {import("./lut.js").Lut} */
     this.lut = SRGB;
@@ -77,7 +78,7 @@ export class Work {
   begin(state) {
     this.version = -1;
     this.open(state, this.view);
-    this.answered(state);
+    this.mix(state);
     this.loader.begin(state.resources);
     this.want();
     if (this.loader.there.has('present')) this.sync();
@@ -119,12 +120,17 @@ export class Work {
     this.setLut(this.lut);
   }
 
-  /** Weights that come with a message. @param {Message} message */
+  /** What an answer or a patch says of weights, unless it is of before what was said already.
+   * @param {Message} message */
   answered(message) {
+    if (message.version < this.version) return;
+    this.version = message.version ?? this.version;
+    this.mix(message);
+  }
+
+  /** Weights that come with a message. @param {Message} message */
+  mix(message) {
     const weights = message.arrays?.weights?.data;
-    const version = message.version ?? this.version;
-    if (message.kind === 'answer' && version < this.version) return;
-    if (message.kind === 'answer') this.version = version;
     if (!weights) return;
     this.weights = Float64Array.from(weights);
     this.weigh();

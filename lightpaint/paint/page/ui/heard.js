@@ -26,6 +26,7 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
   return {
     ready: true,
     state: stateOfView(message, view),
+    version: -1,
     view,
     views,
     lights,
@@ -148,9 +149,12 @@ function weightsOf(message) {
   return { weights };
 }
 
-/** Of an answer, and of a patch. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+/** Of an answer, and of a patch, unless it is of before what was said already: an exact answer that
+ * was found as somebody undid. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 export function answerOf(message, ui) {
+  if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
+  made.version = message.version ?? ui.version;
   for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant'])) {
     if (message[key]) made[key] = message[key];
   }

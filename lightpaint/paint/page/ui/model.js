@@ -26,6 +26,7 @@ import { ofKelvin } from './colours.js';
  * @property {boolean} isWriting files
  * @property {Progress | null} writing how far that is, where it takes long
  * @property {any} state as the session said it last, of the view that is shown
+ * @property {number} version how often the session had changed, as its last message says
  * @property {number} view that is shown
  * @property {{name: string, size: [number, number]}[]} views of the session
  * @property {(Seen | null)[] | null} ofViews how close each view is; null where nothing is painted
@@ -113,6 +114,7 @@ export function first() {
     isWriting: false,
     writing: null,
     state: null,
+    version: -1,
     view: 0,
     views: [],
     ofViews: null,

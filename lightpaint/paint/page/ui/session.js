@@ -38,6 +38,8 @@ export class Session {
     this.isMoving = false;
     /** What was asked of a light before a hand moved it. @type {Map<number, Asked>} */
     this.before = new Map();
+    /** What is asked of lights by messages on their way. @type {Map<number, Asked>} */
+    this.asking = new Map();
     for (const kind of HEARD)
       host.on(kind, (message) => this.receive({ ...message, kind }, message));
   }
@@ -96,9 +98,11 @@ export class Session {
   }
 
   /** What lights were before a hand held them, of those that are held no more: undo does that, too.
+   * What is said while the session has not heard of the hand does not count.
    * @param {Record<string, Asked>} asked */
   forget(asked) {
     for (const light of this.before.keys()) {
+      if (this.hands.has(light) || this.asking.has(light)) continue;
       const now = asked[this.store.value.lights[light]?.name] ?? {};
       if (now.lock === undefined && !now.off) this.before.delete(light);
     }
@@ -137,14 +141,18 @@ export class Session {
    * What is asked of a light from now on.
    * @param {number} light @param {Asked} asked @param {boolean} [done] false while a slider moves
    */
-  ask(light, asked, done = true) {
+  async ask(light, asked, done = true) {
     const kept = Object.fromEntries(
       Object.entries(asked).filter(
         ([, value]) => value !== null && value !== undefined && value !== false,
       ),
     );
     this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }));
-    return this.send('ask', { light, asked: kept, done });
+    this.asking.set(light, kept);
+    await this.send('ask', { light, asked: kept, done });
+    if (this.asking.get(light) !== kept) return;
+    this.asking.delete(light);
+    this.forget(this.store.value.asked);
   }
 
   /**
