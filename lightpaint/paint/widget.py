@@ -27,7 +27,6 @@ from lightpaint.paint import cells
 from lightpaint.paint.beside import told
 from lightpaint.paint.bundle import widget_script, widget_style
 from lightpaint.paint.frames import Message
-from lightpaint.paint.moment import Moment
 from lightpaint.paint.places import Places
 from lightpaint.paint.session import Session
 from lightpaint.paint.store import MemoryStore, Store
@@ -187,12 +186,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
         Raises PaintError where nothing is painted yet, or for another kind of file.
         """
-        path, moment = Path(path), self._studio.moment()
+        path = Path(path)
         if path.suffix == ".json":
-            write_lighting(path, self._lighting(moment))
+            write_lighting(path, self._lighting())
         elif path.suffix != ".exr":
             raise PaintError(f"{path}: expected .exr for the painting, .json for the lighting")
-        elif (target := moment.targets[view]) is None:
+        elif (target := self._studio.moment().targets[view]) is None:
             raise PaintError("nothing is painted yet: there is no painting to keep")
         else:
             write_painting(path, target)
@@ -245,15 +244,15 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _now(self) -> dict[str, Any]:
         """What the session has, by name of what says so."""
-        moment = self._studio.moment()
-        weights, targets = self._studio.session.weights, moment.targets
+        moment, lighting = self._studio.now()
+        targets = moment.targets
         name = " + ".join(target.name for target in moment.painted_targets)
         if cells.same_paintings(targets, self.targets):
             targets = self.targets
         return {
             "target": targets[0],
             "targets": targets,
-            "lighting": Lighting.of_weights(moment.bases[0], weights, target=name),
+            "lighting": lighting.named(name),
             "constraints": moment.wishes.constraints(),
         }
 
@@ -273,11 +272,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             finally:
                 self._is_telling = before
 
-    def _lighting(self, moment: Moment) -> Lighting:
+    def _lighting(self) -> Lighting:
+        """The exact answer, or what is asked where nothing is painted."""
         solution = self.solution
-        if solution is not None:
-            return solution.lighting
-        return Lighting.of_weights(moment.bases[0], self._studio.session.weights)
+        return self._studio.now()[1] if solution is None else solution.lighting
 
     # What page and session say
 

@@ -23,6 +23,7 @@ import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint import beside, bundle, cells, protocol, store, studio
+from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
@@ -209,6 +210,29 @@ def test_two_threads_may_tell_at_once(
     assert not painter._studio.session.store.steps
     painter.constraints = lp.Constraints.of({"fill": {"off": True}})
     assert len(painter._studio.session.store.steps) == 1
+
+
+def test_what_is_told_is_of_one_time(
+    basis: lp.Basis, open_: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where something is painted by another thread just then."""
+    painter, paint = open_(), np.full((*SIZE, 3), 0.5, np.float32)
+    now, moment = painter._studio.now, painter._studio.moment
+
+    def painted_on(look: Callable[[], Any]) -> Any:
+        found = look()
+        monkeypatch.undo()
+        whole = Pixels(paint, np.ones(SIZE, np.float32), None)
+        painter._studio.load({0: whole}, painter._studio.session.wishes, "by another")
+        return found
+
+    before = painter._studio.session.weights.copy()
+    monkeypatch.setattr(painter._studio, "now", lambda: painted_on(now))
+    monkeypatch.setattr(painter._studio, "moment", lambda: painted_on(moment))
+    told = painter._now()
+    assert told["target"] is None
+    assert not np.allclose(painter._studio.session.weights, before)
+    np.testing.assert_array_equal(told["lighting"].weights_for(basis), before)
 
 
 def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> None:
