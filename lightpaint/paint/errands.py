@@ -26,6 +26,10 @@ class Place(Protocol):
 
     subjects: tuple[Subject, ...]
 
+    @property
+    def version(self) -> int:
+        """A number that grows with every change of what is painted and asked."""
+
     def now(self) -> tuple[Moment, Lighting]:
         """What is painted and asked, and the last answer."""
 
@@ -143,6 +147,6 @@ class Errands:
         moment, _ = self._place.now()
         said, beyond = moment.beyond(asked.view)
         self._place.put(of_view("beyond", asked.view), beyond)
-        is_old = self._place.now()[0].version != moment.version
+        is_old = self._place.version != moment.version
         fields = {"sentences": said, "view": asked.view, "is_old": is_old}
         self._place.tell(Message("explained", fields))

@@ -102,6 +102,11 @@ class Studio:
         return self._session
 
     @property
+    def version(self) -> int:
+        """A number that grows with every change. Raises PaintError before there is a basis."""
+        return self.session.version
+
+    @property
     def store(self) -> Store | None:
         """Where it is kept; None before there is a basis."""
         return None if self._session is None else self._session.store

@@ -19,6 +19,7 @@ from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint import exports, protocol, studio
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
+from lightpaint.paint.session import Session
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -356,13 +357,24 @@ def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: P
     again.studio.close()
 
 
-def test_why_it_is_not_closer(heard: Heard):
+def test_why_it_is_not_closer(heard: Heard, monkeypatch: pytest.MonkeyPatch):
+    copied: list[str] = []  # by which threads all pixels were, for which strokes wait
+    moment = Session.moment
+
+    def copies(session: Session) -> Moment:
+        copied.append(threading.current_thread().name)
+        return moment(session)
+
+    monkeypatch.setattr(Session, "moment", copies)
+
     def explained() -> Any:
         heard.messages.clear()
+        copied.clear()
         heard.studio.said(protocol.Explain(), {})
         message = heard.wait(lambda m: m.kind == "explained")
         assert message.fields["sentences"]
         assert not message.fields["is_old"]
+        assert copied.count("lightpaint-explain") == 1
         beyond = heard.studio.resource("beyond")
         assert not beyond[heard.studio.session.views[0].importance == 0].any()
         return beyond
