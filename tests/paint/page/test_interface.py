@@ -397,8 +397,7 @@ def test_space_is_not_held_in_a_window_that_is_left(painter: Painter) -> None:
 
 def test_what_is_under_the_pointer(painter: Painter) -> None:
     painter.page.mouse.move(*painter.place())
-    painter.page.wait_for_timeout(80)
-    assert "back wall" in painter.page.locator(".here").inner_text()
+    painter.page.locator(".here", has_text="back wall").wait_for()
     assert sum(painter.ui("pointed")["shares"]) == pytest.approx(1, abs=1e-6)
     assert painter.page.locator(".share.is-here").count() == 7
 
@@ -436,7 +435,10 @@ def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> 
     assert asked == 1
     # An answer to an earlier painting is none.
     painter.tell(kind="explained", sentences=["Old"], view=0, is_old=True)
-    painter.page.wait_for_timeout(50)
+    painter.page.wait_for_function(
+        "(asked) => host.said.filter(({ kind }) => kind === 'explain').length > asked", arg=asked
+    )
+    painter.page.get_by_text("Out of reach", exact=True).wait_for()
     assert len(painter.said("explain")) == asked + 1
     press("o")
     assert "grey" in legend.inner_text()
@@ -645,10 +647,9 @@ def test_by_keyboard_alone(painter: Painter) -> None:
 
 def test_in_a_shadow_root_it_looks_the_same(opened: Any) -> None:
     plain, shadow = opened(), opened("shadow")
-    for painter in (plain, shadow):
-        painter.page.wait_for_timeout(100)
-    width = "() => engine.element.getBoundingClientRect().width"
-    assert plain.page.evaluate(width) == shadow.page.evaluate(width)
+    width = "engine.element.getBoundingClientRect().width"
+    wide = plain.page.evaluate(f"() => {width}")
+    shadow.page.wait_for_function(f"(wide) => {width} === wide", arg=wide)
     shadow.stroke()
     assert shadow.calls("begin")
     shadow.page.keyboard.press("e")  # the pictures have the focus
@@ -777,8 +778,14 @@ def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
         painter.page.keyboard.press("v")
         painter.tell(kind="closed", reason="taken", text="It is open on another page.")
         painter.tell(kind="say", text="Something is so.", tone="warn")
+        painter.page.get_by_text("Something is so.").wait_for()
     elif state != "first":
         painter.page.evaluate("(dialog) => painter.store.set({ dialog })", state)
-    painter.page.wait_for_timeout(250)  # toasts have faded in
+    painter.page.evaluate(
+        """async () => {  // toasts have faded in
+          const moving = document.querySelector('.toasts').getAnimations({ subtree: true });
+          await Promise.all(moving.map(({ finished }) => finished));
+        }"""
+    )
     found = painter.page.evaluate("() => axe.run(document.querySelector('.lightpaint'))")
     assert [(one["id"], [n["html"] for n in one["nodes"]]) for one in found["violations"]] == []
