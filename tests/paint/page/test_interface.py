@@ -462,7 +462,7 @@ def test_truth(painter: Painter) -> None:
     assert bar.get_attribute("aria-valuenow") == "5"
     painter.button("Stop the render").click()
     assert painter.said("verify")[-1]["run"] is False
-    painter.tell(kind="verified", spp=64, agrees=True, text="The render agrees.")
+    painter.tell(kind="verified", agrees=True, text="The render agrees.")
     painter.button("Answer | Render").click()
     show = painter.ui("show")
     assert (show["left"], show["right"], show["layout"]) == ("solution", "verified", "wipe")

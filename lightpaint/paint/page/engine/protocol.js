@@ -23,11 +23,6 @@ export const VERSION = 2;
 /** @typedef {{name: string, label: string, unit: string, parameter: string, plugin: string,
  *   form: string, members: string[], group: string | null, present: RGB, scale: number,
  *   is_fixed: boolean, is_scalar: boolean}} Light */
-/** @typedef {{emission: RGB, stops: number | null, kelvin: number | null, hue: string | null,
- *   swatch: string, share: number, error: string | null, held: boolean, unreached: boolean}}
- *   Lit */
-/** @typedef {{id: number, name: string, weights: RGB[], delta_e: number | null, stamp: string,
- *   thumbnail: string}} Look */
 /** @typedef {{side: number, low: number, high: number}} Shaper */
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */

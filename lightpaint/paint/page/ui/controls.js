@@ -13,7 +13,7 @@ export function useId() {
 
 /**
  * A button with an icon, a word, or both. `tip` is its label where it has no word.
- * @param {{icon?: string, label?: string, tip?: string, keys?: string, on?: boolean, danger?: boolean,
+ * @param {{icon?: string, label?: string, tip?: string, keys?: string, on?: boolean,
  *   disabled?: boolean, primary?: boolean, act: (event: MouseEvent) => void, class?: string}} props
  */
 export function Button({ icon, label, tip, keys, on, disabled, primary, act, class: name }) {

@@ -100,9 +100,8 @@ export class LightRow extends Component {
     const { light, rgb, lit, isLive } = this.props;
     const level = luminance(rgb);
     const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
-    const hue = white ? kelvinText(white) : (lit?.hue ?? '');
     const parts = [
-      hue,
+      white && kelvinText(white),
       [number(level), light.unit, !isLive && lit?.error].filter(Boolean).join(' '),
     ].filter(Boolean);
     return html`<div class="light-numbers">

@@ -9,9 +9,10 @@ import { ofKelvin } from './colours.js';
 /** @typedef {{name: string, label: string, unit: string, parameter: string, plugin: string,
  *   form: string, members: string[], group: string | null, present: RGB, is_fixed: boolean,
  *   is_scalar: boolean, scale?: number}} Light */
-/** @typedef {{emission: RGB, stops: number | null, kelvin: number | null, hue: string | null,
- *   swatch: string, share: number, error: string | null, held: boolean, unreached: boolean}} Lit */
-/** @typedef {{id: number, name: string, weights: RGB[], stamp: number | null, thumbnail: string}} Look */
+/** @typedef {{emission: RGB, stops: number | null, kelvin: number | null, swatch: string,
+ *   share: number, error: string | null, held: boolean, unreached: boolean}} Lit */
+/** stamp: when it was kept, in seconds since 1970.
+ * @typedef {{id: number, name: string, weights: RGB[], stamp: number, thumbnail: string}} Look */
 /** @typedef {Record<string, any>} Asked */
 /** @typedef {{headline: string, delta_e: number, delta_e_asked: number, sentences: string[]}}
  * Seen */
@@ -49,7 +50,7 @@ import { ofKelvin } from './colours.js';
  * @property {Progress | null} basis
  * @property {Progress | null} verifying
  * @property {{done: number, total: number} | null} loading
- * @property {{spp: number, agrees: boolean, text: string, isOld?: boolean} | null} verified
+ * @property {{agrees: boolean, text: string, isOld?: boolean} | null} verified
  * @property {string[]} explained
  * @property {boolean} explaining
  * @property {{files: string[], command: string} | null} exported
@@ -79,7 +80,7 @@ import { ofKelvin } from './colours.js';
  * @property {{a: number, b: number, share: number} | null} mix of two looks, by their ids
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
- * @property {null | "keys" | "export" | "settings" | "view"} dialog
+ * @property {null | "keys" | "export" | "settings"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
  * @property {number[]} unfolded lights whose controls are open

@@ -20,11 +20,8 @@ export function TopBar({ ui, hands }) {
   const { show, history } = ui;
   const undo = history.undo.at(-1);
   const redo = history.redo.at(-1);
-  const [scene, name] = [ui.state?.scene ?? '', ui.state?.session ?? ''];
   return html`<header class="top">
-    <div class="title"><strong>${scene || 'lightpaint'}</strong>${
-      name && name !== scene && html`<span>${name}</span>`
-    }</div>
+    <div class="title"><strong>${ui.state?.scene || 'lightpaint'}</strong></div>
     ${
       !ui.readonly &&
       html`<div class="group" role="group" aria-label="History">

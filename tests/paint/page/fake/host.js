@@ -137,7 +137,6 @@ export class FakeHost {
         emission: rgb,
         stops: null,
         kelvin: 2400 + 377 * k,
-        hue: null,
         swatch: '#ffcc88',
         share: level(rgb) / total,
         error: '±4 %',
@@ -242,7 +241,7 @@ export class FakeHost {
       name,
       weights: this.weights.map((rgb) => [...rgb]),
       delta_e: 2.3,
-      stamp: '',
+      stamp: 0,
       thumbnail: `look/${id}`,
     });
     return this.kept();
