@@ -243,6 +243,25 @@ def test_newer_pictures_are_fetched_and_others_are_not(run: Any):
     assert fetched == ["plane/1"]
 
 
+def test_of_another_view_only_its_pictures_are_fetched(run: Any, site_of: Any):
+    names = {f"{name}@1": 1 for name in site_of["resources"]}
+    view = {"size": [H, W], "scales": [1, 2, 4], "objects": site_of["objects"]}
+    site_of |= {"views": [view, view], "resources": site_of["resources"] | names}
+    fetched = run(
+        """
+        const { array } = await import("/bench.js");
+        const before = host.fetched.length;
+        host.fetch = (name) => { host.fetched.push(name); return array(name.replace("@1", "")); };
+        engine.see(1);
+        await until(() => loads.at(-1)[1] === 0 && engine.place);
+        return host.fetched.slice(before);
+        """
+    )
+    planes = [f"plane/{k}@1" for k in range(N)]
+    pictures = ["present@1", "objects@1", "painting@1", "importance@1"]
+    assert sorted(fetched) == sorted([*planes, *pictures])
+
+
 def test_old_answers_do_not_come_back(run: Any):
     weights = run(
         """

@@ -45,11 +45,13 @@ export class Loader {
     this.know(resources);
   }
 
-  /** Have a picture in a slot, and its newer ones. @param {string} slot
-   * @param {string | null} name null for none any more */
-  want(slot, name) {
-    if (name === null) this.wanted.delete(slot);
-    else this.wanted.set(slot, name);
+  /** Have pictures in slots, and their newer ones. Nothing is fetched before all are named, as it
+   * would be what a slot had to have before.
+   * @param {[slot: string, name: string | null][]} named null for none any more */
+  want(named) {
+    for (const [slot, name] of named)
+      if (name === null) this.wanted.delete(slot);
+      else this.wanted.set(slot, name);
     this.pump();
   }
 
@@ -58,10 +60,10 @@ export class Loader {
     this.know({ [name]: (this.resources[name] ?? 0) + 0.5 });
   }
 
-  /** All is to be set again: the view has lost it. @param {(slot: string) => boolean} [which] */
+  /** All is to be set again, when it is wanted next: the view has lost it.
+   * @param {(slot: string) => boolean} [which] */
   forget(which = () => true) {
     for (const slot of [...this.there.keys()]) if (which(slot)) this.there.delete(slot);
-    this.pump();
   }
 
   /** Slots that do not have what they are to have. */

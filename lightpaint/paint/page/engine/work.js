@@ -196,14 +196,16 @@ export class Work {
     const { state, shown, loader } = this;
     if (!state) return;
     const isClean = shown?.clean ?? true;
-    for (const name of WANTED) loader.want(name, inView(name, this.view));
+    /** @type {[slot: string, name: string | null][]} */
+    const named = WANTED.map((name) => [name, inView(name, this.view)]);
     for (let k = 0; k < state.lights.length; k++) {
       const clean = inView(`clean/${k}`, this.view);
       const isThere = isClean && clean in loader.resources;
-      loader.want(`plane ${k}`, isThere ? clean : inView(`plane/${k}`, this.view));
+      named.push([`plane ${k}`, isThere ? clean : inView(`plane/${k}`, this.view)]);
     }
     const transform = shown?.transform ?? 'srgb';
-    loader.want('lut', transform === 'srgb' ? null : `lut/${transform}`);
+    named.push(['lut', transform === 'srgb' ? null : `lut/${transform}`]);
+    loader.want(named);
     if (transform === 'srgb') this.setLut(SRGB);
   }
 
@@ -253,6 +255,7 @@ export class Work {
     this.loader.forget(
       (slot) => slot.startsWith('plane ') || slot === 'verified' || slot === 'beyond',
     );
+    this.want();
   }
 
   /** @param {Show} show */
