@@ -1,13 +1,10 @@
 """The places of a notebook at which one painter is shown: who has it, and what is said to whom."""
 
-import sys
-import traceback
 from collections.abc import Callable
 from threading import RLock
 from typing import Any
 
-from lightpaint.errors import LightpaintError
-from lightpaint.files import first_line
+from lightpaint.paint.beside import told
 from lightpaint.paint.frames import Message, said_of
 from lightpaint.paint.protocol import VERSION, Hello, Said, TakeOver
 from lightpaint.paint.studio import Studio
@@ -38,13 +35,8 @@ class Places:
                 if (answers := self._answers(page, said, arrays)) is None:
                     self._tell_taken(page, seq)
                     return
-        except LightpaintError as error:
-            answers = [Message("failed", {"text": str(error)})]
-        except Exception as error:
-            # A mistake of lightpaint's own, which anywidget would say nothing of.
-            traceback.print_exc(file=sys.stderr)
-            text = f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
-            answers = [Message("failed", {"text": text})]
+        except Exception as error:  # of our own, too, which anywidget would say nothing of
+            answers = [Message("failed", {"text": told(error)})]
         for k, message in enumerate(answers):
             self.tell(message, seq if k == 0 else None)
 

@@ -7,23 +7,19 @@ which say what has come of them through `on_message`.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from threading import RLock
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_planes
 from lightpaint.errors import PaintError
-from lightpaint.images.denoise import denoised
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import pictures, protocol
 from lightpaint.paint.beside import Settling, StoppedError, Threads, Tone, Writing, give_way, told
-from lightpaint.paint.canvas import Canvas
+from lightpaint.paint.cleaning import Cleaning
 from lightpaint.paint.errands import Errands
 from lightpaint.paint.frames import Message
 from lightpaint.paint.looks import Looks
@@ -32,7 +28,7 @@ from lightpaint.paint.offered import fields_of_views, offer_transforms, offer_vi
 from lightpaint.paint.pictures import Picture, Pictures
 from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Identity, of_view
+from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.subject import Subject, bases_of, transform_of
 from lightpaint.paint.told import analysis_fields, answer_fields
@@ -43,22 +39,6 @@ from lightpaint.scene.turns import MITSUBA
 
 class OldError(Exception):
     """Somebody has painted on."""
-
-
-@dataclass(frozen=True)
-class _Clean:
-    """Planes without grain. basis: that they were made of. is_kept: whether a file has them."""
-
-    basis: Basis
-    planes: CleanPlanes
-    is_kept: bool = False
-
-    def is_of(self, basis: Basis) -> bool:
-        return self.basis.images is basis.images
-
-    def shown_of(self, basis: Basis) -> CleanPlanes:
-        """What does for the eye until there are those of `basis`."""
-        return self.planes if self.is_of(basis) else self.planes.scaled_as(basis)
 
 
 class Studio:
@@ -82,13 +62,15 @@ class Studio:
         self.on_failure: Callable[[Exception], None] | None = None
         self.failure: Exception | None = None
         self.pictures = Pictures()
-        self._cleans: dict[int, _Clean] = {}  # by view
         self._session: Session | None = None
         self._looks: Looks | None = None
         self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
         self._progress: Mapping[str, Any] | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
         self._telling = RLock()  # taken before the other, by whoever tells of what it made
+        self._cleaning = Cleaning(
+            self.put, lambda: self._is_open, use_cache=self.subjects[0].settings.use_cache
+        )
         self._settling = Settling(self._find, self.tell)
         self._writing = Writing(lambda: self.store, self._tell_kept)
         self._threads = Threads(self.tell)
@@ -272,9 +254,9 @@ class Studio:
             with MITSUBA.at_leisure():
                 for bases in bases_of(self.subjects, self.hears):
                     self._take(bases)
-                    self._clean()
+                    self._cleaning.make(self.session.views)
             self.tell(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
-            self._keep_clean()
+            self._cleaning.keep()
         except StoppedError:
             pass
         except Exception as error:
@@ -289,19 +271,8 @@ class Studio:
 
     def _take(self, bases: Sequence[Basis]) -> None:
         """Paint on with these bases."""
-        use_cache = self.subjects[0].settings.use_cache
-        cleans = [kept_planes(basis) if use_cache else None for basis in bases]
-        presents = [
-            denoised(basis.present_look, basis.features) if clean is None else clean.present
-            for basis, clean in zip(bases, cleans, strict=True)
-        ]
-        for k, (basis, clean) in enumerate(zip(bases, cleans, strict=True)):
-            if clean is not None:
-                self._cleans[k] = _Clean(basis, clean, is_kept=True)
-        shown = [
-            self._cleans[k].shown_of(basis) if k in self._cleans else None
-            for k, basis in enumerate(bases)
-        ]
+        presents = self._cleaning.begin(bases)
+        shown = self._cleaning.shown(bases)
         with self._lock:
             if not self._is_open:
                 raise StoppedError
@@ -357,34 +328,6 @@ class Studio:
             "stroke": session.stroke,
             "command": self._errands.command(sensors, session.wishes),
         }
-
-    def _clean(self) -> None:
-        """Planes without their grain, one after the other, of one view after the other.
-
-        Until they are there, those of the samples before do for the eye.
-        """
-        for view in self.session.views:
-            its = self._cleans.get(view.view)
-            if its is None or not its.is_of(view.basis):
-                self._clean_view(view)
-
-    def _clean_view(self, view: Canvas) -> None:
-        basis = view.basis
-        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
-        planes = CleanPlanes(halves, scales, view.present)
-        for k in range(len(basis.lights)):
-            if not self._is_open or view.basis is not basis:
-                return
-            planes.halves[k], planes.scales[k] = clean_plane(basis, k)
-            self.put(of_view(f"clean/{k}", view.view), planes.halves[k])
-        self._cleans[view.view] = _Clean(basis, planes)
-
-    def _keep_clean(self) -> None:
-        """Keep those of the whole basis for the next session."""
-        if self.subjects[0].settings.use_cache:
-            for its in self._cleans.values():
-                if not its.is_kept:
-                    keep_planes(its.basis, its.planes)
 
     def _find(self) -> None:
         """The exact answer, then what is known of it."""

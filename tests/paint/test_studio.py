@@ -16,7 +16,7 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import exports, protocol, studio
+from lightpaint.paint import cleaning, exports, protocol, studio
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.session import Session
@@ -170,7 +170,7 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
     better = replace(basis, images=basis.images * np.float32(1.5))
     is_taken, goes_on = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
-    real = studio.clean_plane
+    real = cleaning.clean_plane
 
     def clean_plane(its: lp.Basis, k: int) -> Any:
         if its.images is better.images:
@@ -179,7 +179,7 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
         cleaned.append(its)
         return real(its, k)
 
-    monkeypatch.setattr(studio, "clean_plane", clean_plane)
+    monkeypatch.setattr(cleaning, "clean_plane", clean_plane)
     monkeypatch.setattr(studio, "bases_of", lambda *_: iter([[basis], [better]]))
     heard = Heard(tmp_path, basis)
     assert is_taken.wait(30)
