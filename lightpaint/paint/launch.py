@@ -131,6 +131,7 @@ def paint_in_browser(
         say(f"the earlier session is kept as {aside}")
     keeping = Keeping(subjects, path, say)
     studio = Studio(subjects, keeping.opened)
+    studio.on_unsaved = say
     try:
         server = Server(studio, keeping.store, host=host, port=port, say=say)
         keeping.server = server

@@ -28,8 +28,8 @@ from lightpaint.paint.store import Store
 #: Pages that are told that another has the session, at most.
 MOST_PAGES = 16
 
-#: Seconds after which a store that could not write tries again; and for pages to hear the end.
-TRY_S, GOODBYE_S = 2.0, 1.0
+#: Seconds for pages to hear the end.
+GOODBYE_S = 1.0
 
 _Made = TypeVar("_Made")
 
@@ -65,8 +65,6 @@ class Line:
         self._clients: set[Client] = set()
         self.farewell = "the painter has ended; what was painted is kept"
         self._worker = ThreadPoolExecutor(1, "lightpaint-session")
-        self._unsaved: str | None = None
-        self._watch: asyncio.Task[None] | None = None
         self._is_over = False
         self._leaving: asyncio.Future[None] | None = None
 
@@ -79,7 +77,6 @@ class Line:
                 loop.call_soon_threadsafe(self._post, message)
 
         self.session.on_message = post
-        self._watch = loop.create_task(self._watched())
 
     @property
     def has_page(self) -> bool:
@@ -91,8 +88,6 @@ class Line:
         await _all([client.answered() for client in self._clients])
         self._is_over = True
         self.session.on_message = None
-        if self._watch is not None:
-            self._watch.cancel()
         for client in self._clients:
             client.send(Message("closed", {"reason": "ended", "text": self.farewell}))
         await _all([client.sent() for client in self._clients])
@@ -143,7 +138,6 @@ class Line:
                 client.send(first, seq)
             for message in others:
                 client.send(message)
-            self._tell_store()
 
     async def _answers(self, client: Client, heard: Heard) -> list[Message]:
         """What is said to one message; whatever goes wrong is said, too."""
@@ -200,24 +194,6 @@ class Line:
         if message.kind in ("state", "renewed"):
             found = {str(k): int(v) for k, v in message.fields.get("resources", {}).items()}
             self.generations = found if message.kind == "state" else {**self.generations, **found}
-
-    async def _watched(self) -> None:
-        """Try again to write what could not be written."""
-        while True:
-            await asyncio.sleep(TRY_S)
-            if self.store is not None and self.store.unsaved is not None:
-                await asyncio.to_thread(self.store.flush)
-                self._tell_store()
-
-    def _tell_store(self) -> None:
-        unsaved = None if self.store is None else self.store.unsaved
-        if (unsaved is None) == (self._unsaved is None):
-            return
-        self._unsaved = unsaved
-        text = "all that was painted is kept again" if unsaved is None else unsaved
-        self.say(text)
-        tone = "info" if unsaved is None else "warn"
-        self._post(Message("say", {"text": text, "tone": tone}))
 
 
 async def _all(waits: list[Coroutine[Any, Any, None]]) -> None:

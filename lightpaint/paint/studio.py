@@ -50,6 +50,7 @@ class Studio:
 
     Attributes:
         on_message: Hears what is said unasked, from other threads.
+        on_unsaved: Hears, in plain text, that what is done cannot be written, and that it is.
         on_failure: Hears why there is nothing to paint, from another thread.
         failure: The same, afterwards.
     """
@@ -59,6 +60,7 @@ class Studio:
     ) -> None:
         self.subjects, self._open_store = tuple(subjects), open_store
         self.on_message: Callable[[Message], None] | None = None
+        self.on_unsaved: Callable[[str], None] = lambda _: None
         self.on_failure: Callable[[Exception], None] | None = None
         self.failure: Exception | None = None
         self.pictures = Pictures()
@@ -245,6 +247,7 @@ class Studio:
 
     def _tell_kept(self, text: str, tone: Tone) -> None:
         """Whether what is done can be written."""
+        self.on_unsaved(text)
         self.tell(Message("say", {"text": text, "tone": tone}))
 
     def _obtain(self) -> None:

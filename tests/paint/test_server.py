@@ -18,7 +18,7 @@ from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketT
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
-from lightpaint.paint import client, line, server
+from lightpaint.paint import client, server
 from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.guard import Guard
 from lightpaint.paint.line import Line
@@ -651,40 +651,3 @@ def test_names_from_files_are_text() -> None:
     name = "</script><b>\u202e\ud800"
     text = to_frame({"kind": "say", "text": name}, [])
     assert json.loads(text[4:].rstrip(b"\0"))["text"].startswith("</script><b>")
-
-
-class FullDisk:
-    """What a server sees of a store that cannot write at first."""
-
-    identity = None
-
-    def __init__(self) -> None:
-        self.unsaved: str | None = None
-        self.tries = 0
-
-    def flush(self) -> str | None:
-        self.tries += 1
-        self.unsaved = None if self.tries > 2 else self.unsaved
-        return self.unsaved
-
-
-def test_a_full_disk_is_said_and_tried_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(line, "TRY_S", 0.01)
-    served, store = Served(tmp_path / "page"), FullDisk()
-    served.line.store = store  # type: ignore[assignment]
-    with served.browser:
-        served.enter()
-        with served.socket() as socket:
-            greet(socket)
-            store.unsaved = "the disk is full"
-            socket.send_bytes(paint(1))
-            # The answer may come before or after: the store is looked at meanwhile.
-            told = [heard(socket) for _ in range(3)]
-            assert [one["reply"] for one in told if "reply" in one] == [1]
-            said = [(one["text"], one["tone"]) for one in told if one["kind"] == "say"]
-            assert said[0] == ("the disk is full", "warn")
-            assert said[1][1] == "info"
-    assert store.tries == 3
-    assert served.said == ["the disk is full", "all that was painted is kept again"]

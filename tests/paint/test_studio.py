@@ -1,8 +1,10 @@
 """A studio answers at once, says later what takes longer, and exports what `solve` finds."""
 
+import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,7 +18,7 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import cleaning, exports, protocol, studio
+from lightpaint.paint import cleaning, exports, protocol, store, studio
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.session import Session
@@ -355,6 +357,29 @@ def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: P
     again.studio.said(protocol.Undo(), {})
     assert again.studio.session.views[0].importance[2, 20] == 0
     again.studio.close()
+
+
+def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
+    heard: Heard, monkeypatch: pytest.MonkeyPatch
+):
+    @contextmanager
+    def full(_: Any) -> Iterator[None]:
+        raise sqlite3.OperationalError("database or disk is full")
+        yield
+
+    def said(message: Message) -> bool:
+        return message.kind == "say"
+
+    at_terminal: list[str] = []
+    heard.studio.on_unsaved = at_terminal.append
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "transaction", full)
+        heard.paint(1, 0.8)
+        text = heard.wait(said).fields["text"]
+        assert "disk is full" in text
+    heard.wait(lambda m: said(m) and m.fields["tone"] == "info")
+    assert at_terminal == [text, "all that was painted is kept again"]
+    assert [m.fields["text"] for m in heard.messages if said(m)] == at_terminal
 
 
 def test_why_it_is_not_closer(heard: Heard, monkeypatch: pytest.MonkeyPatch):
