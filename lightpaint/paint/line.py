@@ -19,7 +19,7 @@ from typing import Any, Protocol, TypeVar
 import numpy.typing as npt
 
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.files import first_line
+from lightpaint.paint.beside import told
 from lightpaint.paint.client import Client, Heard
 from lightpaint.paint.frames import Message
 from lightpaint.paint.protocol import Said
@@ -162,8 +162,7 @@ class Line:
         except Exception as error:
             # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
             self.say("".join(traceback.format_exception(error)))
-            text = f"this failed inside lightpaint: {type(error).__name__}: {first_line(error)}"
-            return [Message("failed", {"text": text})]
+            return [Message("failed", {"text": told(error, at_length=False)})]
 
     async def _present_holder(self, client: Client) -> Client | None:
         """Who has the session when `client` asks: what one that has left had said is done first."""
