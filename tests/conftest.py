@@ -5,9 +5,11 @@ Where the renderer is needed there is one small room, loaded and rendered once, 
 
 import gc
 import os
+import shutil
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,15 @@ settings.register_profile("lightpaint", deadline=None, derandomize=True)
 settings.load_profile("lightpaint")
 
 BasisFactory = Callable[..., Basis]
+
+#: WebGL2 in software, so that both views are tried where there is no GPU; pages themselves are put
+#: together without it, which takes a third of the time then.
+CHROMIUM = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+]
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -46,6 +57,20 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(
             f"not tried here, for want of: {', '.join(wanting)} ({len(skipped)} tests)"
         )
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """The system's Chromium, or the one that Playwright has installed."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright")
+    with playwright.sync_playwright() as started:
+        names = ("chromium", "chromium-browser", "google-chrome")
+        path = next(filter(None, map(shutil.which, names)), started.chromium.executable_path)
+        if not Path(path).exists():
+            pytest.skip("a browser (chromium)")
+        opened = started.chromium.launch(executable_path=path, args=CHROMIUM)
+        yield opened
+        opened.close()
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """The gallery in a browser: failures first, filter, order, two under a border, lights, mixer."""
 
 import json
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,20 +19,6 @@ from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Lighting
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """The system's Chromium, or the one that Playwright has installed."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright")
-    with playwright.sync_playwright() as started:
-        names = ("chromium", "chromium-browser", "google-chrome")
-        path = next(filter(None, map(shutil.which, names)), started.chromium.executable_path)
-        if not Path(path).exists():
-            pytest.skip("a browser (chromium)")
-        opened = started.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture

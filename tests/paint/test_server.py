@@ -5,7 +5,8 @@ import json
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from posixpath import dirname, join, normpath
@@ -509,6 +510,12 @@ class Scripted:
         """There is nothing to close."""
 
 
+def in_a_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """In a thread of its own: where a browser is open for other tests, this one has a loop."""
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), 20))).result()
+
+
 HELLO = frame("hello", 0, version=VERSION)
 
 
@@ -535,7 +542,7 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
         assert after.sent[0]["kind"] == "state"  # and not: another tab has this session
         await its.end()
 
-    asyncio.run(asyncio.wait_for(trial(), 20))
+    in_a_loop(trial)
     assert strokes_of(session) == [1, 2, 3, 4]
 
 
@@ -548,7 +555,7 @@ def test_a_page_that_greets_and_goes_is_not_waited_for() -> None:
         await its.serve(client.Client(Scripted(HELLO, HELLO, paint(1), HELLO), "a"))
         await its.end()
 
-    asyncio.run(asyncio.wait_for(trial(), 20))
+    in_a_loop(trial)
     assert strokes_of(session) == [1]
 
 
@@ -567,7 +574,7 @@ def test_what_was_said_before_the_end_is_done() -> None:
         serving.cancel()
         assert socket.sent[-1]["reason"] == "ended"
 
-    asyncio.run(asyncio.wait_for(trial(), 20))
+    in_a_loop(trial)
     assert strokes_of(session) == [1, 2, 3]
 
 

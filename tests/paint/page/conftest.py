@@ -1,6 +1,5 @@
-"""One browser for all tests of the page, and a site that serves its modules and arrays."""
+"""One tab for all tests of the page, and a site that serves its modules and arrays."""
 
-import shutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -17,29 +16,7 @@ from renderer import REPOSITORY
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
 HERE = Path(__file__).parent
 
-#: WebGL2 in software, so that both views are tried where there is no GPU; pages themselves are put
-#: together without it, which takes a third of the time then.
-ARGUMENTS = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-gpu-compositing",
-]
 KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": "text/css"}
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """The system's Chromium, or the one that Playwright has installed."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright")
-    with playwright.sync_playwright() as started:
-        names = ("chromium", "chromium-browser", "google-chrome")
-        path = next(filter(None, map(shutil.which, names)), started.chromium.executable_path)
-        if not Path(path).exists():
-            pytest.skip("a browser (chromium)")
-        opened = started.chromium.launch(executable_path=path, args=ARGUMENTS)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="session")
