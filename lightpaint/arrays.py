@@ -15,6 +15,9 @@ Doubles = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
+#: Rows and columns of an image, to index it with.
+Slices = tuple[slice, slice]
+
 #: One colour, linear Rec.709.
 RGB = tuple[float, float, float]
 

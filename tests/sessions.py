@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.steps import Identity, KeptLook, Patch, Seen, Step
+from lightpaint.paint.steps import Identity, KeptLook, Patch, SeenFrom, Step
 from lightpaint.paint.store import Store
 
 SIZE = (12, 10)
-IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (Seen("camera", SIZE),))
+IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (SeenFrom("camera", SIZE),))
 
 
 def patch(rng: np.random.Generator, size: tuple[int, int] = SIZE) -> Patch:

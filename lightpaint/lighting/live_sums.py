@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean
@@ -16,8 +16,6 @@ from lightpaint.lighting.pixels import STRIP, Pixels, joined
 from lightpaint.lighting.reweighted import between
 from lightpaint.lighting.tiles import FEW_LIGHTS, TiledEquations
 from lightpaint.threads import one_thread
-
-Region = tuple[slice, slice]
 
 #: Pixels that a picture is averaged to in display space, at most: what goes into one strip.
 FILM = STRIP
@@ -43,13 +41,13 @@ class PaintedTiles:
         everything = slice(0, len(importance)), slice(0, importance.shape[1])
         self._leave(everything)
         # Where the rest is another by now.
-        self._is_old: Region | None = everything
+        self._is_old: Slices | None = everything
 
-    def _leave(self, region: Region) -> None:
+    def _leave(self, region: Slices) -> None:
         left = np.maximum(1 - self._importance[region], 0)
         self._left[region] = np.where(self._seen[region], 0, left)
 
-    def _update_rest(self, region: Region) -> None:
+    def _update_rest(self, region: Slices) -> None:
         """Where paint and rest are 1 in every pixel, the rest is what the paint is not."""
         side = self._rest.side
         within = tuple(
@@ -62,7 +60,7 @@ class PaintedTiles:
         else:
             self._rest.update(region)
 
-    def painted(self, region: Region, *, with_importance: bool) -> None:
+    def painted(self, region: Slices, *, with_importance: bool) -> None:
         self._paint.update(region, with_M=with_importance)
         if not with_importance:
             return
@@ -106,7 +104,7 @@ class SmallFilm:
         self._a, self._left = np.zeros((2, rows * columns))
         self.painted((slice(0, height), slice(0, width)))
 
-    def painted(self, region: Region) -> None:
+    def painted(self, region: Slices) -> None:
         """Average anew what a rectangle touches."""
         side, (height, width) = self._side, self._importance.shape
         (top, bottom), (left, right) = (
@@ -206,7 +204,7 @@ class Films:
         return mixed.astype(np.float64)
 
 
-def _both(one: Region, other: Region) -> Region:
+def _both(one: Slices, other: Slices) -> Slices:
     """The smallest region that holds both."""
     (top, left), (below, right) = (
         [min(a.start, b.start) for a, b in zip(one, other, strict=True)],

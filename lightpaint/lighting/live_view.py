@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.lighting.live_sums import FILM, PaintedTiles, Region, SmallFilm
+from lightpaint.lighting.live_sums import FILM, PaintedTiles, SmallFilm
 
 #: Pixels along the parts of rows that importance is summed over.
 WIDE = 64
@@ -40,7 +40,7 @@ class LiveView:
         """How many it has."""
         return self._importance.size
 
-    def painted(self, region: Region, *, with_importance: bool = True) -> None:
+    def painted(self, region: Slices, *, with_importance: bool = True) -> None:
         """A rectangle of the painting is another now. with_importance: also what counts there."""
         if with_importance:
             self._count(region)
@@ -67,7 +67,7 @@ class LiveView:
         if self._display is not None:
             self._display.see_through(transform)
 
-    def _count(self, region: Region) -> None:
+    def _count(self, region: Slices) -> None:
         """Sum importance anew, of parts of rows: a sum of sums has the same bits whatever the way
         it came about.
         """

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
@@ -17,8 +17,6 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.tiles import TiledEquations
 from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
-
-Region = tuple[slice, slice]
 
 
 def at_its_word(
@@ -199,7 +197,7 @@ class Painting:
     def paint(
         self,
         k: int,
-        region: Region,
+        region: Slices,
         image: npt.ArrayLike | None,
         importance: npt.ArrayLike | None,
         at_least: npt.ArrayLike | None,

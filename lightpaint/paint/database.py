@@ -14,7 +14,7 @@ from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
-from lightpaint.paint.steps import Identity, Seen
+from lightpaint.paint.steps import Identity, SeenFrom
 from lightpaint.records import strict_json
 from lightpaint.screen import some_names
 
@@ -145,7 +145,7 @@ def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) 
             )
 
 
-def _check_view(path: Path | None, scene: str, its: Seen, now: Seen) -> None:
+def _check_view(path: Path | None, scene: str, its: SeenFrom, now: SeenFrom) -> None:
     if its.size != now.size:
         raise PaintError(
             f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {scene} has "

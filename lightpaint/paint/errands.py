@@ -21,7 +21,7 @@ from lightpaint.progress import Progress, while_wanted
 Asked = protocol.Export | protocol.Verify | protocol.Explain
 
 
-class Place(Protocol):
+class Home(Protocol):
     """What an errand wants of the studio it goes out from."""
 
     subjects: tuple[Subject, ...]
@@ -49,7 +49,7 @@ class Errands:
     Of two that verify the later one counts: the answer may be another by then.
     """
 
-    def __init__(self, place: Place, threads: Threads) -> None:
+    def __init__(self, place: Home, threads: Threads) -> None:
         self._place, self._threads = place, threads
         self._writes, self._renders = Lock(), Lock()
         self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped

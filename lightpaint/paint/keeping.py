@@ -8,7 +8,7 @@ from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line
 from lightpaint.paint.opening import Opening
 from lightpaint.paint.server import Server
-from lightpaint.paint.steps import Identity, Seen
+from lightpaint.paint.steps import Identity, SeenFrom
 from lightpaint.paint.store import Store
 from lightpaint.paint.subject import Subject, sensor_of
 from lightpaint.scene.scene import Scene
@@ -35,7 +35,7 @@ def identity_of(
         found.append(its)
     first = found[0]
     names = tuple(light.name for light in first.lights)
-    views = tuple(Seen(sensor_of(its), its.size) for its in found)
+    views = tuple(SeenFrom(sensor_of(its), its.size) for its in found)
     return Identity(Path(first.path).name, first.identity, names, views)
 
 

@@ -23,7 +23,7 @@ LONGEST = 80
 #: What says where brighter is as good.
 MARKS = "at_least"
 
-Said = SaveLook | RenameLook | CopyLook | MixLooks | DropLook
+OfLooks = SaveLook | RenameLook | CopyLook | MixLooks | DropLook
 
 
 class Looks:
@@ -47,7 +47,7 @@ class Looks:
             for look in self._session.store.looks()
         ]
 
-    def said(self, message: Said) -> Message:
+    def said(self, message: OfLooks) -> Message:
         """What has come of a message. Raises PaintError for a look that there is none of."""
         store = self._session.store
         match message:

@@ -12,12 +12,12 @@ of views but the first as `plane/3@1`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
+
+from lightpaint.paint.pixels import Region
 
 #: Of this protocol; a page of another one is told to load itself anew.
 VERSION = 2
-
-Region: TypeAlias = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def of_view(name: str, view: int) -> str:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenFrom:
     """What a view is. sensor: that it is seen through, "" where nobody knows. size: (height, width)
     of its picture.
     """
@@ -88,13 +88,13 @@ class Identity:
     scene: str
     basis: str
     lights: tuple[str, ...]
-    views: tuple[Seen, ...]
+    views: tuple[SeenFrom, ...]
 
     @classmethod
     def of(cls, bases: Sequence[Basis]) -> "Identity":
         """That of a session which paints on `bases`, of one view each."""
         origin, names = bases[0].origin, bases[0].names
-        views = tuple(Seen(basis.origin.sensor, basis.size) for basis in bases)
+        views = tuple(SeenFrom(basis.origin.sensor, basis.size) for basis in bases)
         return cls(origin.scene, f"{origin.scene_identity} {origin.sensor}", names, views)
 
     @classmethod

@@ -25,7 +25,7 @@ from lightpaint.paint import database
 from lightpaint.paint.database import set_aside
 from lightpaint.paint.packed import packed, unpacked
 from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.steps import Identity, KeptLook, Patch, Seen, Step, painted_by
+from lightpaint.paint.steps import Identity, KeptLook, Patch, SeenFrom, Step, painted_by
 from lightpaint.paint.store import MemoryStore, Store
 
 ACTIONS = st.lists(
@@ -304,15 +304,15 @@ def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
 # What is no session of this picture
 
 
-def seen(*views: Seen) -> Identity:
+def seen(*views: SeenFrom) -> Identity:
     return replace(IDENTITY, views=views)
 
 
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (seen(Seen("camera", (12, 20))), "of 10x12 pixels, and room.xml has 20x12"),
-        (seen(Seen("side", SIZE)), "through camera, and this is through side"),
+        (seen(SeenFrom("camera", (12, 20))), "of 10x12 pixels, and room.xml has 20x12"),
+        (seen(SeenFrom("side", SIZE)), "through camera, and this is through side"),
         (replace(IDENTITY, lights=("panel", "sun")), "lights panel, bulb, and room.xml has"),
     ],
 )
@@ -343,7 +343,7 @@ def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
 
 
 def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
-    path, both = tmp_path / "session.db", seen(*IDENTITY.views, Seen("side", (4, 6)))
+    path, both = tmp_path / "session.db", seen(*IDENTITY.views, SeenFrom("side", (4, 6)))
     with Store.open(path, IDENTITY) as store:
         store.append(step(1))
     with Store.open(path, both) as store:
