@@ -144,7 +144,7 @@ class DropLook:
 
 @dataclass(frozen=True)
 class Export:
-    """Write results to the folder of the session. Answered by `exported`."""
+    """Write results to the folder of the session. Answered by `started`, later by `exported`."""
 
     what: tuple[Literal["target", "lighting", "relit", "report"], ...]
 
@@ -159,7 +159,9 @@ class Verify:
 
 @dataclass(frozen=True)
 class Explain:
-    """Why a view is not closer: answered by `explained`, with the picture `beyond`."""
+    """Why a view is not closer. Answered by `started`, later by `explained` and the picture
+    `beyond`.
+    """
 
     view: int = 0
 

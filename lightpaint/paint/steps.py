@@ -37,9 +37,9 @@ class Patch:
 class Step:
     """One thing that was done, and can be taken back.
 
-    kind: "stroke", "asked", "ties", "settings", "look_loaded", ...; whoever makes it knows more.
-    label: what undo calls it. fields: plain values before and after, as JSON has them.
-    patches: the pixels that it changed, of one view or several.
+    kind: "stroke", "asked" (of lights, ties, settings) or "look_loaded". label: what undo
+    calls it. fields: plain values before and after, as JSON has them. patches: the pixels that it
+    changed, of one view or several.
     """
 
     kind: str
@@ -52,9 +52,9 @@ class Step:
 class KeptLook:
     """A look under a name. id: a number that no other look of the session has.
 
-    fields: name, quality, time and the like, as JSON has them. arrays: weights, and of each view
-    image, importance, `at_least` (uint8, where it is so anywhere) and thumbnail, called as
-    `of_view` says.
+    fields: its name, when it was kept (`stamp`, seconds since 1970) and the wishes, as JSON
+    has them. arrays: weights, and of each view image, importance, `at_least` (uint8, where it is so
+    anywhere) and thumbnail, called as `of_view` says.
     """
 
     id: int
