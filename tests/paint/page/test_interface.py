@@ -567,6 +567,32 @@ def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
     assert not painter.page.get_by_role("alert").is_visible()
 
 
+#: Small pictures that are shown, and of those how many are there.
+THUMBS = (
+    "() => { const all = [...document.querySelectorAll('.lightpaint .thumb')];"
+    " return [all.length, all.filter((one) => one.width > 1).length]; }"
+)
+
+
+def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_again(
+    opened: Any,
+) -> None:
+    """In a notebook it asks for them over the same line by which it is told of its loss."""
+    painter = opened("model=taken&engine")
+    take_over = painter.button("Take over")
+    take_over.wait_for()
+    painter.page.wait_for_timeout(100)
+    assert painter.page.evaluate(THUMBS) == [7, 0]
+    assert painter.ui("toasts") == []
+    take_over.click()
+    painter.page.wait_for_function(f"() => ({THUMBS})()[1] === 7")
+    painter.page.wait_for_function(
+        "() => engine.work.isReady && !engine.work.loader.missing().length"
+    )
+    painter.stroke()
+    assert painter.said("paint")
+
+
 def under_way(painter: Painter) -> set[str]:
     """What is shown to be: writing files, rendering, finding out why it is not closer."""
     ui = painter.page.evaluate("() => painter.store.value")

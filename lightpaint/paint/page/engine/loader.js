@@ -30,6 +30,8 @@ export class Loader {
     /** @type {Set<string>} */
     this.onTheWay = new Set();
     this.total = 0;
+    /** Whether nothing is asked for: another page has the session. */
+    this.isHeld = false;
     this.isOver = false;
   }
 
@@ -41,8 +43,14 @@ export class Loader {
 
   /** Which pictures there are, and no others. @param {Record<string, number>} resources */
   begin(resources) {
+    this.isHeld = false;
     this.resources = {};
     this.know(resources);
+  }
+
+  /** Ask for nothing until the session says again what there is. */
+  hold() {
+    this.isHeld = true;
   }
 
   /** Have pictures in slots, and their newer ones. Nothing is fetched before all are named, as it
@@ -79,7 +87,7 @@ export class Loader {
   }
 
   pump() {
-    if (this.isOver) return;
+    if (this.isOver || this.isHeld) return;
     const missing = this.missing();
     this.total = missing.length ? Math.max(this.total, missing.length) : 0;
     this.tell(this.total - missing.length, this.total);
@@ -101,8 +109,11 @@ export class Loader {
         this.use(slot, name, picture);
       }
     } catch (error) {
-      wait = AGAIN;
-      console.warn(error);
+      // What was refused since another page has the session comes when this one has it again.
+      if (!this.isHeld) {
+        wait = AGAIN;
+        console.warn(error);
+      }
     }
     if (wait) await new Promise((resolve) => setTimeout(resolve, wait));
     this.onTheWay.delete(slot);

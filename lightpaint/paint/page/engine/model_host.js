@@ -81,7 +81,8 @@ export class ModelHost extends Hearers {
   /** @param {string} name @returns {Promise<Picture>} */
   async fetch(name) {
     const message = await this.send('fetch', { name });
-    if (message.kind === 'failed') throw new Error(`${name}: ${message.text}`);
+    // A place that has just lost the painter is told that, and is given no picture.
+    if (message.kind !== 'fetched') throw new Error(`${name}: ${message.text}`);
     return message.arrays.data;
   }
 

@@ -66,6 +66,7 @@ export class Work {
     host.on('state', (message) => this.begin(message));
     host.on('answer', (message) => this.answered(message));
     host.on('patch', (message) => this.patched(message));
+    host.on('closed', () => this.loader.hold());
     host.on('renewed', ({ resources }) => {
       this.loader.know(resources);
       this.want();
@@ -187,6 +188,8 @@ export class Work {
       this.isReady = true;
       this.redraw([canvas.whole]);
     } catch (error) {
+      // Who does not have the session has been told so.
+      if (this.loader.isHeld) return;
       this.tell('trouble', { text: error instanceof Error ? error.message : String(error) });
     }
   }

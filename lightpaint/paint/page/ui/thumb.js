@@ -12,13 +12,28 @@ export function Thumb({ name, generation, hands, label }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {
     if (generation === undefined) return undefined;
+    const { session, store } = hands;
     let isGone = false;
-    hands.session.host.fetch(name).then(
-      (picture) => !isGone && ref.current && put(ref.current, picture),
-      () => undefined, // A thumbnail is not worth an error.
-    );
+    let isThere = false;
+    const fetch = () =>
+      session.host.fetch(name).then(
+        (picture) => {
+          isThere = true;
+          if (!isGone && ref.current) put(ref.current, picture);
+        },
+        () => undefined, // A thumbnail is not worth an error.
+      );
+    void fetch();
+    // A place that has just lost the painter is given no picture, until it has it again.
+    let wasClosed = store.value.closed !== null;
+    const end = store.listen(() => {
+      const isClosed = store.value.closed !== null;
+      if (wasClosed && !isClosed && !isThere) void fetch();
+      wasClosed = isClosed;
+    });
     return () => {
       isGone = true;
+      end();
     };
   }, [name, generation]);
   return html`<canvas class="thumb" ref=${ref} width="1" height="1" role=${label ? 'img' : undefined}

@@ -1,8 +1,11 @@
-/** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`. */
+/** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`;
+ * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
 import { mount } from '../app.js';
+import { ModelHost } from '../engine/model_host.js';
 import { FakeEngine } from './engine.js';
 import { FakeHost } from './host.js';
+import { FakeModel } from './model.js';
 import { makeRoom } from './room.js';
 
 const asked = new URLSearchParams(location.search);
@@ -19,10 +22,13 @@ if (asked.has('shadow')) {
   element.style.height = '100%';
   shadow.append(element);
 }
+const model = new FakeModel(host);
+model.isTaken = asked.get('model') === 'taken';
+const session = asked.has('model') ? new ModelHost(model) : host;
 // `?engine`: the one that ships, over the same session.
 const engine = asked.has('engine')
-  ? (await import('../engine/painter.js')).openEngine(host)
-  : new FakeEngine(host, room);
-const painter = await mount(element, host, { global: !asked.has('shadow'), engine });
-Object.assign(window, { painter, host, engine });
-host.open();
+  ? (await import('../engine/painter.js')).openEngine(session)
+  : new FakeEngine(session, room);
+const painter = await mount(element, session, { global: !asked.has('shadow'), engine });
+Object.assign(window, { painter, host, engine, model });
+session.open();
