@@ -593,6 +593,52 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
     assert painter.said("paint")
 
 
+def alert(painter: Painter) -> str:
+    """What has to be known now, or nothing."""
+    return " ".join(painter.page.get_by_role("alert").all_inner_texts())
+
+
+def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> None:
+    painter = opened("model")
+    painter.page.clock.install()
+    painter.page.evaluate("() => { model.isBusy = true; }")
+    painter.stroke()
+    painter.page.clock.fast_forward(9_000)
+    assert alert(painter) == ""
+    painter.page.clock.fast_forward(1_100)
+    assert "has not answered for 10 s" in alert(painter)
+    painter.page.evaluate("() => { model.isBusy = false; return model.work(); }")
+    assert painter.said("paint")[-1]["done"] is True
+    assert alert(painter) == ""
+    painter.page.clock.fast_forward(60_000)  # nothing is waited for
+    assert alert(painter) == ""
+    # Nor is what was lost on its way.
+    painter.page.evaluate(
+        """() => {
+          model.isBusy = true;
+          painter.session.host.fetch('thumb/0');
+          model.waiting.length = 0;
+          model.isBusy = false;
+          return painter.session.host.fetch('thumb/0').then(() => {});
+        }"""
+    )
+    painter.page.clock.fast_forward(60_000)
+    assert alert(painter) == ""
+
+
+@pytest.mark.parametrize("model", ["model", "model=taken"])
+def test_a_kernel_that_has_ended_is_said_to_have(opened: Any, model: str) -> None:
+    """Nothing is painted for nobody, and nobody is there to take it over from."""
+    painter = opened(model)
+    assert painter.page.get_by_role("button", name="Take over").count() == (model != "model")
+    painter.page.evaluate("() => model.trigger('comm_live_update')")
+    painter.still()
+    assert "The kernel has ended: run the cell again" in alert(painter)
+    assert painter.page.get_by_role("button", name="Take over").count() == 0
+    painter.stroke()
+    assert not painter.calls("begin")
+
+
 def under_way(painter: Painter) -> set[str]:
     """What is shown to be: writing files, rendering, finding out why it is not closer."""
     ui = painter.page.evaluate("() => painter.store.value")

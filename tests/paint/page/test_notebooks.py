@@ -175,6 +175,9 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         row = page.locator('.lightpaint [data-light="light 0"]')
         assert "is-dim" not in row.get_attribute("class")
         run_cell(page, 1, lambda: "is-dim" in row.get_attribute("class"))
+        # What is painted for a kernel that is there no more would be lost.
+        page.locator('.jp-NotebookPanel-toolbar [data-jp-item-name="restart"] *').first.click()
+        page.get_by_text("The kernel has ended: run the cell again to go on.").wait_for()
 
 
 @pytest.mark.skipif(find_spec("marimo") is None, reason="marimo")

@@ -13,7 +13,7 @@ import { VERSION, frame, pictureOf, unframe } from './protocol.js';
 /**
  * What the page knows of its session. `on` hears messages of a kind, asked for or not, and
  * `connection` with {state: 'open' | 'lost' | 'stale'}; stale: it is there, and does not know this
- * page. `send` is answered by the reply, which may be
+ * page; and `silence` with {isSilent} where an answer is long in coming. `send` is answered by the reply, which may be
  * `failed`, and rejects where there is no connection. `fetch` is the newest picture of a name.
  * @typedef {object} Host
  * @property {(kind: string, fields?: Record<string, unknown>, arrays?: Arrays) =>

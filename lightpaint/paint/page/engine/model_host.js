@@ -17,6 +17,11 @@ import { VERSION, described, pictureOf } from './protocol.js';
 /** Numbers of one page's messages: other pages of the same model have others. */
 const MESSAGES = 2 ** 32;
 
+/** Milliseconds without an answer after which that is said. */
+const SILENCE_MS = 10_000;
+
+const ENDED = 'The kernel has ended: run the cell again to go on.';
+
 /** @implements {Host} */
 export class ModelHost extends Hearers {
   /** @param {Model} model */
@@ -30,6 +35,14 @@ export class ModelHost extends Hearers {
     /** @type {(content: any, buffers: DataView[]) => void} */
     this.hear = (content, buffers) => this.receive(content, buffers);
     model.on('msg:custom', this.hear);
+    // A comm lives from its beginning, and what changes is that it ends: with a kernel that is
+    // started again, for one. What is sent to it then reaches nobody.
+    this.end = () => this.ended();
+    model.on('comm_live_update', this.end);
+    this.isOver = false;
+    this.isSilent = false;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.timer = undefined;
   }
 
   /** Ask for all there is. */
@@ -55,11 +68,44 @@ export class ModelHost extends Hearers {
       },
     );
     const message = /** @type {Message} */ ({ ...content, arrays });
+    this.hush(false);
     this.tell(message.kind, message);
     if (message.kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' });
     if (message.reply === undefined) return;
     this.asked.get(message.reply)?.resolve(message);
     this.asked.delete(message.reply);
+    this.listen(message.reply);
+  }
+
+  /** Wait for the next answer, if there is one to come: a kernel that is busy answers late, and one
+   * that has ended never does, of which a model may not be told. What was said before something
+   * that is answered may have been lost on its way, and says nothing of the kernel.
+   * @param {number} answered */
+  listen(answered) {
+    clearTimeout(this.timer);
+    const isWaiting = [...this.asked.keys()].some((seq) => seq > answered);
+    this.timer = isWaiting ? setTimeout(() => this.hush(true), SILENCE_MS) : undefined;
+  }
+
+  /** @param {boolean} isSilent */
+  hush(isSilent) {
+    if (isSilent !== this.isSilent) this.tell('silence', { kind: 'silence', isSilent });
+    this.isSilent = isSilent;
+  }
+
+  /** Nobody is there any more. */
+  ended() {
+    this.leave(ENDED);
+    this.hush(false);
+    this.tell('closed', { kind: 'closed', reason: 'ended', text: ENDED });
+  }
+
+  /** Nothing is asked or answered any more. @param {string} why */
+  leave(why) {
+    this.isOver = true;
+    clearTimeout(this.timer);
+    for (const { reject } of this.asked.values()) reject(new Error(why));
+    this.asked.clear();
   }
 
   /** @param {string} kind @param {Record<string, unknown>} [fields] @param {Arrays} [arrays]
@@ -67,8 +113,10 @@ export class ModelHost extends Hearers {
   async send(kind, fields = {}, arrays = {}) {
     if (!AT_ONCE.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
+      if (this.isOver) return reject(new Error(ENDED));
       const seq = ++this.seq;
       this.asked.set(seq, { resolve, reject });
+      if (this.timer === undefined) this.listen(seq - 1);
       const content = { kind, seq, ...fields, buffers: described(arrays) };
       // Copies: what is painted on meanwhile is of another message.
       const bytes = Object.values(arrays).map(({ data }) =>
@@ -88,7 +136,7 @@ export class ModelHost extends Hearers {
 
   close() {
     this.model.off('msg:custom', this.hear);
-    for (const { reject } of this.asked.values()) reject(new Error('the painter is closed'));
-    this.asked.clear();
+    this.model.off('comm_live_update', this.end);
+    this.leave('the painter is closed');
   }
 }

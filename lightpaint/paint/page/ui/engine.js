@@ -10,7 +10,7 @@
 /**
  * The session, wherever it is: behind a socket, a notebook's model, or a report that only reads.
  * `on` hears messages of a kind, asked for or not, and "connection" with
- * {state: "open" | "lost" | "stale"}. `send` is answered by the reply.
+ * {state: "open" | "lost" | "stale"}, and "silence" with {isSilent}. `send` is answered by the reply.
  * @typedef {object} Host
  * @property {(kind: string, fields?: Record<string, any>, arrays?: Record<string, Picture>)
  *   => Promise<Message>} send

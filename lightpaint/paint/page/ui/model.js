@@ -55,6 +55,7 @@ import { ofKelvin } from './colours.js';
  * @property {boolean} explaining
  * @property {{files: string[], command: string} | null} exported
  * @property {"wait" | "open" | "lost" | "stale"} connection
+ * @property {boolean} isSilent whether an answer is long in coming
  * @property {{reason: string, text: string} | null} closed
  * @property {Toast[]} toasts
  * @property {Record<string, number>} resources
@@ -143,6 +144,7 @@ export function first() {
     explaining: false,
     exported: null,
     connection: 'wait',
+    isSilent: false,
     closed: null,
     toasts: [],
     resources: {},

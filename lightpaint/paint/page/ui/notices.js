@@ -19,9 +19,16 @@ export function Toasts({ ui, hands }) {
   </div>`;
 }
 
+const SILENT =
+  'The kernel has not answered for 10 s: it is busy, or it has ended. What you paint is heard when it is free; if it was restarted, run the cell again.';
+
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Banner({ ui, hands }) {
-  const { closed, connection } = ui;
+  const { closed, connection, isSilent } = ui;
+  if (isSilent) {
+    return html`<div class="banner" role="alert"><${Icon} name="warn" />
+      <span>${SILENT}</span></div>`;
+  }
   if (closed && connection !== 'stale') {
     const canTake = closed.reason === 'taken';
     return html`<div class="banner" role="alert"><${Icon} name="warn" /><span>${closed.text}</span>

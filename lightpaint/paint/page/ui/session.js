@@ -24,6 +24,7 @@ const HEARD = [
   'explained',
   'closed',
   'connection',
+  'silence',
 ];
 
 export class Session {
@@ -91,6 +92,7 @@ export class Session {
       explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
+      silence: (/** @type {any} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
     if (told?.weights) told.weights = told.weights.map((rgb, k) => this.hands.get(k)?.rgb ?? rgb);
     if (told) this.store.set(told);
