@@ -593,6 +593,60 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
     assert painter.said("paint")
 
 
+def refuse(painter: Painter) -> None:
+    """Have what is said next fail."""
+    painter.page.evaluate("() => { host.fails = 'That cannot be done.'; }")
+
+
+def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
+    """Nor does it go along with what is asked next."""
+    painter.page.get_by_role("button", name="key", exact=True).click()
+    painter.type("At least", "20")
+    before = {name: painter.ui(name) for name in ("asked", "ties", "settings", "weights")}
+    at_most = painter.page.get_by_role("textbox", name="At most")
+    refuse(painter)
+    painter.type("At most", "1e308")
+    painter.still()
+    assert at_most.input_value() == ""
+    painter.choose("Colour", "kelvin")
+    asked = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
+    assert painter.said("ask")[-1]["asked"] == asked
+    refuse(painter)
+    painter.choose("Colour", "any")
+    painter.still()
+    assert painter.ui("asked") == {"key": asked}
+    before["asked"] = painter.ui("asked")
+    for act in (
+        lambda: painter.choose("On one dimmer with", "cove"),
+        lambda: painter.page.evaluate("() => void painter.session.setting('sparse', 99)"),
+        lambda: painter.page.evaluate("() => painter.session.hold(2, [9, 9, 9], true)"),
+    ):
+        refuse(painter)
+        act()
+        painter.still()
+        assert {name: painter.ui(name) for name in before} == before
+
+
+def test_what_is_refused_leaves_what_is_on_its_way(painter: Painter) -> None:
+    painter.page.evaluate(
+        """() => {
+          const { session } = painter;
+          host.fails = 'That cannot be done.';
+          session.ask(0, { limits: { max: '1e308%' } });
+          session.ask(1, { off: true });
+        }"""
+    )
+    painter.still()
+    assert painter.ui("asked") == {"window left": {"off": True}}
+
+
+def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.type("Use at most", "1.5")
+    assert painter.said("set")[-1]["values"] == {"sparse": 2}
+    assert painter.page.get_by_role("textbox", name="Use at most").input_value() == "2"
+
+
 def alert(painter: Painter) -> str:
     """What has to be known now, or nothing."""
     return " ".join(painter.page.get_by_role("alert").all_inner_texts())

@@ -84,7 +84,9 @@ export function Number_(props) {
   const { least = -Infinity, most = Infinity } = props;
   const [typed, setTyped] = useState(/** @type {string | null} */ (null));
   const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))));
-  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, x));
+  // What is shown is what is taken.
+  const within = (/** @type {number} */ x) =>
+    Math.min(most, Math.max(least, Number(x.toFixed(digits))));
   const take = (/** @type {string} */ text) => {
     setTyped(null);
     const plain = text
@@ -102,7 +104,7 @@ export function Number_(props) {
       event.preventDefault();
       setTyped(null);
       const by = way * step * (event.shiftKey ? 10 : 1);
-      change(within(Number(((Number(shown) || 0) + by).toFixed(6))));
+      change(within((Number(shown) || 0) + by));
     }
   };
   return html`<label class="field number">

@@ -41,6 +41,9 @@ export class Session {
     this.before = new Map();
     /** What is asked of lights by messages on their way. @type {Map<number, Asked>} */
     this.asking = new Map();
+    /** What the session has said last of what is asked, and of what comes of that: what it refuses
+     * is shown no longer. @type {Pick<Ui, 'asked' | 'ties' | 'settings' | 'weights'>} */
+    this.said = { asked: {}, ties: [], settings: {}, weights: [] };
     for (const kind of HEARD)
       host.on(kind, (message) => this.receive({ ...message, kind }, message));
   }
@@ -94,9 +97,29 @@ export class Session {
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
       silence: (/** @type {any} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
-    if (told?.weights) told.weights = told.weights.map((rgb, k) => this.hands.get(k)?.rgb ?? rgb);
+    for (const key of /** @type {const} */ (['asked', 'ties', 'settings', 'weights']))
+      if (told?.[key]) Object.assign(this.said, { [key]: told[key] });
+    if (told?.weights) told.weights = this.inHand(told.weights);
     if (told) this.store.set(told);
     if (told?.asked) this.forget(told.asked);
+  }
+
+  /** Weights, with lights where hands have them. @param {RGB[]} weights @returns {RGB[]} */
+  inHand(weights) {
+    return weights.map((rgb, k) => this.hands.get(k)?.rgb ?? rgb);
+  }
+
+  /** Show what the session has said last, and what it has not answered yet. */
+  goBack() {
+    const { asked, ties, settings, weights } = this.said;
+    const { lights } = this.store.value;
+    const asking = [...this.asking].map(([light, its]) => [lights[light].name, its]);
+    this.store.set({
+      asked: { ...asked, ...Object.fromEntries(asking) },
+      ties,
+      settings,
+      weights: this.inHand(weights),
+    });
   }
 
   /** What lights were before a hand held them, of those that are held no more: undo does that, too.
@@ -151,10 +174,12 @@ export class Session {
     );
     this.store.set((ui) => ({ asked: { ...ui.asked, [ui.lights[light].name]: kept } }));
     this.asking.set(light, kept);
-    await this.send('ask', { light, asked: kept, done });
-    if (this.asking.get(light) !== kept) return;
-    this.asking.delete(light);
-    this.forget(this.store.value.asked);
+    const reply = await this.send('ask', { light, asked: kept, done });
+    const isNewest = this.asking.get(light) === kept;
+    if (isNewest) this.asking.delete(light);
+    if (reply?.kind === 'failed') this.goBack();
+    if (isNewest) this.forget(this.store.value.asked);
+    return reply;
   }
 
   /**
@@ -182,8 +207,9 @@ export class Session {
       const [light, hand] = next;
       sent.set(light, hand);
       const isScalar = this.store.value.lights[light].is_scalar;
-      await this.ask(light, { lock: isScalar ? hand.rgb[0] : hand.rgb }, hand.done);
+      const reply = await this.ask(light, { lock: isScalar ? hand.rgb[0] : hand.rgb }, hand.done);
       if (hand.done && this.hands.get(light) === hand) this.hands.delete(light);
+      if (reply?.kind === 'failed') this.goBack();
     }
     this.isMoving = false;
   }
@@ -225,13 +251,19 @@ export class Session {
   /** @param {string[][]} ties */
   tieAll(ties) {
     this.store.set({ ties });
-    return this.send('tie', { ties });
+    return this.change('tie', { ties });
   }
 
   /** @param {string} key @param {any} value null for what follows from the painting */
   setting(key, value) {
     this.store.set((ui) => ({ settings: { ...ui.settings, [key]: value } }));
-    return this.send('set', { values: { [key]: value } });
+    return this.change('set', { values: { [key]: value } });
+  }
+
+  /** @param {string} kind @param {Record<string, any>} fields */
+  async change(kind, fields) {
+    const reply = await this.send(kind, fields);
+    if (reply?.kind === 'failed') this.goBack();
   }
 
   /** Why the view that is shown is not closer. */
