@@ -513,6 +513,38 @@ def test_looks(painter: Painter) -> None:
     assert painter.said("copy_look")[-1]["look"] == 1
 
 
+@pytest.mark.parametrize("way", ["deleted", "elsewhere"])
+def test_looks_are_compared_while_both_are_there(painter: Painter, way: str) -> None:
+    for _ in range(3):
+        painter.page.keyboard.press("Control+s")
+        painter.still()
+    painter.choose("Second look", "3")
+    assert painter.ui("mix") == {"a": 1, "b": 3, "share": 1}
+    if way == "deleted":
+        painter.page.locator(".look").first.hover()
+        painter.button("Delete Look 1", exact=True).click()
+        painter.button("Delete Look 1: press again").click()
+        assert painter.said("drop_look")
+    else:
+        painter.page.evaluate("() => { host.drop_look({ look: 1 }); host.tell(host.state()); }")
+    painter.still()
+    show = painter.page.evaluate("() => engine.shown")
+    assert [show[name] for name in ("left", "right", "instead")] == ["painting", "solution", None]
+    chosen = [
+        painter.page.get_by_role("combobox", name=name).input_value()
+        for name in ("First look", "Second look", "Compare")
+    ]
+    assert chosen == ["2", "3", "painting solution"]
+    painter.stroke()
+    assert painter.calls("begin")
+    painter.button("Compare looks").click()
+    painter.page.evaluate("() => painter.session.send('drop_look', { look: 3 })")
+    painter.still()
+    assert painter.page.get_by_role("combobox", name="First look").count() == 0
+    painter.stroke()
+    assert len(painter.calls("begin")) == 2
+
+
 def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.button("Write files").click()
     painter.page.get_by_label("Report").uncheck()

@@ -5,6 +5,7 @@
 /** @typedef {import('./model.js').Ui} Ui */
 
 import { stateOfView } from '../engine/protocol.js';
+import { mixOf, unmixed } from './model.js';
 
 /** What is shown while something that was asked for is under way, as it is when nothing is.
  * @type {Record<string, Partial<Ui>>} */
@@ -46,11 +47,27 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
       basis && !basis.done
         ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
         : null,
+    ...(isApart(looks ?? [], before) ? unmixed(before) : {}),
     // A scene is first shown as it is painted.
     ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
     ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
     ...weightsOf(message),
   };
+}
+
+/** Which looks there are. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+export function looksOf({ looks, resources }, ui) {
+  return {
+    looks,
+    resources: { ...ui.resources, ...resources },
+    ...(isApart(looks, ui) ? unmixed(ui) : {}),
+  };
+}
+
+/** Whether one of the looks that are compared is there no more.
+ * @param {import('./model.js').Look[]} looks @param {Ui} ui */
+function isApart(looks, ui) {
+  return ui.mix !== null && !mixOf({ ...ui, looks }, ui.mix);
 }
 
 /** @param {{name: string, stops: number} | undefined} transform */

@@ -3,7 +3,7 @@
 import { inView } from '../engine/protocol.js';
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
-import { mixOf } from './model.js';
+import { mixOf, unmixed } from './model.js';
 import { Thumb } from './thumb.js';
 import { look } from './tools.js';
 
@@ -79,10 +79,6 @@ function Mix({ ui, hands }) {
     store.set({ mix });
     look(store, { left: 'solution', right: 'other', instead: mixOf(ui, { ...mix, share: 0 }) });
   };
-  const end = () => {
-    store.set({ mix: null });
-    look(store, { left: 'painting', right: 'solution', instead: null, other: null });
-  };
   const keep = () => {
     const names = [a, b].map((id) => ui.looks.find((one) => one.id === id)?.name ?? '');
     const part = ui.mix?.share ?? 1;
@@ -92,7 +88,7 @@ function Mix({ ui, hands }) {
   return html`<div class="mix" role="group" aria-label="Compare two looks">
     <div class="row">
       <${Button} label=${ui.mix ? 'Back to the painting' : 'Compare looks'} on=${Boolean(ui.mix)}
-        act=${() => (ui.mix ? end() : set({}))} />
+        act=${() => (ui.mix ? store.set(unmixed) : set({}))} />
       <${Select} label="First look" hidden value=${String(a)} choices=${choices}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
       <${Select} label="Second look" hidden value=${String(b)} choices=${choices}

@@ -214,6 +214,12 @@ function alone(rgb, light) {
   return Math.max(...light.present) > 0 ? light.present : [1, 1, 1];
 }
 
+/** Two looks are compared no more. @param {Ui} ui @returns {Partial<Ui>} */
+export function unmixed({ show }) {
+  const pair = /** @type {const} */ ({ left: 'painting', right: 'solution' });
+  return { mix: null, show: { ...show, ...pair, instead: null, other: null } };
+}
+
 /** @param {Ui} ui @param {{a: number, b: number, share: number}} mix @returns {RGB[] | null} */
 export function mixOf(ui, { a, b, share }) {
   const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);

@@ -1,6 +1,15 @@
 /** Talks with the session: what it says becomes state, what a person does becomes messages. */
 
-import { ENDED, IDLE, answerOf, explainedOf, progressOf, stateOf, verifiedOf } from './heard.js';
+import {
+  ENDED,
+  IDLE,
+  answerOf,
+  explainedOf,
+  looksOf,
+  progressOf,
+  stateOf,
+  verifiedOf,
+} from './heard.js';
 import { look } from './tools.js';
 
 /** @typedef {import("./engine.js").Host} Host */
@@ -86,10 +95,7 @@ export class Session {
       progress: progressOf,
       say: (/** @type {any} */ m) => this.say(m),
       failed: (/** @type {any} */ m) => this.toast(m.text, 'warn'),
-      looks: (/** @type {any} */ m) => ({
-        looks: m.looks,
-        resources: { ...this.store.value.resources, ...m.resources },
-      }),
+      looks: (/** @type {any} */ m) => looksOf(m, this.store.value),
       exported: (/** @type {any} */ m) => ({ exported: m, ...ENDED.export }),
       verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
       explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
