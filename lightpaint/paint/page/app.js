@@ -46,8 +46,10 @@ export async function mount(element, host, { global = false, readonly = false, e
   if (global) window.addEventListener('keydown', (event) => press(event, hands), { signal });
   else hearWithin(root, hands, signal);
   render(html`<${Painter} hands=${hands} root=${() => root} />`, root);
+  const folding = foldByItself(root, store);
   const close = () => {
     ends.abort();
+    folding.disconnect();
     render(null, root);
     engine.close();
     host.close();
@@ -81,6 +83,26 @@ function listen(hands) {
       },
     });
   });
+}
+
+/** Pixels below which panels lie over the pictures: style.css says it, too. */
+const NARROW = 760;
+
+/** Panels fold where there is no room beside the pictures, and come back when there is.
+ * @param {HTMLElement} root @param {Store<Ui>} store */
+function foldByItself(root, store) {
+  let isFolded = false;
+  let wasNarrow = false;
+  const observer = new ResizeObserver(() => {
+    const { side } = store.value;
+    const isNarrow = root.clientWidth > 0 && root.clientWidth <= NARROW;
+    if (isNarrow === wasNarrow) return;
+    wasNarrow = isNarrow;
+    if (isNarrow ? side : isFolded) store.set({ side: !isNarrow });
+    isFolded = isNarrow && side;
+  });
+  observer.observe(root);
+  return observer;
 }
 
 /** @param {number} count */

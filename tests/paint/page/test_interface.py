@@ -910,17 +910,53 @@ def test_a_space_is_typed_beside_it(opened: Any) -> None:
     assert painter.page.locator("p[contenteditable]").inner_text() == "a b"
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (1024, 768), (900, 600)])
+#: Windows, and columns of notebooks.
+SIZES = [(1280, 720), (1920, 1080), (1024, 768), (900, 600)]
+COLUMNS = [(970, 640), (780, 600), (760, 600), (690, 560), (584, 560), (480, 640)]
+
+#: A long one.
+SENTENCE = (
+    "About half of the way, 46 %: brighter and redder light on the left is missing; what keeps it"
+    " from coming closer is that no light reaches the floor there, and the cove is at its limit."
+)
+
+
+def cut_off(painter: Painter) -> list[str]:
+    """What is wider, or higher, than what is seen of it."""
+    names: list[str] = painter.page.evaluate(
+        "() => ['.top', '.options', '.tools', '.side', '.answer', '.said', '.fold-body'].filter("
+        "(name) => [...document.querySelectorAll(`.lightpaint ${name}`)].some((one) =>"
+        " one.scrollWidth > one.clientWidth + 1 || (!['.side', '.fold-body'].includes(name) &&"
+        " one.scrollHeight > one.clientHeight + 1)))"
+    )
+    return names
+
+
+@pytest.mark.parametrize("size", SIZES + COLUMNS)
 def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
     painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    painter.tell(kind="answer", version=2, exact=True, headline=SENTENCE, lights=[], delta_e=11.2)
     for key in "bwa":
         painter.page.keyboard.press(key)
-        cut = painter.page.evaluate(
-            "() => ['.top', '.options', '.tools', '.side', '.answer', '.fold-body'].filter("
-            "(name) => { const one = document.querySelector(`.lightpaint ${name}`);"
-            " return one.scrollWidth > one.clientWidth + 1; })"
+        assert cut_off(painter) == []
+
+
+def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) -> None:
+    painter = opened(viewport={"width": 690, "height": 560})
+    stage, side = painter.page.locator(".stage"), painter.page.locator(".side")
+    width = stage.bounding_box()["width"]
+    assert side.count() == 0
+    assert width > 600
+    painter.button("Panels").click()
+    assert side.is_visible()
+    assert stage.bounding_box()["width"] == width  # they lie over them while they are wanted
+    painter.button("Panels").click()
+    assert side.count() == 0
+    for room, count in ((1000, 1), (690, 0)):
+        painter.page.set_viewport_size({"width": room, "height": 560})
+        painter.page.wait_for_function(
+            "(count) => document.querySelectorAll('.lightpaint .side').length === count", arg=count
         )
-        assert cut == []
 
 
 @pytest.mark.parametrize("state", ["first", "busy", "keys", "export", "settings"])

@@ -114,7 +114,7 @@ def paint(page: Any, folder: Path) -> None:
     """Strokes over the painting, as soon as there is one, until Python has heard of them: what is
     around the picture may still move it from under the first.
     """
-    page.locator(".lightpaint .light").first.wait_for()
+    page.locator(".lightpaint .tag").first.wait_for()
     picture = page.locator(".lightpaint .pictures canvas").first
     picture.wait_for()
     wait_for(lambda: page.locator(".lightpaint .loading, .lightpaint .waiting").count() == 0)
@@ -176,7 +176,9 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         assert "is-dim" not in row.get_attribute("class")
         run_cell(page, 1, lambda: "is-dim" in row.get_attribute("class"))
         # What is painted for a kernel that is there no more would be lost.
+        page.remove_locator_handler(asks)
         page.locator('.jp-NotebookPanel-toolbar [data-jp-item-name="restart"] *').first.click()
+        asks.click()
         page.get_by_text("The kernel has ended: run the cell again to go on.").wait_for()
 
 
