@@ -58,7 +58,7 @@ class Places:
             self._tell_taken(before)
 
     def _tell_taken(self, page: int, reply: int | None = None) -> None:
-        text = "the painter is open at another place of this notebook"
+        text = "the painter is open at another place"
         self.tell(Message("closed", {"reason": "taken", "text": text}), reply, page=page)
 
     def tell(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:

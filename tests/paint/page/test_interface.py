@@ -913,6 +913,7 @@ def test_a_space_is_typed_beside_it(opened: Any) -> None:
 #: Windows, and columns of notebooks.
 SIZES = [(1280, 720), (1920, 1080), (1024, 768), (900, 600)]
 COLUMNS = [(970, 640), (780, 600), (760, 600), (690, 560), (584, 560), (480, 640)]
+LOW = [(1280, 300), (970, 260), (780, 300), (690, 300), (584, 260), (480, 300)]
 
 #: A long one.
 SENTENCE = (
@@ -932,13 +933,42 @@ def cut_off(painter: Painter) -> list[str]:
     return names
 
 
-@pytest.mark.parametrize("size", SIZES + COLUMNS)
+@pytest.mark.parametrize("size", SIZES + COLUMNS + LOW)
 def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
     painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
     painter.tell(kind="answer", version=2, exact=True, headline=SENTENCE, lights=[], delta_e=11.2)
     for key in "bwa":
         painter.page.keyboard.press(key)
         assert cut_off(painter) == []
+
+
+@pytest.mark.parametrize("size", LOW)
+def test_of_a_low_painter_the_sentence_comes_first(opened: Any, size: tuple[int, int]) -> None:
+    """Nothing that is needed lies below what is seen, and panels scroll."""
+    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    stage = painter.page.locator(".stage").bounding_box()
+    said = painter.page.locator(".said").bounding_box()
+    assert said["y"] + said["height"] <= stage["y"]
+    assert stage["height"] > 60
+    for name in (".stage", ".tools .two-colours", ".answer button", ".options input >> nth=-1"):
+        box = painter.page.locator(name).first.bounding_box()
+        assert box["y"] + box["height"] <= size[1]
+    assert not painter.page.locator(".here").is_visible()
+    if not painter.ui("side"):
+        painter.button("Panels").click()
+    light = painter.page.locator(".light").last
+    light.scroll_into_view_if_needed()
+    assert light.bounding_box()["y"] < size[1]
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (690, 560), (690, 300)])
+def test_what_has_to_be_known_does_not_lie_over_a_name(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened(viewport={"width": size[0], "height": size[1]})
+    painter.page.keyboard.press("Control+s")
+    painter.tell(kind="closed", reason="taken", text="The painter is open at another place.")
+    top = painter.page.locator(".banner").bounding_box()["y"]
+    name = painter.page.locator(".tag", has_text="Painting").bounding_box()
+    assert name["y"] + name["height"] <= top
 
 
 def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) -> None:
