@@ -449,7 +449,11 @@ def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> 
 
 
 def test_truth(painter: Painter) -> None:
-    painter.button("How true?").click()
+    how = painter.page.locator(".answer").get_by_role("button", name="How true?")
+    box = how.bounding_box()
+    how.click()
+    assert how.bounding_box() == box  # or Keep look, and its tip, would be under the pointer
+    assert how.get_attribute("aria-pressed") == "true"
     painter.button("False colour").click()
     assert painter.ui("show")["overlay"] == "falsecolor"
     painter.button("Out of reach").click()  # asks for what it shows

@@ -121,6 +121,7 @@ const DELTA_E =
 export function AnswerLine({ ui, hands }) {
   const { store, session } = hands;
   const text = ui.headline || (ui.ready ? 'Finding the lighting …' : '');
+  const isOpen = ui.side && ui.open.truth;
   return html`<div class="answer">
     <p class="headline" role="status">
       ${
@@ -144,10 +145,10 @@ export function AnswerLine({ ui, hands }) {
       act=${() => session.send('save_look', { name: `Look ${ui.looks.length + 1}` })} />`
     }
     ${
-      !ui.open.truth &&
+      // It stays where it is when it is pressed: nothing else slides under the pointer.
       ui.ready &&
-      html`<${Button} label="How true?" act=${() =>
-        store.set({ side: true, open: { ...ui.open, truth: true } })} />`
+      html`<${Button} label="How true?" on=${isOpen} act=${() =>
+        store.set({ side: true, open: { ...ui.open, truth: !isOpen } })} />`
     }
   </div>`;
 }
