@@ -56,11 +56,15 @@ ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
 KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
 
-class Live(traitlets.Any):  # type: ignore[misc]
-    """An object that is looked at when it is set, also where it is None."""
+#: How often what callbacks set may make callbacks set something again.
+ROUNDS = 20
 
-    def _validate(self, obj: Any, value: Any) -> Any:
-        return value if obj._cross_validation_lock else self._cross_validate(obj, value)
+
+class Live(traitlets.Any):  # type: ignore[misc]
+    """What the session tells with `set_trait`; what is assigned to it is a wish to the session."""
+
+    def __set__(self, obj: Any, value: Any) -> None:
+        obj._assign(self.name, value)
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
@@ -123,7 +127,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         **settings: Any,
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
-        self._waiting: dict[str, Any] = {}  # what is to be set, by name, as soon as it can be
+        self._waiting: list[tuple[str, Any]] = []  # what is to be set as soon as it can be
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
@@ -214,18 +218,44 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     # What is set from a cell
 
-    @traitlets.validate(*LIVE)  # type: ignore[untyped-decorator]
-    def _set(self, proposal: Any) -> Any:
-        """Do what somebody sets, or raise where they set it."""
-        name, value = proposal.trait.name, proposal.value
+    def _assign(self, name: str, value: Any) -> None:
+        """Do what somebody sets, or raise where they set it; a callback's wish is done later."""
         with self._lock:  # another thread may be telling something now
+            wish = ACTS[name](self._studio.session, value)
             if self._is_telling:
-                return value
-            for message in self._studio.load(*ACTS[name](self._studio.session, value)):
-                self._places.tell(message)
-            new = self._now()
-            self._follow({key: its for key, its in new.items() if key != name})
-        return new[name]
+                self._waiting.append((name, value))
+            else:
+                self._do(wish)
+
+    def _do(self, wish: cells.Loaded) -> None:
+        """Raises LightpaintError for what cannot be had."""
+        paintings, wishes, _ = wish
+        if not paintings and wishes == self._studio.session.wishes:
+            return  # it would be a step in which nothing happens, and answered for nothing
+        for message in self._studio.load(*wish):
+            self._places.tell(message)
+        self._follow()
+
+    def _set_waiting(self) -> None:
+        """What has been waiting is set, and then what callbacks have set meanwhile."""
+        for _ in range(ROUNDS):
+            waiting, self._waiting = self._waiting, []
+            for name, value in waiting:
+                self._set_late(name, value)
+        if self._waiting:
+            self._waiting = []
+            self._warn(
+                "callbacks of the painter set something again whenever they are told of what they "
+                "have set: the last of it was not set"
+            )
+
+    def _set_late(self, name: str, value: Any) -> None:
+        """What fails is shown, and ends nothing: who set it has gone on."""
+        try:
+            self._do(ACTS[name](self._studio.session, value))
+        except Exception as error:
+            traceback.print_exc()
+            self._warn(f"painter.{name} was not set: {told(error, at_length=False)}")
 
     # What is told
 
@@ -239,8 +269,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         except Exception as error:  # of whoever observes
             traceback.print_exc()
             said = f"{type(error).__name__}: {first_line(error)}"
-            text = f"a callback of painter.{change['name']} failed: {said}"
-            self._places.tell(Message("say", {"text": text, "tone": "warn"}))
+            self._warn(f"a callback of painter.{change['name']} failed: {said}")
+
+    def _warn(self, text: str) -> None:
+        self._places.tell(Message("say", {"text": text, "tone": "warn"}))
 
     def _now(self) -> dict[str, Any]:
         """What the session has, by name of what says so."""
@@ -265,10 +297,13 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     @contextmanager
     def _telling(self) -> Iterator[None]:
-        with self._lock:  # two threads that tell would each take the other's word for a cell's
+        """Who observes is told; what callbacks set is set when all have been told."""
+        with self._lock:  # two threads that tell would each take the other's callbacks for theirs
             before, self._is_telling = self._is_telling, True
             try:
                 yield
+                if not before:
+                    self._set_waiting()
             finally:
                 self._is_telling = before
 
@@ -303,10 +338,6 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _heard(self, message: Message) -> None:
         self._places.tell(message)
-        if message.kind == "state":
-            waiting, self._waiting = self._waiting, {}
-            for name, value in waiting.items():
-                self._set_late(name, value)
         if message.kind == "state" or message.fields.get("exact"):
             self._follow()
 
@@ -314,18 +345,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """Now, or as soon as there is something to paint on. Raises LightpaintError if now."""
         with self._lock:
             if self._studio.store is None:
-                self._waiting[name] = value
+                self._waiting.append((name, value))
             else:
                 setattr(self, name, value)
-
-    def _set_late(self, name: str, value: Any) -> None:
-        """What fails is shown, and ends nothing: the cell that set it has ended."""
-        try:
-            setattr(self, name, value)
-        except Exception as error:
-            traceback.print_exc()
-            text = f"painter.{name} was not set: {told(error, at_length=False)}"
-            self._places.tell(Message("say", {"text": text, "tone": "warn"}))
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

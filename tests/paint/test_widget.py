@@ -372,6 +372,51 @@ def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any
     assert page.paint(basis.images[1], 1)["kind"] == "answer"
 
 
+def test_what_a_callback_sets_is_set_once_all_are_told(basis: lp.Basis, open_: Any) -> None:
+    painter = open_()
+    off = lp.Constraints.of({"key": {"off": True}})
+    told: list[str] = []
+    painter.observe(lambda _: setattr(painter, "constraints", off), "lighting")
+    painter.observe(lambda change: told.append(change.name))
+    painter.target = lp.Target.of(basis.images[0])
+    assert painter.constraints == off
+    assert painter.lighting.emission["key"] == (0, 0, 0)
+    assert told.index("constraints") > told.index("target")
+    # What is set again to what it is has changed nothing, and is no step to be undone.
+    assert len(painter._studio.session.store.steps) == 2
+
+
+def test_what_a_callback_cannot_set_is_shown(basis: lp.Basis, open_: Any, capsys: Any) -> None:
+    painter = open_()
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    key, fill = (lp.Constraints.of({name: {"lock": True}}) for name in ("key", "lamp"))
+    painter.observe(lambda _: setattr(painter, "constraints", 3), "target")
+    painter.observe(lambda _: setattr(painter, "constraints", fill), "targets")
+    painter.observe(lambda _: setattr(painter, "constraints", key), "lighting")
+    painter.target = lp.Target.of(basis.images[0])
+    said = [x["text"] for x, _ in page.heard() if x["kind"] == "say"]
+    assert any("painter.constraints is a lp.Constraints or None, not int" in x for x in said)
+    assert any("no light 'lamp'" in x for x in said)
+    assert "no light 'lamp'" in capsys.readouterr().err
+    assert painter.constraints == key
+
+
+def test_callbacks_that_never_come_to_an_end_are_stopped(basis: lp.Basis, open_: Any) -> None:
+    painter = open_()
+    page = Page(painter)
+    page.say("hello", version=protocol.VERSION)
+    levels = iter(np.linspace(0.1, 0.9, 1000).tolist())
+
+    def again(_: Any) -> None:
+        painter.constraints = lp.Constraints.of({"key": {"lock": next(levels)}})
+
+    painter.observe(again, "lighting")
+    painter.target = lp.Target.of(basis.images[0])
+    said = [x["text"] for x, _ in page.heard() if x["kind"] == "say"]
+    assert "callbacks of the painter set something again" in said[0]
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_junk_is_answered(basis: lp.Basis, open_: Any, monkeypatch: Any, capsys: Any) -> None:
     painter = open_()
