@@ -10,8 +10,10 @@ import contextvars
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, RLock
+from types import TracebackType
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -38,6 +40,7 @@ from lightpaint.target.target import Target
 try:
     import anywidget
     import traitlets
+    from traitlets import ObserveHandler
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
@@ -65,6 +68,31 @@ class Live(traitlets.Any):  # type: ignore[misc]
 
     def __set__(self, obj: Any, value: Any) -> None:
         obj._assign(self.name, value)
+
+
+@dataclass(frozen=True)
+class Callback:
+    """A function that is told of changes: whatever it does, others are told as well.
+
+    warn: hears in one line what failed.
+    """
+
+    handler: Callable[[Any], Any]
+    warn: Callable[[str], None] = field(compare=False)
+
+    def __call__(self, change: Any) -> None:
+        try:
+            self.handler(change)
+        except Exception as error:
+            # From the callback's own line on.
+            traceback.print_exception(error.with_traceback(_after_this(error)))
+            said = f"{type(error).__name__}: {first_line(error)}"
+            self.warn(f"a callback of painter.{change['name']} failed: {said}")
+
+
+def _after_this(error: Exception) -> TracebackType | None:
+    here = error.__traceback__
+    return here and (here.tb_next or here)
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
@@ -259,17 +287,17 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     # What is told
 
-    def notify_change(self, change: Any) -> None:
-        """Tell who observes; what fails in a callback is shown, and ends nothing."""
-        if change["name"] not in LIVE:
-            super().notify_change(change)
-            return
-        try:
-            super().notify_change(change)
-        except Exception as error:  # of whoever observes
-            traceback.print_exc()
-            said = f"{type(error).__name__}: {first_line(error)}"
-            self._warn(f"a callback of painter.{change['name']} failed: {said}")
+    def observe(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
+        """Have `handler` called with each change; what fails in it is shown, and ends nothing."""
+        super().observe(self._callback(handler), names, type)
+
+    def unobserve(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
+        """Have it called no more."""
+        super().unobserve(self._callback(handler), names, type)
+
+    def _callback(self, handler: Any) -> Any:
+        # What classes observe of themselves is called by its name, and is not a cell's.
+        return handler if isinstance(handler, ObserveHandler) else Callback(handler, self._warn)
 
     def _warn(self, text: str) -> None:
         self._places.tell(Message("say", {"text": text, "tone": "warn"}))

@@ -372,6 +372,29 @@ def test_a_callback_that_fails_is_shown(basis: lp.Basis, open_: Any, capsys: Any
     assert page.paint(basis.images[1], 1)["kind"] == "answer"
 
 
+def test_a_callback_that_fails_silences_no_other(basis: lp.Basis, open_: Any, capsys: Any) -> None:
+    def fails(_: Any) -> None:
+        raise ValueError("boom")
+
+    painter = open_()
+    told: list[str] = []
+    painter.observe(fails, "lighting")
+    painter.observe(lambda change: told.append(change.name), "lighting")
+    painter.target = lp.Target.of(basis.images[0])
+    assert "lighting" in told
+    # Where it failed, and nothing of how it came to be called.
+    frames = [x for x in capsys.readouterr().err.splitlines() if x.startswith("  File")]
+    assert frames
+    assert {frame.rpartition(" in ")[2] for frame in frames} == {"fails"}
+    painter.unobserve(fails, "lighting")
+    painter.target = None
+    assert capsys.readouterr().err == ""
+    painter.observe(fails, "lighting")
+    painter.unobserve_all()
+    painter.target = lp.Target.of(basis.images[0])
+    assert capsys.readouterr().err == ""
+
+
 def test_what_a_callback_sets_is_set_once_all_are_told(basis: lp.Basis, open_: Any) -> None:
     painter = open_()
     off = lp.Constraints.of({"key": {"off": True}})
