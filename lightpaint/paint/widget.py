@@ -8,7 +8,7 @@ import asyncio
 import atexit
 import contextvars
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +39,7 @@ from lightpaint.target.target import Target
 
 try:
     import anywidget
+    import ipywidgets
     import traitlets
     from traitlets import ObserveHandler
 except ImportError as error:
@@ -58,6 +59,9 @@ ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
 #: Painters of this process that keep their session in a file, by its path.
 KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
+
+#: What a painter takes of the room beside other widgets: without it, an HBox gives it none.
+LAYOUT = {"width": "100%", "min_width": "320px"}
 
 #: How often what callbacks set may make callbacks set something again.
 ROUNDS = 20
@@ -109,6 +113,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             kernel.
         folder: Receives what is exported.
         height: Of the painter, in pixels of the screen.
+        layout: As of every widget: the room that it takes beside others.
         settings: Fields of `lp.Settings`, by name.
 
     Attributes:
@@ -152,6 +157,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         store: str | Path | None = None,
         folder: str | Path | None = None,
         height: int = 720,
+        layout: Mapping[str, Any] | ipywidgets.Layout | None = None,
         **settings: Any,
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
@@ -173,7 +179,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         )
         self._places = Places(self._studio, self._lock, self._carry)
         self._failed = ""
-        super().__init__(height=height)
+        room = layout if isinstance(layout, ipywidgets.Layout) else {**LAYOUT, **(layout or {})}
+        super().__init__(height=height, layout=room)
         self.on_msg(self._said)
         self._studio.on_message = self._hears
         try:

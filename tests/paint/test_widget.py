@@ -32,6 +32,7 @@ from lightpaint.settings import Settings
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
+ipywidgets = pytest.importorskip("ipywidgets", reason="ipywidgets")
 
 SIZE = (12, 20)
 PAGE, OTHER = 7, 9
@@ -233,6 +234,14 @@ def test_what_is_told_is_of_one_time(
     assert told["target"] is None
     assert not np.allclose(painter._studio.session.weights, before)
     np.testing.assert_array_equal(told["lighting"].weights_for(basis), before)
+
+
+def test_it_has_room_beside_other_widgets(open_: Any) -> None:
+    assert (open_().layout.width, open_().layout.min_width) == ("100%", "320px")
+    half = open_(layout={"width": "50%"})
+    assert (half.layout.width, half.layout.min_width) == ("50%", "320px")
+    own = ipywidgets.Layout(flex="1")
+    assert open_(layout=own).layout is own
 
 
 def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> None:
