@@ -37,13 +37,11 @@ from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
 from lightpaint.settings import Settings
 from lightpaint.sources import (
-    NOT_IN_GROUPS,
-    RENDERED,
     BasisFile,
     GroupsFile,
     Painting,
     SceneFile,
-    check_needed,
+    check_nothing_idle,
     content,
     from_json,
     to_json,
@@ -114,7 +112,8 @@ class Job:
 
     def __post_init__(self) -> None:
         self._check_counts()
-        self._check_nothing_idle()
+        if not self.scenes:
+            check_nothing_idle(self.settings, self.basis)
         # A painting is read beside the basis, and a mistake in it is said first.
         *targets, basis = side_by_side(content, [*self.targets, self.basis])
         basis = basis.basis if isinstance(basis, LightGroups) else basis
@@ -206,21 +205,6 @@ class Job:
                 f"{len(self.targets)} targets for {len(self.scenes)} views: give one for each; "
                 "several paintings of one view are a job each"
             )
-
-    def _check_nothing_idle(self) -> None:
-        """Raise BasisError for settings that change nothing, since nothing is rendered."""
-        if self.scenes:
-            return
-        is_groups = isinstance(self.basis, LightGroups | GroupsFile)
-        default = Settings()
-        check_needed(
-            [
-                name
-                for name in (NOT_IN_GROUPS if is_groups else RENDERED)
-                if getattr(self.settings, name) != getattr(default, name)
-            ],
-            self.basis,
-        )
 
     def _check_painting_is_no_light(self) -> None:
         """Raise BasisError where a folder of light groups has the painting among its lights."""

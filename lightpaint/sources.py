@@ -159,6 +159,17 @@ def check_needed(given: Iterable[str], basis: Any) -> None:
     )
 
 
+def check_nothing_idle(settings: Settings, basis: Any) -> None:
+    """Raise BasisError for settings that change nothing, since nothing is rendered.
+
+    basis: a saved one, or light groups.
+    """
+    names = NOT_IN_GROUPS if isinstance(basis, LightGroups | GroupsFile) else RENDERED
+    default = Settings()
+    idle = [name for name in names if getattr(settings, name) != getattr(default, name)]
+    check_needed(idle, basis)
+
+
 def to_json(
     scenes: Sequence[Any],
     targets: Sequence[Any],

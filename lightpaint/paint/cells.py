@@ -1,6 +1,8 @@
 """What a cell of a notebook gives to a painter, and sets in it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from lightpaint.paint.wishes import Wishes
 from lightpaint.scene.quality import on_film
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.settings import Settings
+from lightpaint.sources import check_nothing_idle
 from lightpaint.target.target import Target
 
 #: What can be painted.
@@ -110,11 +113,29 @@ def _pixels_of(target: Target) -> Pixels:
     return Pixels(target.image, target.importance, target.at_least)
 
 
+def settings_given(given: Mapping[str, Any], names: Iterable[str]) -> Settings:
+    """What a painter is given by name beside its own arguments, `names`.
+
+    Raises TypeError for what has no such name, LightpaintError for a value that means nothing.
+    """
+    known = [field.name for field in fields(Settings)]
+    for name in given:
+        if name not in known:
+            raise TypeError(f"lp.Painter has no argument {name!r}{_meant(name, [*names, *known])}")
+    return Settings(**given)
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    near = get_close_matches(name, known, 1)
+    return f": did you mean {near[0]!r}?" if near else ""
+
+
 def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[Subject, ...]:
     """What is painted, of one view or of several. how: as of `_subject`.
 
     Raises LightpaintError for what cannot be.
     """
+    _check_asked(**how)
     several = list(given) if isinstance(given, list | tuple) else [given]
     if not several:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
@@ -128,6 +149,16 @@ def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[
     for basis in bases[1:]:
         check_same_lights(bases[0], basis)
     return made
+
+
+def _check_asked(*, constraints: Any, transform: Any, **_: Any) -> None:
+    if not isinstance(constraints, Constraints | None):
+        kind = type(constraints).__name__
+        raise PaintError(f"the constraints are a {kind}: give lp.Constraints.of(...)")
+    if not isinstance(transform, ViewTransform | TransformChoice | None):
+        raise PaintError(
+            f"transform is {transform!r}: expected a ViewTransform, like lp.ViewTransform('agx')"
+        )
 
 
 def _subject(
@@ -146,6 +177,11 @@ def _subject(
         "among": among,
     }
     if isinstance(given, str | Path):
+        if Path(given).suffix.lower() == ".exr":
+            raise PaintError(
+                f"{given} is no scene: give lp.read_basis({str(given)!r}) or, of another "
+                f"renderer's light groups, lp.read_light_groups({str(given)!r})"
+            )
         given = load_scene(given)
     if isinstance(given, Scene):
         scene = on_film(given, settings.quality, settings.resolution)
@@ -160,5 +196,7 @@ def _subject(
     else:
         kind = type(given).__name__
         raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
+    if not isinstance(given, Scene):
+        check_nothing_idle(settings, given)
     place = Path(f"{Path(name).stem}.paint") if folder is None else Path(folder)
     return Subject(source=name, folder=place.absolute(), **about)

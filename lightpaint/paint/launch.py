@@ -29,12 +29,10 @@ from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.sources import (
-    NOT_IN_GROUPS,
-    RENDERED,
     BasisFile,
     GroupsFile,
     SceneFile,
-    check_needed,
+    check_nothing_idle,
 )
 
 #: The session in the folder of what is painted.
@@ -66,10 +64,7 @@ def subject_of(
         "among": among,
     }
     if not isinstance(source, SceneFile):
-        default = Settings()
-        names = NOT_IN_GROUPS if isinstance(source, GroupsFile) else RENDERED
-        idle = [name for name in names if getattr(settings, name) != getattr(default, name)]
-        check_needed(idle, source)
+        check_nothing_idle(settings, source)
         found = source.content
         groups = found if isinstance(found, LightGroups) else None
         basis = found.basis if isinstance(found, LightGroups) else found

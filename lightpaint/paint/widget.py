@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
 from types import TracebackType
@@ -33,7 +34,6 @@ from lightpaint.paint.places import Places
 from lightpaint.paint.session import Session
 from lightpaint.paint.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
-from lightpaint.settings import Settings
 from lightpaint.target.own import write_painting
 from lightpaint.target.target import Target
 
@@ -59,6 +59,9 @@ ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
 #: Painters of this process that keep their session in a file, by its path.
 KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
+
+#: Pixels of the screen with less than which nobody can paint.
+LEAST_HEIGHT = 240
 
 #: What a painter takes of the room beside other widgets: without it, an HBox gives it none.
 LAYOUT = {"width": "100%", "min_width": "320px"}
@@ -112,7 +115,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             this kernel that has it is closed. Without one what was painted lives as long as the
             kernel.
         folder: Receives what is exported.
-        height: Of the painter, in pixels of the screen.
+        height: Of the painter, in pixels of the screen, at least 240.
         layout: As of every widget: the room that it takes beside others.
         settings: Fields of `lp.Settings`, by name.
 
@@ -141,7 +144,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     _esm = widget_script()
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
-    height = traitlets.Int(720).tag(sync=True)
+    height = traitlets.Int(720, min=LEAST_HEIGHT).tag(sync=True)
     target = Live(None)
     targets = Live(())
     lighting = Live(None)
@@ -165,7 +168,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
-        asked = {"settings": Settings(**settings), "constraints": constraints}
+        asked = {"settings": cells.settings_given(settings, ARGUMENTS), "constraints": constraints}
         subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
         if target is not None:
             cells.check_given(target, subjects)
@@ -223,14 +226,17 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
         view: of which view, in the order in which they were given.
 
-        Raises PaintError where nothing is painted yet, or for another kind of file.
+        Raises PaintError where nothing is painted yet, for another kind of file, or for a view that
+        there is none of.
         """
-        path = Path(path)
+        path, moment = Path(path), self._studio.moment()
+        if view not in range(len(moment.targets)):
+            raise PaintError(f"view is {view!r}: expected one of {len(moment.targets)}, from 0 on")
         if path.suffix == ".json":
             write_lighting(path, self._lighting())
         elif path.suffix != ".exr":
             raise PaintError(f"{path}: expected .exr for the painting, .json for the lighting")
-        elif (target := self._studio.moment().targets[view]) is None:
+        elif (target := moment.targets[view]) is None:
             raise PaintError("nothing is painted yet: there is no painting to keep")
         else:
             write_painting(path, target)
@@ -383,6 +389,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                 self._waiting.append((name, value))
             else:
                 setattr(self, name, value)
+
+
+#: What a painter is given that is no setting.
+ARGUMENTS = [name for name in signature(Painter).parameters if name not in ("self", "settings")]
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

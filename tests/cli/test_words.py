@@ -14,10 +14,10 @@ from lightpaint.batch.how import How
 from lightpaint.cli.options import LOADING
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import _SAID, OPTIONS, SPELLINGS, spoken
-from lightpaint.job import NOT_IN_GROUPS
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.relit.forms import Source
 from lightpaint.settings import Settings
+from lightpaint.sources import NOT_IN_GROUPS
 from lightpaint.target.read import read_target
 
 PACKAGE = Path(lightpaint.__file__).parent

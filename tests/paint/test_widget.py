@@ -32,6 +32,7 @@ from lightpaint.settings import Settings
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
+traitlets = pytest.importorskip("traitlets", reason="traitlets")
 ipywidgets = pytest.importorskip("ipywidgets", reason="ipywidgets")
 
 SIZE = (12, 20)
@@ -293,6 +294,30 @@ def test_what_cannot_be_set_is_said_where_it_is_set(basis: lp.Basis, open_: Any)
     assert painter.target is None
     with pytest.raises(lp.LightpaintError, match="not int"):
         lp.Painter(3)
+
+
+def test_what_cannot_be_given_is_said_at_once(basis: lp.Basis, open_: Any, tmp_path: Path) -> None:
+    for how, said in (
+        ({"transform": "agx"}, r"transform is 'agx': expected a ViewTransform, like lp.ViewTran"),
+        ({"constraints": {"key": {"off": True}}}, r"are a dict: give lp.Constraints.of\(\.\.\.\)"),
+        ({"spp": 4}, r"spp=\.\.\. cannot change a saved basis: leave it out, or give the scene"),
+    ):
+        with pytest.raises(lp.LightpaintError, match=said):
+            open_(**how)
+    with pytest.raises(TypeError, match=r"lp.Painter has no argument 'heigth': did you mean 'heig"):
+        open_(heigth=300)
+    with pytest.raises(TypeError, match=r"lp.Painter has no argument 'sp': did you mean 'spp'"):
+        open_(sp=300)
+    for height in (-5, 10):
+        with pytest.raises(traitlets.TraitError, match="should not be less than 240"):
+            open_(height=height)
+    with pytest.raises(lp.LightpaintError, match=r"give lp.read_basis\('x.basis.exr'\)"):
+        lp.Painter("x.basis.exr")
+    painter = open_(target=lp.Target.of(basis.images[0]))
+    for name in ("x.exr", "x.json"):
+        for view in (3, -1):
+            with pytest.raises(lp.LightpaintError, match=f"view is {view}: expected one of 1"):
+                painter.save(tmp_path / name, view=view)
 
 
 class Rendered:
