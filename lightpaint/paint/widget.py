@@ -164,6 +164,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         **settings: Any,
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
+        self._is_closed = False
         self._waiting: list[tuple[str, Any]] = []  # what is to be set as soon as it can be
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
@@ -242,12 +243,13 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             write_painting(path, target)
 
     def close(self) -> None:
-        """End it; a session with a file can be gone on with.
+        """End it; a session with a file can be gone on with. A second time it does nothing.
 
         Raises OutputError if what was done last could not be written; it has ended all the same.
         """
-        if "_studio" not in vars(self):  # it has never begun
+        if "_studio" not in vars(self) or self._is_closed:  # it has never begun, or ended before
             return
+        self._is_closed = True
         atexit.unregister(self.close)  # which would keep it, and its pictures, until then
         self._studio.on_message = None
         try:
@@ -261,6 +263,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _assign(self, name: str, value: Any) -> None:
         """Do what somebody sets, or raise where they set it; a callback's wish is done later."""
+        if self._is_closed:
+            raise PaintError(f"painter.{name} cannot be set: it is closed; make another lp.Painter")
         with self._lock:  # another thread may be telling something now
             wish = ACTS[name](self._studio.session, value)
             if self._is_telling:

@@ -577,6 +577,18 @@ def test_a_cell_with_a_file_runs_again(
     np.testing.assert_array_equal(again.target.image, basis.images[2])
 
 
+def test_who_is_closed_cannot_be_set(basis: lp.Basis, open_: Any) -> None:
+    target = lp.Target.of(basis.images[0])
+    painter = open_(target=target)
+    painter.close()
+    with pytest.raises(lp.LightpaintError, match=r"painter.target cannot be set: it is closed"):
+        painter.target = None
+    # What was painted last is still there to look at, and a second time there is nothing to end.
+    np.testing.assert_array_equal(painter.target.image, target.image)
+    assert painter.solution is not None
+    painter.close()
+
+
 def test_who_closes_waits_for_no_other_painter(open_: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whose renders may go on for as long as they like."""
     monkeypatch.setattr(Studio, "renders", property(lambda _: True))
