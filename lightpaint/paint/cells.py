@@ -1,18 +1,22 @@
 """What a cell of a notebook gives to a painter, and sets in it."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
-from lightpaint.errors import PaintError
+from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.views import check_same_lights
+from lightpaint.paint.database import AFRESH, ELSEWHERE
 from lightpaint.paint.keeping import check_together
 from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
@@ -26,6 +30,13 @@ from lightpaint.target.target import Target
 
 #: What can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path
+
+#: What errors advise who paints in a folder, or solves, and who paints in a notebook.
+ADVICE = {
+    AFRESH: "choose another file (store=...), or give that one another name",
+    ELSEWHERE: "choose another file (store=...)",
+    "pass resize=True": "give target.resized((height, width))",
+}
 
 #: Paintings by view, what is asked with them, and what undo calls it.
 Loaded = tuple[Mapping[int, Pixels], Wishes, str]
@@ -47,14 +58,19 @@ def of_target(session: Session, target: Any) -> Loaded:
 def check_given(target: Any, subjects: Sequence[Subject]) -> None:
     """Raise LightpaintError for what cannot be painted on, also while its lights are rendered."""
     sizes = [(subject.basis or subject.loaded).size for subject in subjects]
-    if isinstance(target, Target):
-        _fitted(target, sizes[0], "target")
-    else:
+    if is_of_each_view(target):
         _fitted_targets(target, sizes)
+    else:
+        _fitted(target, sizes[0], "target")
+
+
+def is_of_each_view(target: Any) -> bool:
+    """Whether it stands for `targets`, and not for the first of them alone."""
+    return isinstance(target, list | tuple)
 
 
 def _fitted_targets(targets: Any, sizes: Sequence[tuple[int, int]]) -> list[Target | None]:
-    if not isinstance(targets, Sequence) or len(targets) != len(sizes):
+    if not is_of_each_view(targets) or len(targets) != len(sizes):
         raise PaintError(
             f"painter.targets is a list of {len(sizes)}, a lp.Target or None for each view"
         )
@@ -64,8 +80,28 @@ def _fitted_targets(targets: Any, sizes: Sequence[tuple[int, int]]) -> list[Targ
 def _fitted(target: Any, size: tuple[int, int], name: str) -> Target | None:
     if not isinstance(target, Target | None):
         kind = type(target).__name__
-        raise PaintError(f"painter.{name} is a lp.Target or None, not {kind}")
-    return None if target is None else target.fitted_to(size, resize=False)
+        raise PaintError(f"painter.{name} is a lp.Target or None, not {kind}{_made_of(target)}")
+    with in_a_notebook():
+        return None if target is None else target.fitted_to(size, resize=False)
+
+
+def _made_of(given: Any) -> str:
+    """How a target is made of that."""
+    if isinstance(given, np.ndarray):
+        return ": give lp.Target.of(array)"
+    return ": give lp.read_target(path)" if isinstance(given, str | Path) else ""
+
+
+@contextmanager
+def in_a_notebook() -> Iterator[None]:
+    """What an error advises, in arguments that a painter has."""
+    try:
+        yield
+    except LightpaintError as error:
+        text = str(error)
+        for elsewhere, here in ADVICE.items():
+            text = text.replace(elsewhere, here)
+        raise type(error)(text) from None
 
 
 def _painting(session: Session, view: int, target: Target | None) -> Pixels:
@@ -128,6 +164,13 @@ def settings_given(given: Mapping[str, Any], names: Iterable[str]) -> Settings:
 def _meant(name: str, known: Iterable[str]) -> str:
     near = get_close_matches(name, known, 1)
     return f": did you mean {near[0]!r}?" if near else ""
+
+
+def place_given(store: Any) -> Path | None:
+    """Where a session is kept. Raises PaintError for what is no path."""
+    if not isinstance(store, str | Path | None):
+        raise PaintError(f"store is {store!r}: expected the path of a file, like 'evening.db'")
+    return None if store is None else Path(store)
 
 
 def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[Subject, ...]:

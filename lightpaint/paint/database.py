@@ -118,12 +118,10 @@ def _keep(database: sqlite3.Connection, identity: str) -> None:
         database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (identity,))
 
 
-#: What can be done instead, and how a session that another process has is told.
+#: How a session that another process has is told, and what can be done instead.
 IN_USE = "is in use"
-AFRESH = (
-    "choose another folder (folder=...), or start afresh, which keeps it under another name "
-    "(new=True)"
-)
+ELSEWHERE = "choose another folder (folder=...)"
+AFRESH = f"{ELSEWHERE}, or start afresh, which keeps it under another name (new=True)"
 
 
 def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
@@ -193,8 +191,7 @@ def _spoken(path: Path | None, error: sqlite3.Error) -> LightpaintError:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
         return PaintError(
-            f"{path} {IN_USE}: another lightpaint paints there; end that one, or choose another "
-            "folder (folder=...)"
+            f"{path} {IN_USE}: another lightpaint paints there; end that one, or {ELSEWHERE}"
         )
     if code in _DAMAGED or not isinstance(error, sqlite3.OperationalError):
         return damaged(path, error)

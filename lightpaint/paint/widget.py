@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
@@ -32,6 +33,7 @@ from lightpaint.paint.bundle import widget_script, widget_style
 from lightpaint.paint.frames import Message
 from lightpaint.paint.places import Places
 from lightpaint.paint.session import Session
+from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
 from lightpaint.target.own import write_painting
@@ -173,14 +175,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
         if target is not None:
             cells.check_given(target, subjects)
-        place = None if store is None else Path(store)
+        place = cells.place_given(store)
         if place is not None:
             if (before := KEPT_IN.get(place.resolve())) is not None:
                 before.close()  # its cell runs again
             KEPT_IN[place.resolve()] = self
-        self._studio = Studio(
-            subjects, lambda its: MemoryStore(its) if place is None else Store.open(place, its)
-        )
+        self._studio = Studio(subjects, partial(_opened, place))
         self._places = Places(self._studio, self._lock, self._carry)
         self._failed = ""
         room = layout if isinstance(layout, ipywidgets.Layout) else {**LAYOUT, **(layout or {})}
@@ -204,7 +204,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                 raise PaintError(self._failed)
             self._follow()
         if target is not None:
-            self._set_once_there("target" if isinstance(target, Target) else "targets", target)
+            self._set_once_there("targets" if cells.is_of_each_view(target) else "target", target)
 
     def __repr__(self) -> str:
         return f"Painter({self._studio.subjects[0].name})"
@@ -397,6 +397,13 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
 #: What a painter is given that is no setting.
 ARGUMENTS = [name for name in signature(Painter).parameters if name not in ("self", "settings")]
+
+
+def _opened(place: Path | None, identity: Identity) -> Store:
+    if place is None:
+        return MemoryStore(identity)
+    with cells.in_a_notebook():
+        return Store.open(place, identity)
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

@@ -320,6 +320,38 @@ def test_what_cannot_be_given_is_said_at_once(basis: lp.Basis, open_: Any, tmp_p
                 painter.save(tmp_path / name, view=view)
 
 
+def test_what_is_said_is_said_in_words_of_a_notebook(
+    basis: lp.Basis, open_: Any, tmp_path: Path
+) -> None:
+    image = basis.images[0]
+    painter = open_()
+    with pytest.raises(lp.LightpaintError, match=r"not ndarray: give lp.Target.of\(array\)"):
+        painter.target = image
+    with pytest.raises(lp.LightpaintError, match=r"targets .* not ndarray: give lp.Target.of"):
+        painter.targets = [image]
+    with pytest.raises(lp.LightpaintError, match=r"a list of 1, a lp.Target or None for each"):
+        painter.targets = lp.Target.of(image)
+    with pytest.raises(lp.LightpaintError, match=r"painter.target .*: give lp.Target.of\(array\)"):
+        open_(target=image)
+    with pytest.raises(lp.LightpaintError, match=r"painter.target .*: give lp.read_target\(path\)"):
+        open_(target="evening.exr")
+    large = lp.Target.of(np.ones((30, 50, 3)))
+    with pytest.raises(lp.LightpaintError, match=r"or give target.resized\(\(height, width\)\)$"):
+        painter.target = large
+    painter.target = large.resized(SIZE)
+    (tmp_path / "junk.db").write_bytes(b"hello" * 1000)
+    elsewhere = r"choose another file \(store=\.\.\.\)"
+    with pytest.raises(lp.LightpaintError, match=f"damaged .*: {elsewhere}, or give") as junk:
+        open_(store=tmp_path / "junk.db")
+    assert not any(word in str(junk.value) for word in ("folder", "new="))
+    used = Store.open(tmp_path / "used.db", Identity.of([basis]))
+    with pytest.raises(lp.LightpaintError, match=f"is in use: .*, or {elsewhere}$"):
+        open_(store=tmp_path / "used.db")
+    used.close()
+    with pytest.raises(lp.LightpaintError, match="store is 3: expected the path of a file"):
+        open_(store=3)
+
+
 class Rendered:
     """Stands for a scene whose basis is rendered meanwhile: a first one, and then a better one."""
 
@@ -346,7 +378,7 @@ def test_what_cannot_be_set_is_said_while_it_still_renders(
         (small, "3x3"),
         ([small], "3x3"),
         ([None, None], "list of 1"),
-        (small.image, "list of 1"),
+        (small.image, "not ndarray"),
         ([small.image], "lp.Target or None, not ndarray"),
     ):
         with pytest.raises(lp.LightpaintError, match=said):
