@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypedDict
 
 from lightpaint.errors import LightpaintError
 from lightpaint.expected import SWITCH, Check, a, number, one_of, whole
-from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
 from lightpaint.scene.film import check_resolution
 from lightpaint.scene.quality import Quality
 
@@ -127,3 +128,34 @@ class Settings(Fit):
     def checks_as_basis(self) -> bool:
         """Whether the verification has as many samples as the basis, whatever their films."""
         return self.spp is None and (self.time_s is not None or self.quality is not None)
+
+
+class SettingsByName(TypedDict, total=False):
+    """Fields of `Settings` for `**settings`, so that type checkers know their names.
+
+    `transform` is an argument of its own where part of one can be asked.
+    """
+
+    space: Space | None
+    hold: float | None
+    colors: Colors | None
+    unpainted: float
+    literal: bool
+    method: Method
+    emitters: Emitters
+    resize: bool
+    spp: int | None
+    time_s: float | None
+    seed: int
+    resolution: str | None
+    quality: Quality | None
+    use_cache: bool
+    exact_spp: bool
+    noise_correction: bool | None
+    refine: int
+    suggest: int
+    cd_per_unit: float | None
+    verify: bool
+    report: bool
+    force: bool
+    command: str

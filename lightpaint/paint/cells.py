@@ -157,11 +157,12 @@ def settings_given(given: Mapping[str, Any], names: Iterable[str]) -> Settings:
     known = [field.name for field in fields(Settings)]
     for name in given:
         if name not in known:
-            raise TypeError(f"lp.Painter has no argument {name!r}{_meant(name, [*names, *known])}")
+            raise TypeError(f"lp.Painter has no argument {name!r}{meant(name, [*names, *known])}")
     return Settings(**given)
 
 
-def _meant(name: str, known: Iterable[str]) -> str:
+def meant(name: str, known: Iterable[str]) -> str:
+    """Behind an error of a name that there is nothing of; nothing if none is near."""
     near = get_close_matches(name, known, 1)
     return f": did you mean {near[0]!r}?" if near else ""
 

@@ -16,7 +16,7 @@ from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack
 from weakref import WeakValueDictionary
 
 from lightpaint.colour.transform import TransformChoice, ViewTransform
@@ -36,6 +36,7 @@ from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
+from lightpaint.settings import SettingsByName
 from lightpaint.target.own import write_painting
 from lightpaint.target.target import Target
 
@@ -58,6 +59,9 @@ ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
     "constraints": cells.of_constraints,
 }
 
+Told = TypeVar("Told")
+Given = TypeVar("Given")
+
 #: Painters of this process that keep their session in a file, by its path.
 KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
@@ -72,10 +76,14 @@ LAYOUT = {"width": "100%", "min_width": "320px"}
 ROUNDS = 20
 
 
-class Live(traitlets.Any):  # type: ignore[misc]
+class Live(traitlets.Any, Generic[Told, Given]):  # type: ignore[misc]
     """What the session tells with `set_trait`; what is assigned to it is a wish to the session."""
 
-    def __set__(self, obj: Any, value: Any) -> None:
+    if TYPE_CHECKING:
+
+        def __get__(self, obj: Any, cls: Any = None) -> Told: ...
+
+    def __set__(self, obj: Any, value: Given) -> None:
         obj._assign(self.name, value)
 
 
@@ -126,7 +134,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             one's.
         targets: The paintings of all views, in order.
         lighting: The `Lighting` that answers it. Setting it holds every light there.
-        constraints: The `Constraints` that were asked in the painter.
+        constraints: The `Constraints` that were asked in the painter. Like `lighting` None as long
+            as nothing of a scene is rendered.
 
     What is painted changes these, and `observe` tells of it; setting them shows in the painter, as
     a step that can be undone.
@@ -147,10 +156,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     _esm = widget_script()
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
     height = traitlets.Int(720, min=LEAST_HEIGHT).tag(sync=True)
-    target = Live(None)
-    targets = Live(())
-    lighting = Live(None)
-    constraints = Live(None)
+    target: Live[Target | None, Target | None] = Live(None)
+    targets: Live[tuple[Target | None, ...], Sequence[Target | None]] = Live(())
+    lighting: Live[Lighting | None, Lighting] = Live(None)
+    constraints: Live[Constraints | None, Constraints | None] = Live(None)
 
     def __init__(
         self,
@@ -163,7 +172,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         folder: str | Path | None = None,
         height: int = 720,
         layout: Mapping[str, Any] | ipywidgets.Layout | None = None,
-        **settings: Any,
+        **settings: Unpack[SettingsByName],
     ) -> None:
         self._lock, self._is_there, self._is_telling = RLock(), Event(), False
         self._is_closed = False
@@ -261,6 +270,13 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     # What is set from a cell
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raises AttributeError for a slip of the pen, which would be an attribute of its own."""
+        is_there = name.startswith("_") or hasattr(type(self), name)
+        if not is_there and (meant := cells.meant(name, [*LIVE, "height"])):
+            raise AttributeError(f"lp.Painter has no attribute {name!r}{meant}")
+        super().__setattr__(name, value)
+
     def _assign(self, name: str, value: Any) -> None:
         """Do what somebody sets, or raise where they set it; a callback's wish is done later."""
         if self._is_closed:
@@ -305,7 +321,15 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     # What is told
 
     def observe(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
-        """Have `handler` called with each change; what fails in it is shown, and ends nothing."""
+        """Have `handler` called with each change; what fails in it is shown, and ends nothing.
+
+        Raises PaintError for what cannot be called, and for names that there is nothing of.
+        """
+        if not callable(handler):
+            raise PaintError(f"{handler!r} cannot observe a painter: expected a function")
+        for name in [names] if isinstance(names, str) or names is traitlets.All else names:
+            if name is not traitlets.All and not self.has_trait(name):
+                raise PaintError(f"painter.{name} cannot be observed{cells.meant(name, LIVE)}")
         super().observe(self._callback(handler), names, type)
 
     def unobserve(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:

@@ -4,13 +4,15 @@ import asyncio
 import gc
 import importlib
 import sqlite3
+import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +20,7 @@ from weakref import ref
 
 import numpy as np
 import pytest
+from renderer import REPOSITORY
 
 import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
@@ -28,7 +31,7 @@ from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.settings import Settings
+from lightpaint.settings import Settings, SettingsByName
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
@@ -350,6 +353,42 @@ def test_what_is_said_is_said_in_words_of_a_notebook(
     used.close()
     with pytest.raises(lp.LightpaintError, match="store is 3: expected the path of a file"):
         open_(store=3)
+
+
+def test_names_are_found_and_slips_of_the_pen_are_said(open_: Any) -> None:
+    assert "Painter" in dir(lp)
+    painter = open_()
+    with pytest.raises(AttributeError, match="no attribute 'lightning': did you mean 'lighting'"):
+        painter.lightning = painter.lighting
+    painter.shown_in = "the hall"  # whoever wants may keep something with it
+    with pytest.raises(lp.LightpaintError, match="ligthing cannot be observed: did you mean 'lig"):
+        painter.observe(print, "ligthing")
+    with pytest.raises(lp.LightpaintError, match="hight cannot be observed"):
+        painter.observe(print, ["target", "hight"])
+    with pytest.raises(lp.LightpaintError, match="'told' cannot observe a painter: expected a fun"):
+        painter.observe("told", "lighting")
+
+
+def test_settings_by_name_are_those_there_are() -> None:
+    names = {field.name for field in fields(Settings)} - {"transform"}
+    assert set(SettingsByName.__annotations__) == names
+
+
+@pytest.mark.skipif(find_spec("mypy") is None, reason="mypy")
+def test_type_checkers_know_what_can_be_set(tmp_path: Path) -> None:
+    right = "painter.target = None\npainter.targets = [None]\nassert painter.lighting\n"
+    wrong = "painter.lighting = 3\npainter.target = 'a.exr'\nlp.Painter(basis, heigth=3)\n"
+    text = "import lightpaint as lp\nbasis = lp.read_basis('x')\npainter = lp.Painter(basis)\n"
+    (tmp_path / "script.py").write_text(text + right + wrong)
+    # What mypy has found out of the package before, it need not again.
+    ran = subprocess.run(
+        [sys.executable, "-m", "mypy", tmp_path / "script.py"],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+    )
+    lines = [line.split(":")[1] for line in ran.stdout.splitlines() if ": error:" in line]
+    assert lines == ["7", "8", "9"], ran.stdout
 
 
 class Rendered:
