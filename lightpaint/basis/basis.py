@@ -122,6 +122,8 @@ class Basis(Shown):
             only, since that file may change.
         features: Albedo and normals of what is seen, to denoise pictures by, or None.
         objects: Whose surfaces are seen, or None.
+        source: Path of the file that it was read from, or of the scene that it was rendered of, for
+            people; of memory only.
 
     Examples:
         >>> basis.names
@@ -139,6 +141,7 @@ class Basis(Shown):
     asked: Asked = field(default_factory=Asked)
     features: Features | None = None
     objects: Objects | None = None
+    source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         n = len(self.lights)

@@ -5,6 +5,7 @@ Part k is named after light k and holds its image as R, G, B; docs/formats.md ha
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ def read_basis(path: str | Path) -> Basis:
                 f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
                 "make one with lightpaint basis"
             )
-        return _of_parts(parts, head)
+        return replace(_of_parts(parts, head), source=str(path))
     except BasisError as error:
         raise BasisError(f"{path} {error}") from error
     except _DAMAGES as error:

@@ -13,6 +13,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.views import check_same_lights
@@ -232,15 +233,15 @@ def _subject(
         name = str(scene.path)
         about |= {"scene": scene}
     elif isinstance(given, LightGroups):
-        name = given.basis.origin.scene
+        name = str(given.path)
         about |= {"basis": given.basis, "groups": given}
     elif isinstance(given, Basis):
-        name = given.origin.scene
+        name = given.source or given.origin.scene
         about |= {"basis": given}
     else:
         kind = type(given).__name__
         raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
     if not isinstance(given, Scene):
         check_nothing_idle(settings, given)
-    place = Path(f"{Path(name).stem}.paint") if folder is None else Path(folder)
+    place = Path(f"{called(Path(name))}.paint") if folder is None else Path(folder)
     return Subject(source=name, folder=place.absolute(), **about)

@@ -216,7 +216,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._set_once_there("targets" if cells.is_of_each_view(target) else "target", target)
 
     def __repr__(self) -> str:
-        return f"Painter({self._studio.subjects[0].name})"
+        first, *others = self._studio.subjects
+        its = first.loaded if first.basis is None else first.basis
+        shown = f"{its.size[1]}x{its.size[0]}" if not others else f"{1 + len(others)} views"
+        return f"Painter({first.name}, {len(its.lights)} lights, {shown})"
 
     @property
     def solution(self) -> Solution | None:

@@ -240,6 +240,25 @@ def test_what_is_told_is_of_one_time(
     np.testing.assert_array_equal(told["lighting"].weights_for(basis), before)
 
 
+def test_it_is_called_as_what_is_painted(basis: lp.Basis, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    lp.write_basis("hall.basis.exr", basis)
+    lp.write_basis("annex.basis.exr", basis)
+    side = replace(basis, origin=replace(basis.origin, sensor="side"))
+    for given, said in (
+        (lp.read_basis("hall.basis.exr"), "Painter(hall, 3 lights, 20x12)"),
+        (lp.read_basis("annex.basis.exr"), "Painter(annex, 3 lights, 20x12)"),
+        ([replace(basis, source="hall/scene.xml"), side], "Painter(hall, 3 lights, 2 views)"),
+    ):
+        painter = lp.Painter(given)
+        painter.comm.messages = []
+        assert repr(painter) == said
+        name = said.split("(")[1].split(",")[0]
+        state = Page(painter).say("hello", version=protocol.VERSION)
+        assert (state["scene"], state["folder"]) == (name, str(tmp_path / f"{name}.paint"))
+        painter.close()
+
+
 def test_it_has_room_beside_other_widgets(open_: Any) -> None:
     assert (open_().layout.width, open_().layout.min_width) == ("100%", "320px")
     half = open_(layout={"width": "50%"})

@@ -57,7 +57,8 @@ def obtain_basis(
 
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
-        start = replace(start, lights=basis_lights(scene), asked=scene.asked)
+        lights, source = basis_lights(scene), str(scene.path)
+        start = replace(start, lights=lights, asked=scene.asked, source=source)
     basis = render(
         scene,
         spp=spp,

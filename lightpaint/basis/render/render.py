@@ -245,6 +245,7 @@ def _render_together(
             origin_of(scene, seed, ONE_PASS, halves, passes),
             tracer.guide.learned(),
             scene.asked,
+            source=str(scene.path),
         )
 
     try:
@@ -291,7 +292,8 @@ def _render_one_by_one(
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
         lights = basis_lights(scene)
-        return Basis(lights, images, half_differences, seen, origin, asked=scene.asked)
+        asked, source = scene.asked, str(scene.path)
+        return Basis(lights, images, half_differences, seen, origin, asked=asked, source=source)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

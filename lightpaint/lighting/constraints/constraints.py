@@ -23,7 +23,7 @@ from lightpaint.lighting.constraints.values import (
     primaries_of,
     strength_of,
 )
-from lightpaint.screen import shortly
+from lightpaint.screen import some_of
 
 #: What may be asked of one light.
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")
@@ -79,8 +79,11 @@ class LightConstraint:
                     "of its colours open: lock it at a colour"
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
-        label = ", ".join(described(key, asked[key]) for key in LIGHT_KEYS if key in asked)
-        return cls(lock, "off" in asked, least, most, primaries, label, where)
+        return cls(lock, "off" in asked, least, most, primaries, _label(asked), where)
+
+
+def _label(asked: Mapping[str, Any]) -> str:
+    return ", ".join(described(key, asked[key]) for key in LIGHT_KEYS if key in asked)
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,8 @@ class Constraints:
         >>> lighting = lp.solve(basis, target, constraints=asked).lighting
         >>> np.round(lighting.emission["panel"], 3).tolist()
         [4.0, 3.0, 2.0]
+        >>> lp.Constraints.of({"panel": {"lock": True}, "bulb": {"color": "3200K"}}, sparse=2)
+        Constraints(panel lock; bulb color 3200K; sparse 2)
     """
 
     lights: tuple[tuple[str, Mapping[str, Any], str], ...] = ()
@@ -120,7 +125,12 @@ class Constraints:
     prefer_current: float = 0.0
     sparse: int | None = None
 
-    __repr__ = shortly
+    def __repr__(self) -> str:
+        told = [f"{name} {_label(asked)}" for name, asked, _ in self.lights]
+        told += [f"tie {' + '.join(tie.lights)}" for tie in self.ties]
+        told += [f"prefer_current {self.prefer_current:g}"] if self.prefer_current else []
+        told += [] if self.sparse is None else [f"sparse {self.sparse}"]
+        return f"Constraints({some_of(told, '; ', room=600)})"
 
     def __bool__(self) -> bool:
         return bool(self.lights or self.ties or self.prefer_current or self.sparse is not None)
