@@ -2,12 +2,15 @@
 
 import ast
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import lightpaint as lp
 from lightpaint.cli.parser import command_parser
+from lightpaint.scene.scene import load_scene
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -37,6 +40,31 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
     assert sorted(public - {*lp.__all__, *lp._EXTRAS}) == []
     options = set(re.findall(r"`(--[a-z-]+)(?:[ `=])", text)) - ELSEWHERE
     assert sorted(options - _options()) == []
+
+
+def test_snippets_of_python_run_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    pytest.importorskip("anywidget", reason="anywidget")
+    text = (ROOT / "docs" / "python.md").read_text()
+    snippets = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert len(snippets) > 5
+    for name in ("scenes", "targets"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+
+    def small(path: str) -> lp.Scene:
+        return replace(load_scene(path).reduced("1/4"), spp=2)
+
+    monkeypatch.setattr(lp, "load_scene", small)
+    names: dict[str, Any] = {}
+    try:
+        for snippet in snippets:
+            if "import marimo" not in snippet:  # which keeps states for its own cells only
+                exec(snippet.replace("spp=64", "spp=2"), names)
+    finally:
+        if "painter" in names:
+            names["painter"].close()
 
 
 def test_keys_of_the_painter_are_those_of_its_page():

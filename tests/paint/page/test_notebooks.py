@@ -184,13 +184,24 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
 
 @pytest.mark.skipif(find_spec("marimo") is None, reason="marimo")
 def test_in_marimo(browser: Any, folder: Path) -> None:
-    lines = "".join(f"    {line}\n" for line in [*PAINTER.splitlines(), "painter"])
-    text = f"import marimo\napp = marimo.App()\n\n@app.cell\ndef _():\n{lines}    return\n"
+    state = ["import marimo as mo", "lighting, set_lighting = mo.state(painter.lighting)"]
+    state += ['painter.observe(lambda change: set_lighting(change.new), "lighting")', "painter"]
+    told = ["mo.md(f\"for {lighting().target or 'nothing'}\")"]
+    text = "import marimo\napp = marimo.App()\n"
+    for head, cell, made in (
+        ("", [*PAINTER.splitlines(), *state], "lighting, mo"),
+        ("lighting, mo", told, ""),
+    ):
+        lines = "".join(f"    {line}\n" for line in cell)
+        text += f"\n@app.cell\ndef _({head}):\n{lines}    return {made}\n"
     (folder / "paint.py").write_text(text)
     options = ["--headless", "--no-token", "--host", "127.0.0.1"]
     with served(folder, "marimo", "run", "paint.py", *options) as url, tab(browser) as page:
         page.goto(url)
+        page.get_by_text("for nothing").wait_for()
         paint(page, folder)
+        # Cells that use a state run again when a callback sets it.
+        page.get_by_text("for painting").first.wait_for()
         # The style of the page stays within: marimo shows it in a shadow root.
         styled = page.locator(".lightpaint").evaluate("x => getComputedStyle(x).display")
         assert styled == "grid"
