@@ -34,8 +34,8 @@ Paintable = Basis | Scene | LightGroups | str | Path
 
 #: What errors advise who paints in a folder, or solves, and who paints in a notebook.
 ADVICE = {
-    AFRESH: "choose another file (store=...), or give that one another name",
-    ELSEWHERE: "choose another file (store=...)",
+    AFRESH: "give another file as its store, or give that one another name",
+    ELSEWHERE: "give another file as its store",
     "pass resize=True": "give target.resized((height, width))",
 }
 

@@ -362,7 +362,7 @@ def test_what_is_said_is_said_in_words_of_a_notebook(
         painter.target = large
     painter.target = large.resized(SIZE)
     (tmp_path / "junk.db").write_bytes(b"hello" * 1000)
-    elsewhere = r"choose another file \(store=\.\.\.\)"
+    elsewhere = "give another file as its store"
     with pytest.raises(lp.LightpaintError, match=f"damaged .*: {elsewhere}, or give") as junk:
         open_(store=tmp_path / "junk.db")
     assert not any(word in str(junk.value) for word in ("folder", "new="))
