@@ -10,18 +10,15 @@ import contextvars
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import partial
 from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack
+from typing import Any, Unpack
 from weakref import WeakValueDictionary
 
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.files import first_line
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import write_lighting
@@ -45,6 +42,8 @@ try:
     import ipywidgets
     import traitlets
     from traitlets import ObserveHandler
+
+    from lightpaint.paint.callbacks import Callback, Live
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
@@ -59,9 +58,6 @@ ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
     "constraints": cells.of_constraints,
 }
 
-Told = TypeVar("Told")
-Given = TypeVar("Given")
-
 #: Painters of this process that keep their session in a file, by its path.
 KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
@@ -74,42 +70,6 @@ LAYOUT = {"width": "100%", "min_width": "320px"}
 
 #: How often what callbacks set may make callbacks set something again.
 ROUNDS = 20
-
-
-class Live(traitlets.Any, Generic[Told, Given]):  # type: ignore[misc]
-    """What the session tells with `set_trait`; what is assigned to it is a wish to the session."""
-
-    if TYPE_CHECKING:
-
-        def __get__(self, obj: Any, cls: Any = None) -> Told: ...
-
-    def __set__(self, obj: Any, value: Given) -> None:
-        obj._assign(self.name, value)
-
-
-@dataclass(frozen=True)
-class Callback:
-    """A function that is told of changes: whatever it does, others are told as well.
-
-    warn: hears in one line what failed.
-    """
-
-    handler: Callable[[Any], Any]
-    warn: Callable[[str], None] = field(compare=False)
-
-    def __call__(self, change: Any) -> None:
-        try:
-            self.handler(change)
-        except Exception as error:
-            # From the callback's own line on.
-            traceback.print_exception(error.with_traceback(_after_this(error)))
-            said = f"{type(error).__name__}: {first_line(error)}"
-            self.warn(f"a callback of painter.{change['name']} failed: {said}")
-
-
-def _after_this(error: Exception) -> TracebackType | None:
-    here = error.__traceback__
-    return here and (here.tb_next or here)
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
