@@ -30,7 +30,7 @@ from lightpaint.paint.frames import Message
 from lightpaint.paint.keeping import identity_of
 from lightpaint.paint.launch import subjects_of
 from lightpaint.paint.protocol import Ask, Export, Paint
-from lightpaint.paint.steps import Seen
+from lightpaint.paint.steps import SeenFrom
 from lightpaint.paint.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.scene.scene import load_scene
@@ -76,7 +76,7 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
     )
     identity = identity_of(subjects, {k: its.loaded for k, its in enumerate(subjects)})
     assert identity is not None
-    assert identity.views == (Seen("camera", (10, 12)), Seen("close", (5, 7)))
+    assert identity.views == (SeenFrom("camera", (10, 12)), SeenFrom("close", (5, 7)))
     exported = Event()
     told: list[Message] = []
 

@@ -307,16 +307,20 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._places.tell(Message("say", {"text": text, "tone": "warn"}))
 
     def _now(self) -> dict[str, Any]:
-        """What the session has, by name of what says so."""
+        """What the session has, by name of what says so; what has not changed is the same object.
+
+        An exact answer comes twice, the second time with all that is known of it.
+        """
         moment, lighting = self._studio.now()
         targets = moment.targets
         name = " + ".join(target.name for target in moment.painted_targets)
         if cells.same_paintings(targets, self.targets):
             targets = self.targets
+        lighting = lighting.named(name)
         return {
             "target": targets[0],
             "targets": targets,
-            "lighting": lighting.named(name),
+            "lighting": self.lighting if lighting == self.lighting else lighting,
             "constraints": moment.wishes.constraints(),
         }
 
