@@ -107,12 +107,13 @@ class Studio:
         self._threads.begin(self._writing.watch, "write")
 
     def close(self) -> None:
-        """End; all that was done is kept."""
+        """End; all that was done is kept, also of a stroke whose end was never heard."""
         self._is_open = False
         self._settling.end()
         self._writing.end()
         with self._lock:
             if self._session is not None:
+                self._session.left(with_stroke=True)
                 self._session.store.close()
 
     def wait(self) -> None:

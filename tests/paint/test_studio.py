@@ -130,6 +130,16 @@ def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_pat
     )
 
 
+def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(heard: Heard, tmp_path: Path):
+    arrays = {"image": np.ones((4, 4, 3), np.float32), "importance": np.ones((4, 4), np.float32)}
+    heard.studio.said(protocol.Paint(1, (0, 4, 0, 4), False), arrays)
+    identity = heard.studio.session.store.identity
+    heard.studio.close()
+    with Store.open(tmp_path / "session.db", identity) as store:
+        assert [step.kind for step in store.steps] == ["stroke"]
+        np.testing.assert_array_equal(store.steps[0].patches[0].after.image, arrays["image"])
+
+
 def test_one_export_is_written_at_a_time(heard: Heard, monkeypatch: pytest.MonkeyPatch):
     """Also of what needs no render: they go to the same files."""
     at_work, most = 0, 0

@@ -339,6 +339,22 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     assert not session.wishes.lights
 
 
+def test_a_stroke_is_kept_though_the_page_is_closed_at_once(
+    served: Served, opened: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    me = opened(served).ready().press("0")
+    said = served.studio.said
+
+    def slowly(*given: Any) -> Any:
+        time.sleep(0.3)
+        return said(*given)
+
+    monkeypatch.setattr(served.studio, "said", slowly)
+    me.stroke((60, 30), (80, 30))  # its end waits for the answer to what was said while it went on
+    me.page.goto("about:blank")
+    until(lambda: served.steps == ["brush"], "the stroke is lost")
+
+
 def test_what_is_said_while_nothing_is_painted(served: Served, opened: Any) -> None:
     me = opened(served).ready()
     said, rows = me.page.locator(".headline"), me.page.locator(".lights")

@@ -214,6 +214,8 @@ export class Painter extends Hearers {
   }
 
   close() {
+    this.work.strokes?.hurry();
+    this.work.strokes?.close();
     this.work.loader.close();
     this.screen.close();
     this.element.remove();

@@ -44,6 +44,8 @@ export class Strokes {
     this.waiting = [];
     /** Whether the next patch is of a stroke that the canvas has dropped already. */
     this.isDropping = false;
+    this.leave = () => this.hurry();
+    addEventListener('pagehide', this.leave);
     host.gate = () => this.settled();
     host.on('connection', ({ state }) => this.connected(state === 'open'));
     // Another page has the session: nothing is said to it.
@@ -79,7 +81,20 @@ export class Strokes {
   close() {
     this.isOver = true;
     this.left = [];
+    removeEventListener('pagehide', this.leave);
     this.tell();
+  }
+
+  /** The page goes away: what is done is said now, and nobody waits for the answers. */
+  hurry() {
+    if (!this.isOpen || this.isOver) return;
+    for (const one of this.left) {
+      if ('isDropped' in one) continue;
+      const { stroke, view, cut, label } = one;
+      const fields = { stroke, view, region: cut, done: true, label };
+      // What has been said already is there already.
+      this.host.send('paint', fields, cutOf(one)).catch(() => {});
+    }
   }
 
   /** Whether anything of a stroke is on its way, or will be. */
