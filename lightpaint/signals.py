@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -52,23 +53,29 @@ def _sent_again(came: list[int]) -> Iterator[None]:
     It drops what is raised in a destructor or in the callback of a weak reference, and a signal
     may come just then. came: the signals that have been heard.
     """
-    reported, timers = sys.unraisablehook, []
+    reported, over, is_reporting = sys.unraisablehook, threading.Event(), False
+
+    def send(number: int) -> None:
+        while is_reporting:  # it would be dropped again
+            time.sleep(SOON_S)
+        if not over.wait(SOON_S):
+            os.kill(os.getpid(), number)
 
     def report(dropped: Any) -> None:
+        nonlocal is_reporting
         if not (came and isinstance(dropped.exc_value, KeyboardInterrupt)):
             reported(dropped)
             return
-        timers.append(threading.Timer(SOON_S, os.kill, (os.getpid(), came[-1])))
-        timers[-1].daemon = True
-        timers[-1].start()
+        is_reporting = True
+        threading.Thread(target=send, args=(came[-1],), daemon=True).start()
+        is_reporting = False
 
     sys.unraisablehook = report
     try:
         yield
     finally:
         sys.unraisablehook = reported
-        for timer in timers:
-            timer.cancel()
+        over.set()
 
 
 @contextmanager

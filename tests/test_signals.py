@@ -121,12 +121,19 @@ def test_what_ends_a_process_otherwise_waits_too():
             signal.signal(number, handler)
 
 
+@pytest.mark.parametrize("late_s", [0.0, 0.3])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_what_comes_in_a_destructor_is_not_lost(number: signal.Signals) -> None:
-    """Python drops exceptions that are raised there."""
+def test_what_comes_in_a_destructor_is_not_lost(number: signal.Signals, late_s: float) -> None:
+    """Python drops exceptions that are raised there, and where they are reported.
+
+    late_s: until a thread that is started lets go on whoever has started it, as under load.
+    """
     code = f"""
-import signal, sys, time
+import signal, sys, threading, time
 from lightpaint.signals import hearing
+
+start = threading.Thread.start
+threading.Thread.start = lambda thread: (start(thread), time.sleep({late_s}))
 
 class Ending:
     def __del__(self):
@@ -136,7 +143,7 @@ came = []
 with hearing(came):
     try:
         Ending()
-        time.sleep(20)
+        time.sleep(10)
     except KeyboardInterrupt:
         sys.exit(128 + came[0])
 """
