@@ -114,7 +114,8 @@ class Line:
             client.give_up()  # a task may be at the end of a wait, which swallows the cancelling
             for task in (sending, answering):
                 task.cancel()
-            await asyncio.gather(sending, answering, return_exceptions=True)
+            # Not gathered: whoever gives this wait up would hear of their end, not of its own.
+            await asyncio.wait((sending, answering))
 
     async def resource(self, name: str) -> npt.NDArray[Any]:
         """A picture of the session. Raises PaintError if there is none of that name."""

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from posixpath import dirname, join, normpath
 from typing import Any
@@ -576,6 +577,30 @@ def test_what_was_said_before_the_end_is_done() -> None:
 
     in_a_loop(trial)
     assert strokes_of(session) == [1, 2, 3]
+
+
+def test_a_page_can_be_given_up_at_any_step() -> None:
+    """Whoever gives it up, as a test client does when it leaves, hears of its own word alone."""
+
+    async def given_up_after(steps: int, *, leaves: bool) -> None:
+        its = Line(FakeSession(), None)
+        its.begin()
+        page = client.Client(Scripted(HELLO, leaves=leaves), "a")
+        serving = asyncio.ensure_future(its.serve(page))
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        serving.cancel("given up")
+        try:
+            await serving
+            words: tuple[str, ...] = ("given up",)  # it has ended before
+        except asyncio.CancelledError as heard:
+            words = heard.args
+        assert words == ("given up",), steps
+        await its.end()
+
+    for steps in range(40):
+        for leaves in (False, True):
+            in_a_loop(partial(given_up_after, steps, leaves=leaves))
 
 
 # Pages that are slow
