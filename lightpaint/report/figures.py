@@ -129,7 +129,7 @@ def wipe(looks: list[Picture]) -> str:
     # The verification may be larger than the rest, which the page then enlarges.
     height, width = max(look.pixels.shape[:2] for look in looks)
     # The prediction first: it is the answer, and less noisy than the render that checks it.
-    a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("target", "predicted"))
+    a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("painting", "answer"))
 
     def choices(chosen: int) -> str:
         return "".join(
@@ -187,7 +187,7 @@ def maps(
     figures = [
         figure(
             Picture("Residual", "False-colour map of the residual.", picture),
-            f"Luminance, predicted − target, as rendered{missed.spoken}. Hatched pixels do not "
+            f"Luminance, answer − painting, as rendered{missed.spoken}. Hatched pixels do not "
             "count.",
             signed_scale(missed.limit),
         ),
@@ -207,11 +207,9 @@ def maps(
         figures.append(
             figure(
                 Picture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
-                "Predicted − verified in standard errors, mean of the channels. Noise alone "
+                "Answer − render in standard errors, mean of the channels. Noise alone "
                 "looks like even grain; a shape in it is an error.",
-                scale(
-                    SIGNED, f"−{LIMIT:g} predicted darker", "0", f"predicted brighter +{LIMIT:g}"
-                ),
+                scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
             )
         )
     return "".join(figures)

@@ -149,14 +149,14 @@ def _wipe(
         return Picture(name, alt, both[0], both[1] if looks.is_clean else None)
 
     pictures = [
-        picture("current look", "The scene as it is.", looks.current, raw.current),
+        picture("now", "The scene as it is.", looks.current, raw.current),
         Picture(
-            "target",
-            "The painting. Unpainted pixels are grey, dim and hatched.",
+            "painting",
+            "What was painted. Unpainted pixels are grey, dim and hatched.",
             target_picture(target, solution, looks.current, transform=transform),
         ),
         picture(
-            "predicted",
+            "answer",
             "The solved lighting, as the sum of the basis images.",
             looks.predicted,
             raw.predicted,
@@ -164,7 +164,7 @@ def _wipe(
     ]
     if looks.verified is not None and raw.verified is not None:
         about = "An independent render of the relit scene."
-        pictures.append(picture("verified", about, looks.verified, raw.verified))
+        pictures.append(picture("render", about, looks.verified, raw.verified))
     return wipe(pictures)
 
 

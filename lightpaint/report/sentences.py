@@ -19,6 +19,9 @@ from lightpaint.screen import some_names, some_of
 
 CHANNELS = ("red", "green", "blue")
 
+#: Where nothing is missed.
+MET = "The lights can do what is painted."
+
 #: Shares of the miss, or of a light, that are too small to speak of.
 SMALL = 0.05
 
@@ -159,29 +162,37 @@ def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
 def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     """At most four sentences on why it does not look like the painting, the first first."""
     d = diagnosis
-    if d.missed < 0.01:
-        return ["The lights can do what is painted."]
+    if not (parts := parts_of_miss(d)):
+        return [MET]
     # What is kept has a bound of its own below.
     which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
-    parts = {
-        f"no mix of {which} can reach": d.unreachable,
-        "only light below zero could"
-        if not d.is_constrained
-        else "would need other limits of the lights or light below zero": d.forbidden,
-        "is given up for the other views": d.compromise,
-        "is noise of the basis": d.noise,
-        noise_of_painting(d): d.painting_noise,
+    words = {
+        "unreachable": f"no mix of {which} can reach",
+        "forbidden": "would need other limits of the lights or light below zero"
+        if d.is_constrained
+        else "only light below zero could",
+        "compromise": "is given up for the other views",
+        "noise": "is noise of the basis",
+        "painting_noise": noise_of_painting(d),
     }
-    told = [
-        (d.share(energy), what)
-        for what, energy in sorted(parts.items(), key=lambda item: -item[1])
-        if d.share(energy) >= 0.005
-    ]
-    shares = [f"{spoken_percent(share)} {what}" for share, what in told]
+    shares = [f"{spoken_percent(share)} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
     if d.place is not None and d.share(d.unreachable) >= SMALL:
         sentences.append(spoken_place(d.place))
     return sentences + what_holds(d)
+
+
+def parts_of_miss(diagnosis: Diagnosis) -> dict[str, float]:
+    """Of what is missed the parts that are told, and their shares, the largest first.
+
+    None where the lights make what is painted.
+    """
+    if diagnosis.missed < 0.01:
+        return {}
+    parts = ("unreachable", "forbidden", "compromise", "noise", "painting_noise")
+    shares = {part: diagnosis.share(getattr(diagnosis, part)) for part in parts}
+    told = sorted(shares.items(), key=lambda item: -item[1])
+    return {part: share for part, share in told if share >= 0.005}
 
 
 def what_holds(diagnosis: Diagnosis) -> list[str]:

@@ -14,7 +14,7 @@ from lightpaint.screen import some_names
 #: What is asked beside the painting, as what holds the lights back.
 HOLDING: dict[Held, str] = {
     "hold": "what you did not paint is held as it is",
-    "colors": "lamps keep their colours",
+    "colors": "lamps are not free in their colour",
     "constraints": "some lights are locked, limited or left out",
 }
 
@@ -74,7 +74,7 @@ def _manner(seen: Seen) -> str:
     # It would not be true of the lights where something else holds them.
     return (
         "What else is asked keeps the lights from this"
-        if seen.held
+        if seen.held or _are_kept(seen)
         else ("These lights cannot make this")
     )
 
@@ -96,12 +96,27 @@ def spoken_reason(seen: Seen) -> str:
         return f"{', '.join(most)}, and {last}" if most else last
     if not seen.there:
         return "no light gets there"
-    some, is_one = some_names(seen.there[:2], joint=" and "), len(seen.there) == 1
+    some, is_one = _spoken_some(seen.there)
     if is_darker(seen):
         return f"{some} {'lights' if is_one else 'light'} it too"
     if not seen.does_much:
         return f"{some} {'does' if is_one else 'do'} little there"
-    return f"{some} would light too much else"
+    if _are_kept(seen):
+        its = "is held back by what you ask of it"
+        return f"{some} {its if is_one else 'are held back by what you ask of them'}"
+    free = tuple(name for name in seen.there if name not in seen.kept_there)
+    return f"{_spoken_some(free)[0]} would light too much else"
+
+
+def _are_kept(seen: Seen) -> bool:
+    """Whether no light does much for the place but what something asked of it holds back."""
+    is_short = seen.place is not None and seen.does_much and not is_darker(seen)
+    return is_short and bool(seen.there) and set(seen.there) <= set(seen.kept_there)
+
+
+def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
+    """The first two, and whether there is one only."""
+    return some_names(names[:2], joint=" and "), len(names) == 1
 
 
 def _spoken_views(names: tuple[str, ...]) -> str:

@@ -197,7 +197,7 @@ def write_look(
     write_rgb(path, image)
     picture = path.with_suffix(".png")
     shown = transform.encode(image if clean is None else clean)
-    write_png_16(picture, shown, texts=_texts(transform) | dict(texts or {}))
+    write_png_16(picture, shown, texts=texts_of(transform) | dict(texts or {}))
     return picture
 
 
@@ -259,5 +259,6 @@ def file_names(names: Iterable[str]) -> list[str]:
     return made
 
 
-def _texts(transform: ViewTransform) -> dict[str, str]:
+def texts_of(transform: ViewTransform) -> dict[str, str]:
+    """What a PNG says of the transform that it is shown through."""
     return {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}

@@ -128,15 +128,15 @@ def test_pictures_are_the_display_encoded_images(make_basis: Any):
     result = _result(make_basis)
     looks = _looks(Page(report_page(**result)))
     current = combine(result["basis"], Lighting.present(result["basis"])).image
-    assert list(looks) == ["current look", "target", "predicted", "verified"]
+    assert list(looks) == ["now", "painting", "answer", "render"]
     for name, image in (
-        ("current look", current),
-        ("predicted", result["predicted"].image),
-        ("verified", result["verification"].verified.image),
+        ("now", current),
+        ("answer", result["predicted"].image),
+        ("render", result["verification"].verified.image),
     ):
         np.testing.assert_array_equal(looks[name], to_8_bit(encode_display(image)))
     painted = to_8_bit(encode_display(result["target"].image))[:, :16]
-    np.testing.assert_array_equal(looks["target"][:, :16], painted)
+    np.testing.assert_array_equal(looks["painting"][:, :16], painted)
 
 
 def test_every_picture_has_its_size_and_words(make_basis: Any):
@@ -157,7 +157,7 @@ def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):
     assert all("label" in control["inside"].split() for control in controls)
     assert len(page.all("option")) == 8
     chosen = re.findall(r"selected>([^<]+)<", text)
-    assert chosen == ["target", "predicted"]
+    assert chosen == ["painting", "answer"]
 
 
 def test_names_are_text_whatever_they_are(make_basis: Any):
@@ -198,7 +198,7 @@ def test_a_disagreement_is_loud(make_basis: Any, bias: float):
 def test_without_a_verification(make_basis: Any):
     result = _result(make_basis)
     page = Page(report_page(**{**result, "verification": None}))
-    assert list(_looks(page)) == ["current look", "target", "predicted"]
+    assert list(_looks(page)) == ["now", "painting", "answer"]
     assert len(page.all("option")) == 6
     assert "Not verified" in page.text("header")
     assert "Not checked by a render." in page.text("header")
@@ -273,7 +273,7 @@ def test_a_page_of_usual_size_can_be_mailed(make_basis: Any):
     )
     # Independent noise in every pixel is the worst there is to compress.
     assert len(page) < 7_000_000
-    assert _looks(Page(page))["verified"].shape == (360, 640, 3)
+    assert _looks(Page(page))["render"].shape == (360, 640, 3)
 
 
 def test_another_size_is_refused(make_basis: Any):

@@ -66,8 +66,8 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(5.0, held=("colors", "constraints")),
-            "Part of the way, but the brighter light in the middle is out of reach: lamps keep "
-            "their colours, and some lights are locked, limited or left out.",
+            "Part of the way, but the brighter light in the middle is out of reach: lamps are "
+            "not free in their colour, and some lights are locked, limited or left out.",
         ),
         (
             _seen(5.0, on="figure_hollow"),
@@ -86,8 +86,27 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(5.0, held=("colors", "views"), held_by_views=("a", "b")),
-            "Part of the way, but the brighter light in the middle is out of reach: lamps keep "
-            "their colours, and views a and b ask for other light.",
+            "Part of the way, but the brighter light in the middle is out of reach: lamps are "
+            "not free in their colour, and views a and b ask for other light.",
+        ),
+        (
+            _seen(5.0, there=("lamp", "sun", "sky"), kept_there=("lamp", "sun")),
+            "Part of the way, but the brighter light in the middle is out of reach: sky would "
+            "light too much else.",
+        ),
+        (
+            _seen(14.0, there=("lamp",), kept_there=("lamp",)),
+            "What else is asked keeps the lights from this: in the middle it is painted brighter "
+            "than they make it; lamp is held back by what you ask of it.",
+        ),
+        (
+            _seen(5.0, there=("lamp", "sun"), kept_there=("sun", "lamp")),
+            "Part of the way, but the brighter light in the middle is out of reach: lamp and sun "
+            "are held back by what you ask of them.",
+        ),
+        (
+            _seen(5.0, there=("sky",), kept_there=("sky",), at=((1, 0), DARK, LIT)),
+            "Part of the way, but the darker shade on the left is out of reach: sky lights it too.",
         ),
         (
             Seen(14.0, 0.0, 20.0),

@@ -56,6 +56,7 @@ class Seen:
         there: Lights that get to that place, the one that does most for it first; where there is
             too much light, those that it is from.
         does_much: Whether one of them does much there.
+        kept_there: Those of them that what is asked of them holds back.
         held: What is asked beside the painting and keeps the lights from it.
         held_by_views: Which other views do, where these are among that: their sensors, or paintings
             where they have the same.
@@ -73,6 +74,7 @@ class Seen:
     is_spot: bool = False
     there: tuple[str, ...] = ()
     does_much: bool = True
+    kept_there: tuple[str, ...] = ()
     held: tuple[Held, ...] = ()
     held_by_views: tuple[str, ...] = ()
 
@@ -138,7 +140,9 @@ def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     there, does_much = _lights_at(solution, place)
     if (objects := solution.basis.objects) is not None:
         seen = replace(seen, place=replace(place, object=_object(look, objects, missed, light)))
-    seen = replace(seen, there=there, does_much=does_much)
+    kept = {light.name for light in solution.lighting.lights if light.is_active}
+    kept_there = tuple(name for name in there if name in kept)
+    seen = replace(seen, there=there, does_much=does_much, kept_there=kept_there)
     held, views = held_back_by(solution)
     return replace(seen, held=held, held_by_views=views)
 

@@ -111,6 +111,16 @@ def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: 
     assert seen.held == held
 
 
+def test_lights_that_are_held_back_are_known(make_basis: Any):
+    basis = _left_and_right(make_basis, spill=0.5)
+    target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
+    limits = Constraints.of({"left": {"limits": {"max": 0.21}}})
+    seen = what_is_seen(solve(basis, target, constraints=limits))
+    assert seen.kept_there == ("left",)
+    assert {"left"} < set(seen.there)
+    assert what_is_seen(solve(basis, target)).kept_there == ()
+
+
 def test_a_small_wish_that_is_swallowed_is_not_close(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.9)
     target = _over(_look(basis), (slice(8, 12), slice(4, 8)), 0.415)
