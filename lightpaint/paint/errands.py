@@ -52,6 +52,7 @@ class Errands:
     def __init__(self, place: Home, threads: Threads) -> None:
         self._place, self._threads = place, threads
         self._writes, self._renders = Lock(), Lock()
+        self._seen: dict[int, tuple[int, dict[str, Any]]] = {}  # renders, by view: of which version
         self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
 
     def said(self, message: Asked) -> list[Message]:
@@ -81,6 +82,11 @@ class Errands:
         paths = {sensor: str(painting_of(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, wishes) if paths else ""
 
+    def verified(self, version: int) -> list[dict[str, Any]]:
+        """What the last render of each view has shown, and whether it is of an earlier version."""
+        seen = list(self._seen.values())
+        return [about | {"is_old": its != version} for its, about in seen]
+
     def _subject(self, view: int) -> Subject:
         subjects = self._place.subjects
         if view >= len(subjects):
@@ -97,7 +103,7 @@ class Errands:
 
     def _export(self, message: protocol.Export) -> None:
         # It brings all rooms, of which painting needs a few.
-        from lightpaint.paint.exports import export
+        from lightpaint.paint.exports import OF_PAINTING, export
 
         moment, lighting = self._answer()
 
@@ -107,8 +113,14 @@ class Errands:
 
         with self._writes:
             files = export(self._place.subjects, moment, lighting, message.what, hears)
-        command = self.command(moment.painted_sensors, moment.wishes)
-        fields = {"files": [str(x) for x in files], "command": command}
+        # It is of the paintings that were written now: those of before may be others.
+        is_asked, is_painted = bool(OF_PAINTING & set(message.what)), bool(moment.painted)
+        sensors = moment.painted_sensors if is_asked and is_painted else ()
+        fields = {
+            "files": [str(x.absolute()) for x in files],
+            "command": self.command(sensors, moment.wishes),
+            "is_unpainted": is_asked and not is_painted,
+        }
         self._place.tell(Message("exported", fields))
 
     def _verified(self, asked: protocol.Verify) -> None:
@@ -123,7 +135,7 @@ class Errands:
                 self._verify(asked.view, check)
         except StoppedError:
             if self._wanted is None:  # else a page waits for the next one
-                self._place.tell(Message("progress", {"what": "", "done": 1, "total": 1}))
+                self._place.tell(Message("stopped", {"what": "verify"}))
 
     def _verify(self, view: int, check: Callable[[], None]) -> None:
         """Render the answer in a view. check: raises StoppedError once nobody wants that."""
@@ -141,6 +153,7 @@ class Errands:
         check()
         self._place.put(of_view("verified", view), as_halves(picture))
         about = {"agrees": agrees, "text": said, "view": view}
+        self._seen[view] = moment.version, about
         self._place.tell(Message("verified", about))
 
     def _explain(self, asked: protocol.Explain) -> None:

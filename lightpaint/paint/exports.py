@@ -8,23 +8,32 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.images.denoise import denoised
+from lightpaint.files import write_bytes
+from lightpaint.images.denoise import denoised, how_denoised
+from lightpaint.images.png import png_bytes
 from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.paint.moment import Moment
-from lightpaint.paint.subject import Subject, painting_of
+from lightpaint.paint.subject import Subject, painting_of, picture_of
 from lightpaint.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verify import verify
+from lightpaint.report.looks import Looks
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.own import write_painting
+from lightpaint.target.template import texts_of
 
-#: Files of an export beside the paintings, and the folder of its report.
+#: Files of an export beside paintings and pictures, and the folder of its report.
 LIGHTING, RELIT, ANSWER = "lighting.json", "relit.xml", "answer"
+
+#: What is of a painting, and writes it.
+OF_PAINTING = {"target", "report"}
 
 
 def export(
@@ -36,21 +45,27 @@ def export(
 ) -> list[Path]:
     """Write what is asked for into the folder of the session; returns the files.
 
-    subjects: of all views. Raises PaintError for what there is not, OutputError for what cannot be
-    written.
+    subjects: of all views. Where nothing is painted, what is of a painting is left out. Raises
+    PaintError for what there is not, OutputError for what cannot be written.
     """
+    if not moment.painted:
+        what = [one for one in what if one not in OF_PAINTING]
+        if not what:
+            raise PaintError("nothing is painted yet: there is no painting to write")
     first, folder = subjects[0], subjects[0].folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make {folder}: {error.strerror}") from None
     written = []
-    if "target" in what or "report" in what:
-        if not moment.painted:
-            raise PaintError("nothing is painted yet: there is no painting to write")
+    if set(what) & OF_PAINTING:
         for sensor, target in zip(moment.painted_sensors, moment.painted_targets, strict=True):
             written.append(painting_of(folder, sensor))
             write_painting(written[-1], target)
+    if "picture" in what:
+        for sensor, basis in zip(moment.sensors, moment.bases, strict=True):
+            written.append(picture_of(folder, sensor))
+            write_bytes(written[-1], picture(basis, lighting, moment.transform))
     if "lighting" in what:
         write_lighting(folder / LIGHTING, lighting)
         written.append(folder / LIGHTING)
@@ -62,6 +77,14 @@ def export(
     if "report" in what:
         written += _report(subjects, moment, progress)
     return written
+
+
+def picture(basis: Basis, lighting: Lighting, transform: ViewTransform) -> bytes:
+    """The answer in a view, as pages and reports show it: a PNG, through `transform`, clean."""
+    weights = lighting.weights_for(basis)
+    looks = Looks.clean(basis, weights, basis.mix(weights), None)
+    shown = to_8_bit(transform.encode(looks.predicted))
+    return png_bytes(shown, texts_of(transform) | how_denoised(basis.features, raw="not kept"))
 
 
 def _report(subjects: Sequence[Subject], moment: Moment, progress: Progress) -> list[Path]:

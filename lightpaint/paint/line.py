@@ -150,7 +150,7 @@ class Line:
                 if holder not in (None, client) and not (
                     heard.takes_over or _same_page(holder, client)
                 ):
-                    return [_taken("another tab has this session")]
+                    return [_taken("the painter is open in another tab")]
                 is_back = self._last is client or _same_page(self._last, client)
                 self._give(client)
                 return [await self._done(partial(self.session.greet, is_back=is_back))]

@@ -14,9 +14,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.paint.told import sketched
+from lightpaint.paint.told import why_not_closer
 from lightpaint.paint.wishes import Wishes
-from lightpaint.report.sentences import what_is_missed
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
@@ -26,6 +25,7 @@ class Moment:
     """A session as it was.
 
     version: of the session then. bases, targets: of each view; None where nothing was painted.
+    transform: what was painted through.
     """
 
     version: int
@@ -34,6 +34,7 @@ class Moment:
     wishes: Wishes
     settings: Settings
     constraints: Constraints
+    transform: ViewTransform
 
     @property
     def painted(self) -> tuple[int, ...]:
@@ -44,6 +45,13 @@ class Moment:
     def painted_targets(self) -> tuple[Target, ...]:
         """What was painted in these."""
         return tuple(target for target in self.targets if target is not None)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """By which pictures of all views are told apart; "" of the only one there is."""
+        if len(self.bases) == 1:
+            return ("",)
+        return tuple(basis.origin.sensor for basis in self.bases)
 
     @property
     def painted_sensors(self) -> tuple[str, ...]:
@@ -83,5 +91,4 @@ class Moment:
         shown = transform.encode(self.bases[view].mix(best.weights))
         missed = np.abs(shown - transform.encode(target.image)).max(axis=-1)
         missed = np.where(target.importance > 0, np.clip(missed, 0, 1), 0)
-        said = [sketched(analysis.seen), *what_is_missed(analysis.diagnosis)]
-        return said, np.round(255 * missed).astype(np.uint8)
+        return why_not_closer(analysis), np.round(255 * missed).astype(np.uint8)

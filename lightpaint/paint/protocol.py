@@ -144,14 +144,19 @@ class DropLook:
 
 @dataclass(frozen=True)
 class Export:
-    """Write results to the folder of the session. Answered by `started`, later by `exported`."""
+    """Write results to the folder of the session. Answered by `started`, later by `exported`.
 
-    what: tuple[Literal["target", "lighting", "relit", "report"], ...]
+    what: target: a painting of each painted view; picture: the answer in each view, as it is seen.
+    """
+
+    what: tuple[Literal["target", "picture", "lighting", "relit", "report"], ...]
 
 
 @dataclass(frozen=True)
 class Verify:
-    """Render the answer in a view, or stop that. Answered by `started`, later by `verified`."""
+    """Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
+    `stopped` once nothing is rendered any more.
+    """
 
     run: bool = True
     view: int = 0

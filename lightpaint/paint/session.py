@@ -31,7 +31,7 @@ from lightpaint.paint.pixels import Pixels, Region
 from lightpaint.paint.steps import Step
 from lightpaint.paint.store import Store
 from lightpaint.paint.told import answer_fields, unpainted_fields
-from lightpaint.paint.wishes import Wishes
+from lightpaint.paint.wishes import TITLES, Wishes
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
@@ -136,7 +136,7 @@ class Session:
         """What is painted and asked now."""
         asked, bases = self.answering, tuple(view.basis for view in self.views)
         targets = tuple(self.target(k) for k in range(len(bases)))
-        what = asked.wishes, asked.settings, asked.constraints
+        what = asked.wishes, asked.settings, asked.constraints, self.transform
         return Moment(self.version, bases, targets, *what)
 
     # What is said
@@ -173,8 +173,8 @@ class Session:
                 self._check_names(name for names in message.ties for name in names)
                 return [self._wish("tie", replace(self.wishes, ties=message.ties))]
             case protocol.Set():
-                label = ", ".join(message.values)
-                return [self._wish(label, self.wishes.of_answer(message.values))]
+                wishes = self.wishes.of_answer(message.values)
+                return [self._wish(", ".join(TITLES[key] for key in message.values), wishes)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
     def answer(self, **more: Any) -> Message:

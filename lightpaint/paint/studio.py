@@ -133,7 +133,7 @@ class Studio:
             about: dict[str, Any] = {
                 "version": protocol.VERSION,
                 "scene": first.name,
-                "folder": str(first.folder),
+                "folder": str(first.folder.absolute()),
                 "can_render": self.renders,
                 "can_report": self.renders or len(self.subjects) == 1,
             }
@@ -328,6 +328,7 @@ class Studio:
                 "wanted": wanted or basis.origin.spp,
                 "done": wanted is None or basis.origin.spp >= wanted,
             },
+            "verified": self._errands.verified(session.version),
             "first": not session.store.steps,
             "stroke": session.stroke,
             "command": self._errands.command(sensors, session.wishes),

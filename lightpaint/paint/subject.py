@@ -160,3 +160,8 @@ def sensor_of(scene: Scene | Known) -> str:
 def painting_of(folder: Path, sensor: str) -> Path:
     """Where the painting of a view goes among exports. sensor: "" of the only one."""
     return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
+
+
+def picture_of(folder: Path, sensor: str) -> Path:
+    """Where the answer in a view goes, as it is seen. sensor: "" of the only one."""
+    return folder / (f"answer-{sensor}.png" if sensor else "answer.png")

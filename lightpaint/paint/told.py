@@ -13,7 +13,14 @@ from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.held_back import Held
 from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.report.sentences import spoken_errors, spoken_percent, what_holds
+from lightpaint.report.sentences import (
+    MET,
+    parts_of_miss,
+    spoken_errors,
+    spoken_percent,
+    spoken_place,
+    what_holds,
+)
 from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
 #: Distance from Planck's locus up to which a colour is called white, and part of the present light
@@ -30,11 +37,24 @@ WAYS = (
     (0.0, "A first step"),
 )
 
-#: What to do about what holds the lights.
+#: The same of an answer that is no closer to the paint than the present look.
+NOT_YET = "No closer than it is now"
+
+#: What to do about what holds the lights; a page has a button for each.
 HELP: dict[Held, str] = {
     "hold": "Paint what may change too, or let it go.",
-    "colors": "The settings give them any colour.",
+    "colors": "The settings allow any colour.",
 }
+
+#: Why something is missed, for who paints it; and where something is asked of the lights.
+PARTS = {
+    "unreachable": "no setting of these lights reaches",
+    "forbidden": "would need a light to be darker than off",
+    "compromise": "is given up for the other views",
+    "noise": "is grain of the samples (more of them take it away)",
+    "painting_noise": "is finer than light can be here: grain, edges and texture of the paint",
+}
+ASKED = {"forbidden": "would need lights of other colours or levels than they may have"}
 
 
 def light_fields(light: BasisLight) -> dict[str, Any]:
@@ -114,7 +134,7 @@ def unpainted_fields(*, is_asked: bool) -> dict[str, Any]:
     """
     stay = "the lights stay as they are, but for what you ask of them"
     said = f"Nothing is painted: {stay if is_asked else 'the answer is the present lighting'}."
-    return {"headline": said, "of_views": None}
+    return {"headline": said, "help": None, "of_views": None}
 
 
 def sketched(seen: Seen) -> str:
@@ -125,13 +145,38 @@ def sketched(seen: Seen) -> str:
     if seen.is_close:
         return headline(seen)
     far = next(words for least, words in WAYS if seen.share_met >= least)
-    said = f"{far}, {spoken_percent(seen.share_met)}"
+    said = f"{far}, {spoken_percent(seen.share_met)}" if seen.share_met else NOT_YET
     if seen.place is None:
         return f"{said}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one is told when that has been seen to.
     first = replace(seen, held=seen.held[:1])
     told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
-    return " ".join([told, *(HELP[its] for its in first.held if its in HELP)])
+    helps = helped(seen)
+    return told if helps is None else f"{told} {HELP[helps]}"
+
+
+def why_not_closer(analysis: Analysis) -> list[str]:
+    """At most four sentences on what keeps the lights from what somebody paints.
+
+    Where it is missed most, `sketched` says: it stands below the pictures anyway.
+    """
+    seen, found = analysis.seen, analysis.diagnosis
+    if not (parts := parts_of_miss(found)):
+        return [MET]
+    problem = analysis.solution.problem
+    words = PARTS | (ASKED if problem.asks or problem.fit.colors != "free" else {})
+    shares = ", ".join(f"{spoken_percent(share)} {words[part]}" for part, share in parts.items())
+    said = [f"Of what is missed (great misses count most), {shares}."]
+    if seen.place is None and found.place is not None:
+        said.append(spoken_place(found.place))
+    return said + what_holds(found)
+
+
+def helped(seen: Seen) -> Held | None:
+    """Which of HELP `sketched` advises, if it does."""
+    if seen.is_close or seen.place is None or not seen.held:
+        return None
+    return seen.held[0] if seen.held[0] in HELP else None
 
 
 def _seen_fields(analysis: Analysis) -> dict[str, Any]:
@@ -139,6 +184,7 @@ def _seen_fields(analysis: Analysis) -> dict[str, Any]:
     seen = analysis.seen
     return {
         "headline": sketched(seen),
+        "help": helped(seen),
         "delta_e": seen.delta_e,
         "delta_e_asked": seen.asked,
         "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],

@@ -13,6 +13,16 @@ from lightpaint.settings import Settings
 #: What may be asked of the answer: of its fit, and of all lights together.
 OF_FIT, OF_ALL = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
 
+#: What people know them by: the titles that the page's settings have.
+TITLES = {
+    "hold": "What you did not paint",
+    "space": "What counts as close",
+    "colors": "Which colours lamps may have",
+    "literal": "How the paint is meant",
+    "prefer_current": "Lights that hardly help",
+    "sparse": "How many lights may be on",
+}
+
 
 @dataclass(frozen=True)
 class Wishes:
@@ -46,7 +56,9 @@ class Wishes:
         """With these values, None for what follows from the painting. Raises PaintError."""
         if unknown := [key for key in values if key not in (*OF_FIT, *OF_ALL)]:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
-        kept = {k: v for k, v in ({**self.values, **values}).items() if v not in (None, False)}
+        # Not by `in`: 0 lets go of what is held, and equals False.
+        both = {**self.values, **values}
+        kept = {k: v for k, v in both.items() if v is not None and v is not False}
         return replace(self, values=kept)
 
     @classmethod

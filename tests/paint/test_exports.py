@@ -1,14 +1,17 @@
 """What a session leaves for others: where it lies, and where not."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from renderer import write_room
 
 import lightpaint as lp
+from lightpaint.images.denoise import denoised
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.paint.exports import verified
+from lightpaint.paint.exports import picture, verified
 from lightpaint.paint.launch import subject_of
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile
@@ -32,3 +35,23 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     assert all(files == there for files in seen)
     assert "A render of 4 samples per pixel" in said
     np.testing.assert_allclose(picture.mean(), 2 * basis.present_look.mean(), rtol=0.1)  # noise
+
+
+@pytest.mark.parametrize("transform", [lp.ViewTransform("srgb", 1.5), lp.ViewTransform("agx")])
+def test_a_picture_of_the_answer_is_what_the_view_shows(
+    tmp_path: Path, make_basis: Any, transform: lp.ViewTransform
+) -> None:
+    """Read back through that view, which it names, it is the answer's light."""
+    y, x = np.mgrid[:9, :16] / 16
+    images = np.stack([np.stack([y + 0.1, x + 0.1, 0.3 + 0 * x], -1), np.full((9, 16, 3), 0.2)])
+    basis = make_basis(images=images, emission=np.ones((2, 3)))
+    lighting = Lighting.of_weights(basis, np.array([[0.5, 0.4, 0.3], [0.2, 0.2, 0.6]]))
+    path = tmp_path / "answer.png"
+    path.write_bytes(picture(basis, lighting, transform))
+    shown = np.asarray(Image.open(path)) / 255
+    answered = lp.combine(basis, lighting).image
+    clean = denoised(answered, basis.features)
+    np.testing.assert_allclose(shown, transform.encode(clean), atol=0.5 / 255 + 1e-6)  # 8 bits
+    again = lp.read_target(path)
+    assert again.transform == transform
+    np.testing.assert_allclose(transform.encode(again.image), shown, atol=1e-3)

@@ -1,5 +1,6 @@
 """Whatever is done in a session, and in whichever order, equals what is built from scratch."""
 
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from renderer import REPOSITORY
 
 import lightpaint as lp
 from lightpaint.basis.basis import BasisLight, Origin
+from lightpaint.cli.spelling import options_of
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
@@ -18,7 +21,7 @@ from lightpaint.paint.pixels import Pixels
 from lightpaint.paint.session import Session
 from lightpaint.paint.steps import Identity
 from lightpaint.paint.store import MemoryStore
-from lightpaint.paint.wishes import Wishes
+from lightpaint.paint.wishes import OF_ALL, OF_FIT, TITLES, Wishes
 from lightpaint.settings import Settings
 
 SIZE = (18, 32)
@@ -329,6 +332,27 @@ def test_a_slider_that_is_being_moved_is_in_nothing_else(
     for session in sessions:
         session.said(*paint(2, (4, 9, 3, 9), 0.5))
     assert slid.wishes == still.wishes
+
+
+def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
+    session = session_of(basis)
+    usual = session.about["meant"]["hold"]
+    assert usual > 0
+    session.said(protocol.Set({"hold": 0}), {})
+    assert session.about["meant"]["hold"] == session.moment().settings.hold == 0
+    assert options_of(session.wishes) == ["--hold 0"]
+    assert session.about["history"]["undo"] == ["What you did not paint"]
+    session.said(protocol.Set({"hold": None}), {})
+    assert session.about["meant"]["hold"] == usual
+    session.said(protocol.Undo(), {})
+    assert session.about["settings"] == {"hold": 0}
+
+
+def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
+    page = REPOSITORY / "lightpaint" / "paint" / "page" / "ui" / "settings.js"
+    shown = re.findall(r'<\$\{Row\} title="([^"]+)"', page.read_text("utf-8"))
+    assert list(TITLES.values()) == shown
+    assert set(TITLES) == {*OF_FIT, *OF_ALL}
 
 
 def test_who_leaves_in_the_middle_leaves_a_stroke_and_no_slider(basis: lp.Basis):

@@ -169,7 +169,9 @@ def test_killed_at_any_moment_all_that_was_acknowledged_is_there(tmp_path: Path)
             heard = "".join(process.stdout.readline() for _ in range(chance.randrange(3, 12)))
             time.sleep(chance.uniform(0, 0.02))  # in the middle of whatever comes next
             process.kill()
-            said = [line.split() for line in (heard + process.stdout.read()).splitlines()]
+            # It may have been killed in the middle of a line.
+            lines = (heard + process.stdout.read()).splitlines(keepends=True)
+            said = [line.split() for line in lines if line.endswith("\n")]
         acknowledged = [int(words[1]) for words in said if words[0] == "step"]
         looks = {int(words[1]) % 7: int(words[1]) for words in said if words[0] == "look"}
         with Store.open(path, IDENTITY) as store:

@@ -105,10 +105,11 @@ def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_pat
     heard.studio.said(protocol.Ask(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
     heard.studio.said(protocol.Set({"colors": "free"}), {})
     exact = heard.exact()
-    heard.studio.said(protocol.Export(("target", "lighting")), {})
+    heard.studio.said(protocol.Export(("target", "picture", "lighting")), {})
     exported = heard.wait(lambda m: m.kind == "exported")
     assert set(exported.fields["files"]) == {
         str(tmp_path / "painting.exr"),
+        str(tmp_path / "answer.png"),
         str(tmp_path / "lighting.json"),
     }
     words = exported.fields["command"]
@@ -128,6 +129,19 @@ def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_pat
     np.testing.assert_allclose(
         [emission[name] for name in basis.names], exact.arrays["weights"], rtol=1e-12
     )
+    heard.messages.clear()
+    heard.studio.said(protocol.Export(("lighting",)), {})
+    assert heard.wait(lambda m: m.kind == "exported").fields["command"] == ""
+
+
+def test_what_is_not_of_a_painting_is_exported_without_one(heard: Heard, tmp_path: Path):
+    heard.studio.said(protocol.Export(("target", "picture", "lighting", "report")), {})
+    exported = heard.wait(lambda m: m.kind == "exported").fields
+    files = [str(tmp_path / "answer.png"), str(tmp_path / "lighting.json")]
+    assert exported == {"files": files, "command": "", "is_unpainted": True}
+    heard.studio.said(protocol.Export(("target",)), {})
+    said = heard.wait(lambda m: m.kind == "say" and "nothing is painted" in m.fields["text"])
+    assert said.fields["what"] == "export"
 
 
 def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(heard: Heard, tmp_path: Path):
@@ -465,7 +479,7 @@ def with_scenes(
 
 def is_stopped(message: Message) -> bool:
     """Whether it says that a render has been stopped."""
-    return message.kind == "progress" and not message.fields["what"]
+    return message.kind == "stopped" and message.fields["what"] == "verify"
 
 
 def test_a_verifying_render_can_be_stopped(with_scenes: tuple[Heard, Renders]):
@@ -481,6 +495,11 @@ def test_a_verifying_render_can_be_stopped(with_scenes: tuple[Heard, Renders]):
     renders.is_enough.set()
     assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
     assert heard.studio.resource("verified@1").shape == (*SIZE, 3)
+    # A page that begins anew is told of it, and whether the answer is another one since.
+    about = {"agrees": True, "text": "A render confirms it.", "view": 1}
+    assert heard.studio.state().fields["verified"] == [about | {"is_old": False}]
+    heard.paint(1, 0.8)
+    assert heard.studio.state().fields["verified"] == [about | {"is_old": True}]
 
 
 def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
@@ -587,10 +606,12 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     studio.said(protocol.Explain(1), {})
     assert heard.wait(lambda m: m.kind == "explained").fields["view"] == 1
     assert studio.resource("beyond@1").shape == (10, 16)
-    studio.said(protocol.Export(("target", "lighting")), {})
+    studio.said(protocol.Export(("target", "picture", "lighting")), {})
     exported = heard.wait(lambda m: m.kind == "exported").fields
     files = [tmp_path / f"painting-{name}.exr" for name in names]
-    assert exported["files"] == [*map(str, files), str(tmp_path / "lighting.json")]
+    pictures = [tmp_path / f"answer-{name}.png" for name in names]
+    assert exported["files"] == [*map(str, files + pictures), str(tmp_path / "lighting.json")]
+    assert [lp.read_target(path).image.shape[:2] for path in pictures] == [x.size for x in both]
     targets = [f"--target {name}={file}" for name, file in zip(names, files, strict=True)]
     assert " ".join(targets) in exported["command"]
     solution = correct_noise(lp.solve(both, [lp.read_target(file) for file in files]))
