@@ -108,13 +108,39 @@ def test_fill_is_one_object(page: Any):
 
 
 def test_the_eraser_brings_the_present_look_back(page: Any):
-    fill = stroke("tool: 'fill', rgb: [3, 3, 3]", place(1, 1))
+    spot = stroke("size: 50, rgb: [3, 3, 3]", place(40, 32))
     again = "{" + stroke("tool: 'eraser', size: 30", place(40, 32)) + "}"
-    image, importance = painted(page, "{" + fill + "}" + again, light=0.25)
+    image, importance = painted(page, "{" + spot + "}" + again, light=0.25)
     assert importance[32, 40] == 0
     np.testing.assert_array_equal(image[32, 40], 0.25)
-    np.testing.assert_array_equal(image[0, 0], 3)
+    np.testing.assert_array_equal(image[32, 20], 3)
     np.testing.assert_array_equal(image[importance == 0], 0.25)
+
+
+@pytest.mark.parametrize("mired", [0, 60])
+def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mired: int):
+    """And no daylight into a night."""
+    all_ = f"hand.askFor(canvas, {{ stops: -2, mired: {mired}, object: null }});"
+    path = stroke("rgb: [3, 1, 1], size: 16", place(30, 30), place(50, 30))
+    erase = stroke("tool: 'eraser', size: 30", place(30, 30), place(60, 30))
+    alone, counts = painted(page, all_, light=0.5)
+    image, importance = painted(page, all_ + "{" + path + "}{" + erase + "}", light=0.5)
+    np.testing.assert_allclose(image[25:35, 25:60], alone[25:35, 25:60], rtol=2e-3)  # halves
+    np.testing.assert_array_equal(importance[25:35, 25:60], 1)
+    assert counts.min() == 1
+
+
+def test_on_a_patchwork_the_eraser_brings_the_present_look_back(page: Any):
+    """All is painted, but not alike: nothing lies below it."""
+    objects = np.tile(np.arange(W) // 10, (H, 1))
+    fills = "".join(
+        "{" + stroke(f"tool: 'fill', rgb: [{k}, 1, 1]", place(10 * k + 0.5, 1)) + "}"
+        for k in range(8)
+    )
+    erase = stroke("tool: 'eraser', size: 30", place(30, 30), place(60, 30))
+    image, importance = painted(page, fills + "{" + erase + "}", light=0.5, objects=objects)
+    np.testing.assert_array_equal(image[30, 30:50], 0.5)
+    np.testing.assert_array_equal(importance[30, 30:50], 0)
 
 
 def test_the_importance_brush_leaves_light_alone(page: Any):
@@ -123,6 +149,43 @@ def test_the_importance_brush_leaves_light_alone(page: Any):
     image, importance = painted(page, "{" + fill + "}" + again)
     assert (importance[32, 40], importance[0, 0]) == (0.25, 1)
     np.testing.assert_array_equal(image, np.tile([3.0, 2, 1], (H, W, 1)))
+
+
+def test_the_importance_brush_goes_by_what_counts_already(page: Any):
+    """Accents on a picture of which all is painted count 10: more of that is more."""
+    path = stroke("rgb: [1, 1, 1], size: 8", place(30, 30), place(50, 30))
+    more = stroke("tool: 'weight', importance: 4, size: 8", place(40, 30))
+    all_ = "hand.askFor(canvas, { stops: -1, mired: 0, object: null });"
+    _, importance = painted(page, all_ + "{" + path + "}{" + more + "}{" + more + "}", light=0.5)
+    assert importance[30, 40] == 160
+    assert importance[30, 31] == 10
+    # What is not painted is kept as it is, as a stroke would be; and never is anything forgotten.
+    _, importance = painted(page, more, light=0.5)
+    assert importance[30, 40] == 4
+    less = more.replace("importance: 4", "importance: 0.1")
+    image, importance = painted(page, "{" + path + "}" + f"{{{less}}}" * 5, light=0.5)
+    assert 0 < importance[30, 40] < 0.1
+    assert image[30, 40, 0] == 1
+
+
+def test_what_counts_less_is_never_more(page: Any):
+    """Not at the soft end of a stroke either, of which hardly anything is left."""
+    soft = stroke("rgb: [1, 1, 1], size: 40, hardness: 0, flow: 0.02", place(40, 32))
+    less = stroke("tool: 'weight', importance: 0.1, size: 60", place(40, 32))
+    _, before = painted(page, "{" + soft + "}")
+    _, after = painted(page, "{" + soft + "}{" + less + "}")
+    is_there = before > 0
+    assert (before[is_there] < 0.01).any()
+    assert (after[is_there] <= before[is_there]).all()
+
+
+def test_how_much_something_counts_has_an_end(page: Any):
+    """Also where it becomes an accent on all that is asked for: what is more, a session refuses."""
+    dot = f"canvas.importance[{10 * W + 10}] = 1000;"
+    all_ = "hand.askFor(canvas, { stops: -1, mired: 0, object: null });"
+    _, importance = painted(page, dot + all_, light=0.5)
+    assert importance[10, 10] == 1000
+    assert importance[40, 40] == 1
 
 
 def test_a_drag_asks_for_stops_and_keeps_luminance(page: Any):
@@ -174,6 +237,23 @@ def test_strokes_over_what_was_asked_of_all_count_more_than_it(page: Any):
     np.testing.assert_allclose(rest.sum() / its.sum(), 3, rtol=1e-6)
     # Where something is not painted, that is held, and paint counts as it is.
     assert painted(page, path, light=0.5)[1].max() == 1
+
+
+def test_strokes_before_all_is_asked_stay_accents(page: Any):
+    """The rest had counted three times what they did, as it was held; so it does now."""
+    path = stroke("rgb: [1, 1, 1], size: 16", place(30, 30), place(50, 30))
+    all_ = "hand.askFor(canvas, { stops: -1, mired: 0, object: null });"
+    before = painted(page, path, light=0.5)[1]
+    image, importance = painted(page, "{" + path + "}" + all_, light=0.5)
+    accent = before == 1
+    np.testing.assert_allclose([image[30, 40, 0], image[5, 70, 0]], [0.5, 0.25], rtol=1e-6)
+    assert importance[5, 70] == 1
+    expected = (1 - before.mean()) / (3 * before.mean())
+    assert 1 < expected < 10
+    np.testing.assert_allclose(importance[accent], expected, rtol=1e-6)
+    # Once: what is asked of all again changes no importance.
+    again = painted(page, "{" + path + "}" + all_ + all_, light=0.5)[1]
+    np.testing.assert_array_equal(again, importance)
 
 
 @pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "ask"])

@@ -201,8 +201,43 @@ def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
     assert light == 0.125
 
 
+@pytest.mark.parametrize("stops", [0.0, -1.3])
+def test_paint_is_shown_beside_its_colour_as_the_pictures_show_it(run: Any, stops: float):
+    light = [0.02, 0.4, 3.0]
+    got = run(f"return engine.codes({light}, {stops});")
+    want = ViewTransform("srgb", stops).encode(np.array(light)) * 255
+    np.testing.assert_allclose(got, want, atol=0.75)  # rounded, from a table
+
+
+@pytest.mark.parametrize("view", ["cpu", "gl"])
+def test_what_is_picked_paints_the_same(run: Any, view: str):
+    """As light it is what falls there, and not what comes back of it."""
+    picked, look, on_black = run(
+        """
+        const { canvas } = engine.work;
+        canvas.albedo = new Uint16Array(W * H * 3).fill(0x3400);  // a quarter
+        canvas.albedo.fill(0, 0, 3);
+        engine.use({ ...use, as: "light" });
+        engine.begin(at(10, 10)); engine.end();
+        const picked = [engine.paintAt("painting", 10, 10), engine.lightAt("painting", 10, 10)];
+        const black = engine.paintAt("painting", 0, 0);
+        engine.use(use);
+        return [...picked, [black, engine.paintAt("painting", 0, 0)]];
+        """,
+        view,
+    )
+    np.testing.assert_allclose(picked, [1, 0.5, 0.25], rtol=1e-3)
+    np.testing.assert_allclose(look, [0.25, 0.125, 0.0625], rtol=1e-3)
+    np.testing.assert_allclose(on_black, np.outer([12.5, 0.25], [1, 1, 1]), rtol=1e-3)
+
+
 def test_what_is_pointed_at(run: Any, site: Any):
-    found, outside = run("return [engine.pointed(25.7, 8.1), engine.pointed(-1, 3)];")
+    found, outside, (data, shape) = run(
+        "const { data, width, height } = engine.objects();"
+        " return [engine.pointed(25.7, 8.1), engine.pointed(-1, 3), [[...data], [height, width]]];"
+    )
+    np.testing.assert_array_equal(np.reshape(data, shape), site.arrays["objects"])
+    assert found["index"] == site.arrays["objects"][8, 25]
     levels = [
         np.float64(site.arrays[f"plane/{k}"][8, 25])
         * 2**k

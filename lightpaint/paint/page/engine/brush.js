@@ -93,7 +93,7 @@ export function fill(canvas, object, flow) {
 /** Cover everything. @param {PaintCanvas} canvas @returns {Region} */
 export function flood(canvas) {
   canvas.cover(canvas.whole, () => 1);
-  canvas.covers(1);
+  canvas.coversAll();
   return canvas.whole;
 }
 

@@ -22,10 +22,14 @@ const TILE = 64;
 /** Importance below which a pixel is not painted. */
 const DUST = 1e-3;
 
-/** Importance of the rest of a picture beside that of a stroke, and of a stroke over a pixel that
- * was painted, at most: that makes up for a stroke over a thirtieth of the picture. */
+/** Importance of the rest of a picture beside that of a stroke, and by how much at most a stroke
+ * counts more than the rest: that makes up for a stroke over a thirtieth of the picture. */
 const REST = 3;
 const OVER = 10;
+
+/** By how much what covers that part of a picture counts more than the rest of it, where all is
+ * painted. @param {number} part */
+const accent = (part) => Math.min(OVER, Math.max(1, (1 - part) / (REST * part)));
 
 /** What halves can hold, so that both views can show it. */
 const MOST = 65504;
@@ -51,6 +55,8 @@ export class PaintCanvas {
     this.region = null;
     /** Importance of what the stroke paints. */
     this.full = 1;
+    /** By how much what was painted before it counts more than it did. */
+    this.lift = 1;
   }
 
   /** @returns {Region} */
@@ -73,6 +79,7 @@ export class PaintCanvas {
     this.tiles = new Map();
     this.region = null;
     this.isAll = this.importance.every((x) => x >= 1);
+    this.lift = 1;
     this.covers(0);
   }
 
@@ -82,7 +89,17 @@ export class PaintCanvas {
    * is not, of which the rest is held. @param {number} part
    */
   covers(part) {
-    this.full = this.isAll ? Math.min(OVER, Math.max(1, (1 - part) / (REST * part))) : 1;
+    this.full = this.isAll ? accent(part) : 1;
+  }
+
+  /**
+   * The stroke covers all: what was painted before it is not to get lost in that, but to come about
+   * as it did while the rest was held.
+   */
+  coversAll() {
+    const painted = this.importance.reduce((sum, x) => sum + x, 0);
+    this.lift = this.isAll ? 1 : accent(painted / this.importance.length);
+    this.covers(1);
   }
 
   /** Cover pixels with the stroke.

@@ -9,7 +9,7 @@ import { VALUES, finite, toFloats } from './half.js';
 import { Layer } from './layer.js';
 import { SRGB } from './lut.js';
 import { Mix } from './mix.js';
-import { INKS, falseColour, fullOf, inked, missed } from './overlay.js';
+import { INKS, falseColour, fullOf, inkOf, inked, missed } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
 
 /** @typedef {import("./view.js").Kind} Kind */
@@ -137,9 +137,10 @@ export class CpuView {
     const isImportance = kind === 'painting' && params.overlay === 'importance';
     if (isImportance && layer.stale) layer.forget();
     layer.show(this.lut, params.stops, isImportance ? 'importance' : falseOnly(params), (rgba) => {
+      if (!isImportance) return falseColour(rgba, layer.light, 2 ** params.stops);
       const { importance } = this;
-      if (isImportance) inked(rgba, importance, fullOf(importance), INKS.importance, this.grid(1));
-      else falseColour(rgba, layer.light, 2 ** params.stops);
+      const full = fullOf(importance);
+      inked(rgba, (p) => inkOf(importance[p], full), INKS.importance, this.grid(1));
     });
     return layer;
   }
@@ -159,7 +160,7 @@ export class CpuView {
     layer.show(this.lut, params.stops, wants === 'importance' ? null : wants, (rgba) => {
       const grid = this.grid(this.step);
       if (wants === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops);
-      else if (wants === 'beyond' && beyond) inked(rgba, beyond, 255, INKS.beyond, grid);
+      else if (wants === 'beyond' && beyond) inked(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
       else if (painting) missed(rgba, painting, this.importance, grid);
     });
     if (isOther) this.pace = (performance.now() - started) * this.step ** 2;

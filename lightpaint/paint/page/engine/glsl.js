@@ -131,7 +131,7 @@ void main() {
   } else if (overlay == 2) {
     display = missed(display, at);
   } else if (overlay == 3) {
-    float amount = clamp(texelFetch(painting, at, 0).a / full, 0.0, 1.0) * 0.8;
+    float amount = min(log(1.0 + max(texelFetch(painting, at, 0).a, 0.0)) / log(1.0 + full), 1.0) * 0.8;
     display = lay(display, ${vec3(INKS.importance)}, amount * hatch(at, 1));
   } else if (overlay == 4) {
     float amount = texelFetch(beyond, at, 0).r * 0.8;

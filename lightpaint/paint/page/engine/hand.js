@@ -3,6 +3,7 @@
  */
 import { Path, fill, flood, stamp } from './brush.js';
 import { warmer } from './colour.js';
+import { groundOf } from './ground.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./effects.js").Effect} Effect */
@@ -12,9 +13,9 @@ import { warmer } from './colour.js';
 /** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'ask'} Tool */
 
 /**
- * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: what the
- * importance brush paints. about: whether a drag asks at a soft spot of that size, or of the
- * object under it; a spot, where that is not said.
+ * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: how many
+ * times as much as before counts what the importance brush goes over. about: whether a drag asks at
+ * a soft spot of that size, or of the object under it; a spot, where that is not said.
  * @typedef {{tool: Tool, rgb: RGB, as: 'light' | 'look', size: number, hardness: number,
  *   flow: number, importance: number, about?: 'spot' | 'object'}} Use */
 
@@ -61,11 +62,11 @@ export class Stroke {
     this.use = use;
     this.start = point;
     this.scale = scale;
-    this.effect = effectOf(use);
+    canvas.begin();
+    this.effect = effectOf(canvas, use);
     this.path = new Path(canvas, use);
     /** What a drag asks for. */
     this.asked = { stops: 0, mired: 0 };
-    canvas.begin();
   }
 
   /** @returns {Region[]} */
@@ -132,10 +133,10 @@ export function askFor(canvas, { stops, mired, object }) {
   return region;
 }
 
-/** @param {Use} use @returns {Effect} */
-function effectOf(use) {
-  if (use.tool === 'eraser') return { kind: 'erase' };
-  if (use.tool === 'weight') return { kind: 'weigh', importance: use.importance };
+/** @param {PaintCanvas} canvas @param {Use} use @returns {Effect} */
+function effectOf(canvas, use) {
+  if (use.tool === 'eraser') return { kind: 'erase', ground: groundOf(canvas) };
+  if (use.tool === 'weight') return { kind: 'weigh', times: use.importance };
   if (use.tool === 'ask') return asking(0, 0);
   return { kind: 'paint', rgb: use.rgb, as: use.as };
 }

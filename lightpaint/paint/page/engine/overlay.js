@@ -96,13 +96,14 @@ export function fullOf(importance) {
   return full;
 }
 
-/** @param {Uint8ClampedArray} rgba changed @param {ArrayLike<number>} amounts (h, w)
- * @param {number} most what stands for all @param {number[]} ink @param {Grid} grid */
-export function inked(rgba, amounts, most, ink, grid) {
-  each(grid, (at, x, y, p) => {
-    const amount = Math.min(1, Math.max(0, amounts[p] / most)) * 0.8;
-    lay(rgba, at, ink, amount * hatch(x, y, 1));
-  });
+/** Part of all ink for an importance, by ratios: beside an accent that counts ten times as much, the
+ * rest is to be seen, too. @param {number} x @param {number} most that is all */
+export const inkOf = (x, most) => Math.log1p(Math.max(0, x)) / Math.log1p(most);
+
+/** @param {Uint8ClampedArray} rgba changed @param {(p: number) => number} amount of ink at a pixel
+ * @param {number[]} ink @param {Grid} grid */
+export function inked(rgba, amount, ink, grid) {
+  each(grid, (at, x, y, p) => lay(rgba, at, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)));
 }
 
 /** @param {Uint8ClampedArray} rgba changed @param {Float32Array} light (…, 3)

@@ -5,9 +5,12 @@
  * what the session says of pixels and weights.
  */
 import { luminance } from './colour.js';
+import { VALUES } from './half.js';
 import { FIRST, LABELS, Stroke, askFor } from './hand.js';
 import { Hearers, SocketHost } from './host.js';
 import { union } from './layer.js';
+import { Encoder } from './lut.js';
+import { fullOf } from './overlay.js';
 import { Screen } from './screen.js';
 import { at, zoomed } from './view.js';
 import { Work } from './work.js';
@@ -19,6 +22,9 @@ import { Work } from './work.js';
 /** @typedef {import("./protocol.js").RGB} RGB */
 /** @typedef {import("./view.js").Kind} Kind */
 /** @typedef {import("./view.js").Pane} Pane */
+
+/** Albedo that is black: what falls there is not seen. */
+const LEAST_ALBEDO = 0.02;
 
 /** The session behind the server that the page came from. @returns {Host} */
 export function openHost() {
@@ -48,6 +54,8 @@ export class Painter extends Hearers {
     this.stroke = null;
     /** @type {Use} */
     this.hand = FIRST;
+    /** @type {Encoder | null} */
+    this.encoder = null;
   }
 
   // What is shown
@@ -93,8 +101,23 @@ export class Painter extends Hearers {
     return place && this.screen.view ? this.screen.view.lightAt(kind, ...place) : [0, 0, 0];
   }
 
+  /** What to paint with, in the manner that is in the hand, for a pixel to have the light that a
+   * picture has there: as light, what falls on it.
+   * @param {Kind} kind @param {number} x @param {number} y @returns {RGB} */
+  paintAt(kind, x, y) {
+    const light = this.lightAt(kind, x, y);
+    const place = this.within(x, y);
+    const { albedo, width } = this.work.canvas ?? {};
+    if (this.hand.as === 'look' || !place || !albedo || !width) return light;
+    const at = 3 * (place[1] * width + place[0]);
+    return /** @type {RGB} */ (
+      light.map((x, c) => x / Math.max(LEAST_ALBEDO, VALUES[albedo[at + c]]))
+    );
+  }
+
   /** What is seen at a pixel, and the share of each light in the answer's luminance there.
-   * @param {number} x @param {number} y @returns {{object: string | null, shares: number[]} | null} */
+   * @param {number} x @param {number} y
+   * @returns {{object: string | null, index: number, shares: number[]} | null} */
   pointed(x, y) {
     const place = this.within(x, y);
     const { canvas, state, weights } = this.work;
@@ -104,8 +127,31 @@ export class Painter extends Hearers {
       Math.max(0, luminance(light.subarray(3 * k, 3 * k + 3))),
     );
     const whole = levels.reduce((a, b) => a + b, 0);
-    const object = state.objects?.[canvas.objectAt(...place)] ?? null;
-    return { object, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) };
+    const index = canvas.objectAt(...place);
+    const object = state.objects?.[index] ?? null;
+    return { object, index, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) };
+  }
+
+  /** Which object each pixel shows, once that is known.
+   * @returns {{data: Int16Array, width: number, height: number} | null} */
+  objects() {
+    const { objects, width, height } = this.work.canvas ?? {};
+    return objects && width && height ? { data: objects, width, height } : null;
+  }
+
+  /** The greatest importance that is painted, and 1 at least: what an overlay shows as all. */
+  greatest() {
+    return fullOf(this.work.canvas?.importance ?? new Float32Array(0));
+  }
+
+  /** Codes that light is shown with, at an exposure. @param {RGB} rgb @param {number} stops */
+  codes(rgb, stops) {
+    const { lut } = this.work;
+    if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
+      this.encoder = new Encoder(lut, stops);
+    const rgba = new Uint8ClampedArray(4);
+    this.encoder.pixels(Float32Array.from(rgb), rgba, 0, 1);
+    return [...rgba.subarray(0, 3)];
   }
 
   /** @param {number} x @param {number} y @returns {[number, number] | null} */
@@ -174,7 +220,8 @@ export class Painter extends Hearers {
     return true;
   }
 
-  /** The stroke in the hand is given up: it would lie over what another page has painted. */
+  /** The stroke in the hand is given up: it would lie over what another page has painted, or be
+   * heard by nobody. */
   given() {
     if (!this.stroke) return;
     this.ended();

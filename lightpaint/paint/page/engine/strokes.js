@@ -21,8 +21,8 @@ import { union } from './layer.js';
 export class Strokes {
   /** @param {import("./host.js").Host} host
    * @param {() => void} [refused] hears that the session has not taken a stroke
-   * @param {(count: number) => void} [lost] hears how many strokes are not sent any more, since
-   * another page had the session in between */
+   * @param {(count: number, isStale: boolean) => void} [lost] hears how many strokes are not sent
+   * any more, since another page had the session in between; stale: since it is there no more */
   constructor(host, refused = () => {}, lost = () => {}) {
     this.host = host;
     /** @type {PaintCanvas | null} */
@@ -38,7 +38,7 @@ export class Strokes {
     this.isBusy = false;
     this.isOpen = true;
     this.isOver = false;
-    /** Whether nothing can be painted, since another page has the session. */
+    /** Whether nothing can be painted: another page has the session, or it is there no more. */
     this.isTaken = false;
     /** @type {(() => void)[]} */
     this.waiting = [];
@@ -47,7 +47,13 @@ export class Strokes {
     this.leave = () => this.hurry();
     addEventListener('pagehide', this.leave);
     host.gate = () => this.settled();
-    host.on('connection', ({ state }) => this.connected(state === 'open'));
+    host.on('connection', ({ state }) => {
+      this.connected(state === 'open');
+      if (state === 'stale') {
+        this.isTaken = true;
+        this.forget(true);
+      }
+    });
     // Another page has the session: nothing is said to it.
     host.on('closed', () => {
       this.isTaken = true;
@@ -68,13 +74,14 @@ export class Strokes {
     this.view = view;
   }
 
-  /** Another page has painted meanwhile: what the session has not heard would lie over that. */
-  forget() {
+  /** Another page has painted meanwhile, and what the session has not heard would lie over that;
+   * or nobody is there who would hear it. */
+  forget(isStale = false) {
     const count = this.left.length + (this.live?.whole ? 1 : 0);
     this.left = [];
     this.live = null;
     this.tell();
-    if (count) this.lost(count);
+    if (count) this.lost(count, isStale);
   }
 
   /** Say nothing any more. */

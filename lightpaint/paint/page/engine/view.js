@@ -141,12 +141,6 @@ export function zoomed(params, pane, x, y, factor) {
   };
 }
 
-/** The zoom at which each pixel of the picture is one of the canvas.
- * @param {Params} params @param {Pane} pane */
-export function actualSize(params, pane) {
-  return params.zoom / pane.scale;
-}
-
 /** @typedef {{x: number, y: number, width: number, height: number}} Box */
 
 /** A pane whose picture is fitted into an area that may be larger, by zoom and pan. Its corner

@@ -111,7 +111,9 @@ export class Work {
     if (isOther || !this.strokes) {
       const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
       this.strokes?.close();
-      this.strokes = new Strokes(this.host, refused, (count) => this.tell('lost', { count }));
+      const lost = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
+        this.tell('lost', { count, isStale });
+      this.strokes = new Strokes(this.host, refused, lost);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
     }
     this.strokes.paintOn(this.canvas, view);
