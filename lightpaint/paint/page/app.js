@@ -6,11 +6,14 @@ import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { counted } from './ui/format.js';
 import { hearWithin, press } from './ui/keys.js';
-import { LightsPanel } from './ui/lights.js';
+import { LightsPanel, ShowAll } from './ui/lights.js';
 import { Looks } from './ui/looks.js';
+import { handBefore, keep, openBefore, sizeBefore } from './ui/memory.js';
 import { first } from './ui/model.js';
 import { Banner, Tips, Toasts, Working } from './ui/notices.js';
 import { Session } from './ui/session.js';
+import { SettingsPanel } from './ui/settings.js';
+import { Skips } from './ui/skips.js';
 import { Stage } from './ui/stage.js';
 import { Store } from './ui/store.js';
 import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
@@ -26,14 +29,15 @@ import { Views, see } from './ui/views.js';
 /**
  * Show the painter in an element.
  *
- * `global`: keys work wherever the focus is, for a page that is nothing else. `readonly`: a mixer,
- * with nothing to paint on. `engine`: the picture engine over that host.
+ * `global`: keys work wherever the focus is, for a page that is nothing else. `engine`: the picture
+ * engine over that host.
  * @param {HTMLElement} element @param {Host} host
- * @param {{global?: boolean, readonly?: boolean, engine: Engine}} options
+ * @param {{global?: boolean, engine: Engine}} options
  * @returns {Promise<{store: Store<Ui>, session: Session, close: () => void}>}
  */
-export async function mount(element, host, { global = false, readonly = false, engine }) {
-  const store = new Store({ ...first(), readonly, open: { ...first().open, ...remembered() } });
+export async function mount(element, host, { global = false, engine }) {
+  const open = { ...first().open, ...openBefore() };
+  const store = new Store({ ...first(), ...handBefore(), open });
   const root = document.createElement('div');
   root.className = 'lightpaint';
   root.dataset.lmSuppressShortcuts = 'true'; // of JupyterLab, which hears keys before the painter
@@ -47,9 +51,11 @@ export async function mount(element, host, { global = false, readonly = false, e
   else hearWithin(root, hands, signal);
   render(html`<${Painter} hands=${hands} root=${() => root} />`, root);
   const folding = foldByItself(root, store);
+  const forget = keep(store);
   const close = () => {
     ends.abort();
     folding.disconnect();
+    forget();
     render(null, root);
     engine.close();
     host.close();
@@ -65,17 +71,18 @@ function listen(hands) {
   engine.on('loading', (loading) => store.set({ loading }));
   engine.on('asking', (asking) => store.set({ asking }));
   engine.on('view', ({ view }) => see(hands, view));
-  engine.on('lost', ({ count }) => session.toast(given(count), 'warn'));
+  engine.on('lost', ({ count, isStale }) => {
+    if (isStale) store.set({ unheard: count });
+    else session.toast(given(count), 'warn');
+  });
   engine.on('trouble', ({ text }) => session.toast(text, 'warn'));
   let isSized = false;
-  let kept = store.value.open;
   store.listen(() => {
-    const { state, show, open } = store.value;
-    if (open !== kept) remember((kept = open));
+    const { state, show } = store.value;
     if (!state || isSized) return;
     isSized = true;
     store.set({
-      size: Math.max(4, Math.round(0.14 * state.size[0])),
+      size: sizeBefore(state.size[0]),
       show: {
         ...show,
         transform: state.transform?.name ?? show.transform,
@@ -121,10 +128,11 @@ function Painter({ hands, root }) {
     return store.listen(() => setUi(store.value));
   }, []);
   return html`
+    <${Skips} hands=${hands} />
     <${TopBar} ui=${ui} hands=${hands} />
-    ${!ui.readonly && html`<${ToolBar} ui=${ui} hands=${hands} />`}
-    <main class=${`middle ${ui.side ? '' : 'is-wide'}`} aria-label="Painter">
-      ${!ui.readonly && html`<${ToolOptions} ui=${ui} hands=${hands} />`}
+    <${ToolBar} ui=${ui} hands=${hands} />
+    <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label="Painter">
+      <${ToolOptions} ui=${ui} hands=${hands} />
       <${Views} ui=${ui} hands=${hands} />
       <div class="view"><${Stage} ui=${ui} hands=${hands} />
         <${Banner} ui=${ui} hands=${hands} />
@@ -133,7 +141,11 @@ function Painter({ hands, root }) {
       <${AnswerLine} ui=${ui} hands=${hands} />
       <${Looks} ui=${ui} hands=${hands} />
     </main>
-    ${ui.side && html`<${Side} ui=${ui} hands=${hands} />`}
+    ${
+      ui.panel
+        ? html`<${SettingsPanel} ui=${ui} hands=${hands} />`
+        : ui.side && html`<${Side} ui=${ui} hands=${hands} />`
+    }
     <${Dialogs} ui=${ui} hands=${hands} />
     <${Tips} root=${root} />`;
 }
@@ -141,33 +153,23 @@ function Painter({ hands, root }) {
 /** @param {{ui: Ui, hands: Hands}} props */
 function Side({ ui, hands }) {
   const { store } = hands;
-  const fold = (/** @type {string} */ name, /** @type {string} */ title, /** @type {any} */ made) =>
-    html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])}
+  const fold = (
+    /** @type {string} */ name,
+    /** @type {string} */ title,
+    /** @type {any} */ made,
+    /** @type {any} */ extra = null,
+  ) =>
+    html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${made}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
-    ${!ui.readonly && fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} hands=${hands} />`)}
-    ${!ui.readonly && fold('ask', 'Ask in numbers', html`<${Ask} ui=${ui} hands=${hands} />`)}
-    ${fold('lights', 'Lights', html`<${LightsPanel} ui=${ui} hands=${hands} />`)}
+    ${fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} hands=${hands} />`)}
+    ${fold('ask', 'Ask in numbers', html`<${Ask} ui=${ui} hands=${hands} />`)}
+    ${fold(
+      'lights',
+      'Lights',
+      html`<${LightsPanel} ui=${ui} hands=${hands} />`,
+      html`<${ShowAll} ui=${ui} hands=${hands} />`,
+    )}
     ${fold('truth', 'How true?', html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
   </aside>`;
-}
-
-const KEPT = 'lightpaint.open';
-
-/** What was unfolded the last time, where a browser remembers. @returns {Record<string, boolean>} */
-function remembered() {
-  try {
-    return JSON.parse(localStorage.getItem(KEPT) ?? '{}');
-  } catch {
-    return {};
-  }
-}
-
-/** @param {Record<string, boolean>} open */
-function remember(open) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(open));
-  } catch {
-    // Private windows, and frames of some notebooks, keep nothing.
-  }
 }

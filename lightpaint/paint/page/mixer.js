@@ -118,8 +118,8 @@ class Mixer {
     this.said.setAttribute('role', 'status');
     const buttons = made('div', 'mixer-buttons');
     buttons.append(
-      button('Reset to solved', 'All lights as the answer has them', () => this.reset('answer')),
-      button('Reset to present', 'All lights as the scene has them', () => this.reset('present')),
+      button('Reset to answer', 'All lights as the answer has them', () => this.reset('answer')),
+      button('Reset to now', 'All lights as the scene has them', () => this.reset('present')),
       button(
         'Copy as lighting.json',
         'Every light as its sliders stand; solo and mute only change ' + 'what is seen',

@@ -1,5 +1,7 @@
 /** One light of the mixer: its row, and what its sliders make of it. */
 
+import { slideByTouch } from './touch.js';
+
 /** @typedef {import("./engine/protocol.js").RGB} RGB */
 /** kelvin: where a look has it white, else null.
  * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean, isRest?: boolean,
@@ -82,13 +84,16 @@ export class Row {
       return;
     }
     body.append(this.dimmer, this.dimmed);
+    const back = () => this.show();
     this.dimmer.addEventListener('input', () => this.dim(Number(this.dimmer.value)));
+    slideByTouch(this.dimmer, (stops) => this.dim(stops), back);
     this.dimmer.addEventListener('dblclick', () => this.dim(0));
     if (light.isScalar) return;
     this.white.classList.add('is-white');
     this.white.style.setProperty('--track', trackOf(kelvins));
     body.append(this.white, this.whiteness);
     this.white.addEventListener('input', () => this.turn(Number(this.white.value)));
+    slideByTouch(this.white, (mired) => this.turn(mired), back);
   }
 
   /** @param {string} text @param {string} label @param {() => void} act */

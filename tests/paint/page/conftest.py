@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 import pytest
 from accessible import axe_source
+from interface import Painter
 from renderer import REPOSITORY
 
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
@@ -95,3 +96,37 @@ def page(tab: Any, site: Site) -> Iterator[Any]:
     site.arrays.clear()
     left, wrong[:] = wrong[:], []
     assert left == []
+
+
+@pytest.fixture
+def opened(browser: Any, site: Any) -> Iterator[Any]:
+    """Opens painters. No test leaves an error on the console, or one that nobody caught."""
+    contexts, errors = [], []
+
+    def open_painter(
+        query: str = "", init: str = "", until: str = ".lightpaint .tag", **about: Any
+    ) -> Painter:
+        context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **about})
+        contexts.append(context)
+        context.set_default_timeout(5000)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on(
+            "console",
+            lambda said: errors.append(said.text) if said.type in ("error", "warning") else None,
+        )
+        if init:
+            page.add_init_script(init)
+        page.goto(f"{site.url}/fake/index.html?{query}&size=48x27")
+        page.wait_for_selector(until)
+        return Painter(page)
+
+    yield open_painter
+    for context in contexts:
+        context.close()
+    assert not errors
+
+
+@pytest.fixture
+def painter(opened: Any) -> Painter:
+    return opened()

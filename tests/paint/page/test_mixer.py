@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from interface import Finger
 
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
@@ -132,13 +133,13 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, opene
     rows.nth(1).get_by_text("S", exact=True).click()
     rows.nth(0).get_by_text("M", exact=True).click()
     check(page, codes(basis, np.where(np.arange(3)[:, None] == 0, 0, weights), transform))
-    page.get_by_text("Reset to present").click()
+    page.get_by_text("Reset to now").click()
     check(page, codes(basis, basis.present_weights, transform))
     move(page, 0, 0, -8)
     dark = basis.present_weights.copy()
     dark[0] = 0
     check(page, codes(basis, dark, transform))
-    page.get_by_text("Reset to solved").click()
+    page.get_by_text("Reset to answer").click()
     check(page, codes(basis, answer, transform))
 
 
@@ -152,6 +153,33 @@ def test_kelvin_turns_the_colour_and_keeps_the_luminance(make_basis: Any, opened
     weights[0] = warm * (answer[0] @ [0.2126, 0.7152, 0.0722])
     check(page, codes(basis, weights, transform))
     assert "3000 K" in page.locator(".mixer-light").nth(0).inner_text()
+
+
+def test_a_finger_scrolls_past_sliders(make_basis: Any, opened: Any, browser: Any) -> None:
+    """One that begins on them; sideways it moves them."""
+    basis = lit(make_basis, 3)
+    path = opened(report(basis)).url
+    context = browser.new_context(viewport={"width": 400, "height": 500}, has_touch=True)
+    page = context.new_page()
+    page.goto(path)
+    finger = Finger(page)
+    page.evaluate(
+        "() => { window.scrolls = 0; addEventListener('pointercancel', () => window.scrolls++); }"
+    )
+    for k, slider in enumerate(page.locator(".mixer-light input[type=range]").all()[:2]):
+        slider.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
+        box, value = slider.bounding_box(), float(slider.input_value())
+        x, y = box["x"] + 0.2 * box["width"], box["y"] + box["height"] / 2
+        finger.goes(*((x, y + 12 * k) for k in range(8)), *[(x, y + 84)] * 8)
+        assert page.evaluate("window.scrolls") == k + 1
+        assert float(slider.input_value()) == value
+        slider.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
+        box = slider.bounding_box()
+        y = box["y"] + box["height"] / 2
+        finger.goes(*((x + 6 * k, y) for k in range(8)))
+        part = slider.evaluate("(one) => (one.value - one.min) / (one.max - one.min)")
+        assert part * box["width"] == pytest.approx(x + 42 - box["x"], abs=10)
+    context.close()
 
 
 @pytest.mark.parametrize("name", ["filmic", "agx", "linear"])
@@ -197,7 +225,7 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> 
     page = opened(report(basis))
     assert page.locator(".mixer-light").count() == SHOWN + 1
     check(page, codes(basis, answer, transform))
-    page.get_by_text("Reset to present").click()
+    page.get_by_text("Reset to now").click()
     check(page, codes(basis, basis.present_weights, transform))
     data = json.loads(page.locator(".mixer script").inner_text())
     assert len(data["rest"]["answer"]) == 60 - SHOWN

@@ -51,7 +51,7 @@ def until(is_so: Callable[[], Any], what: str, seconds: float = 20) -> Any:
 
 
 #: Keys of a hard brush at full flow, whose middle leaves nothing of what was there.
-FIRM = ("0", *["Shift+]"] * 8)
+FIRM = ("0", *["Shift+}"] * 8)
 
 
 class Served:
@@ -269,6 +269,10 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me = opened(served, view).ready()
     assert me.look("return screen.view.name") == view
     before, far, now = me.seen(30, 10), me.seen(90, 50), me.seen(30, 10, 1)
+    me.look("work.canvas.importance[5] = 2.5")
+    assert me.look("return engine.greatest()") == 2.5
+    me.look("work.canvas.importance[5] = 0")
+    assert me.look("return engine.greatest()") == 1
     me.press("0").stroke((20, 10), (40, 10)).still("brush")
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
     assert me.seen(90, 50) == far
@@ -486,7 +490,7 @@ def test_a_second_tab_takes_over_and_the_first_takes_back(served: Served, opened
     first = opened(served).ready()
     first.press("0").stroke((20, 20), (40, 20)).still("brush")
     second = opened(served, beside=first)
-    second.page.get_by_text("another tab has this session").wait_for()
+    second.page.get_by_text("the painter is open in another tab").wait_for()
     second.button("Take over").click()
     second.ready()
     first.page.get_by_text("another tab has taken this session over").wait_for()
@@ -509,8 +513,9 @@ def test_a_stroke_that_was_taken_over_lies_over_nothing(served: Served, opened: 
     second = opened(served, beside=first)
     second.button("Take over").click()
     second.ready()
-    # What was heard of it is kept; what the second tab paints there lies over it.
-    second.press(*FIRM, "x").stroke((10, 5), (40, 5)).still("stroke", "brush")
+    # What was heard of it is kept; what the second tab paints there lies over it. It has the brush
+    # that the first one had.
+    second.press("x").stroke((10, 5), (40, 5)).still("stroke", "brush")
     first.page.bring_to_front()
     first.page.mouse.move(*first.at(60, 5), steps=3)
     first.page.mouse.up()
@@ -530,12 +535,22 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
     try:
         page = context.new_page()
         page.goto(served.server.url)
-        Person(page, served).ready()
+        me = Person(page, served).ready()
+        me.look("host.hearers.delete('closed')")  # one that is killed says no goodbye
     finally:
         served.close()
-    again = Served(subject, port=served.server.port)
+    again = None
     try:
+        page.get_by_text("What you paint now is sent if the same painter comes back").wait_for()
+        me.stroke((10, 5), (20, 5))
+        me.stroke((10, 15), (20, 15))
+        again = Served(subject, port=served.server.port)
         page.get_by_text("This page is of an earlier start of the painter").wait_for()
+        page.get_by_text("never heard, and lost: 2 strokes").wait_for()
+        # Nobody would hear more of them.
+        count = me.look("return work.strokes.count")
+        me.stroke((10, 25), (20, 25))
+        assert me.look("return work.strokes.count") == count
         beside = context.new_page()
         beside.goto(again.server.url)
         # The browser has the new cookie now, and the old tab does not take the session by it.
@@ -543,7 +558,8 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         assert page.get_by_text("This page is of an earlier start of the painter").is_visible()
     finally:
         context.close()
-        again.close()
+        if again:
+            again.close()
 
 
 @pytest.fixture

@@ -1,15 +1,18 @@
 /** What the solve may do with one light: all that can be asked of it, in words of the trade. */
 
 import { html, useState } from '../vendor/preact.js';
-import { luminance, toHex, toKelvin } from './colours.js';
+import { atFull, luminance, ofKelvin, toHex, toKelvin } from './colours.js';
 import { Button, Choice, Number_, Select } from './controls.js';
+import { number } from './format.js';
+import { KelvinSlider } from './kelvin.js';
+import { atLevel, isOnNow, nowOf, stopsOf } from './level.js';
 
 /** @typedef {import("./model.js").Asked} Asked */
 /** @typedef {import("./engine.js").RGB} RGB */
 
 const MANNERS = [
   { value: 'free', label: 'Free', tip: 'The solve sets it' },
-  { value: 'held', label: 'Held', tip: 'It stays at a level' },
+  { value: 'held', label: 'Held', tip: 'You hold it at a level' },
   { value: 'present', label: 'As now', tip: 'It stays as the scene has it' },
   { value: 'off', label: 'Off', tip: 'It is off in every answer' },
 ];
@@ -22,13 +25,9 @@ const COLOURS = [
 
 /** @param {import("./light.js").Props} props */
 export function Asking(props) {
-  const { k, light, hands, asked = {}, rgb, readonly } = props;
+  const { k, light, hands, asked = {}, rgb, tied } = props;
   const { session } = hands;
-  if (readonly || light.is_fixed) {
-    return html`<p class="asking-light faint">${
-      light.is_fixed ? 'This light is not adjusted.' : ''
-    }</p>`;
-  }
+  if (light.is_fixed) return html`<p class="asking-light faint">This light is not adjusted.</p>`;
   const manner = asked.off
     ? 'off'
     : asked.lock === true
@@ -47,11 +46,19 @@ export function Asking(props) {
   }`}>
     <h3>In the solve</h3>
     <${Choice} label="Level" value=${manner} choices=${MANNERS} change=${change} />
-    ${manner === 'held' && html`<${Held} ...${props} />`}
+    ${
+      manner === 'held' &&
+      html`<${Held} ...${props} />
+      ${!light.is_scalar && html`<${HeldColour} ...${props} />`}`
+    }
     ${
       manner === 'free' &&
       html`<${Limits} ...${props} />
-      ${!light.is_scalar && html`<${Colours} ...${props} />`}`
+      ${
+        tied && colourOf(asked) === 'any'
+          ? html`<p class="faint">On one dimmer, lights keep the colours that they have now.</p>`
+          : !light.is_scalar && html`<${Colours} ...${props} />`
+      }`
     }
     <${Ties} ...${props} />
   </div>`;
@@ -59,21 +66,64 @@ export function Asking(props) {
 
 /** @param {import("./light.js").Props} props */
 function Held({ k, light, hands, rgb }) {
+  const [unit, setUnit] = useState(isOnNow(light) ? 'stops' : 'value');
   const level = luminance(rgb);
-  const to = (/** @type {number} */ value) => {
-    const factor = level > 0 ? value / level : value;
-    const base = level > 0 ? rgb : /** @type {RGB} */ ([1, 1, 1]);
-    hands.session.hold(k, /** @type {RGB} */ (base.map((x) => x * factor)), true);
+  const hold = (/** @type {number} */ to) => hands.session.hold(k, atLevel(rgb, light, to), true);
+  const now = nowOf(light);
+  const { value, least, step, of } = {
+    stops: {
+      value: stopsOf(rgb, light),
+      least: -20,
+      step: 0.1,
+      of: (/** @type {number} */ x) => now * 2 ** x,
+    },
+    share: {
+      value: (100 * level) / now,
+      least: 0,
+      step: 5,
+      of: (/** @type {number} */ x) => (now * x) / 100,
+    },
+    value: { value: level, least: 0, step: 0.1, of: (/** @type {number} */ x) => x },
+  }[/** @type {'stops' | 'share' | 'value'} */ (unit)];
+  const units = [{ value: 'stops', label: 'st from now' }, ...unitsOf(light)];
+  return html`<div class="ask-fields is-pair">
+    <${Number_} label="Held at" value=${value} least=${least} most=${unit === 'stops' ? 20 : undefined}
+      digits=${unit === 'stops' ? 2 : 4} step=${step} empty=${unit === 'stops' ? 'off' : undefined}
+      change=${(/** @type {number | null} */ to) => hold(to === null ? 0 : of(to))} />
+    ${
+      isOnNow(light) &&
+      html`<${Select} label="Unit" value=${unit} choices=${units} change=${setUnit} />`
+    }
+  </div>`;
+}
+
+/** What levels of a light are given in. @param {import("./model.js").Light} light */
+const unitsOf = (light) => [
+  { value: 'share', label: '% of now' },
+  { value: 'value', label: light.unit || 'value' },
+];
+
+/** The white that a light is held at, as bright as it is. @param {import("./light.js").Props} props */
+function HeldColour({ k, hands, rgb }) {
+  const level = luminance(rgb);
+  const [last, setLast] = useState(/** @type {number | null} */ (null));
+  // Where it is no white, or off, what was chosen last stays on the slider.
+  const kelvin = (level > 0 ? toKelvin(rgb)?.kelvin : null) ?? last ?? 3200;
+  const change = (/** @type {number} */ made, /** @type {boolean} */ done) => {
+    setLast(made);
+    const white = ofKelvin(made);
+    const factor = level / luminance(white);
+    hands.session.hold(k, /** @type {RGB} */ (white.map((x) => x * factor)), done);
   };
-  return html`<${Number_} label="Held at" value=${level} least=${0} digits=${4} unit=${light.unit}
-    step=${0.1} change=${to} />`;
+  return html`<div class="held-colour"><${KelvinSlider} value=${kelvin} disabled=${level <= 0}
+    change=${change} /></div>`;
 }
 
 /** @param {import("./light.js").Props} props */
 function Limits({ k, light, hands, asked = {} }) {
   const limits = asked.limits ?? {};
   const given = limits.max ?? limits.min;
-  const canShare = luminance(light.present) > 0;
+  const canShare = isOnNow(light);
   const [chosen, setUnit] = useState(typeof given === 'number' || !canShare ? 'value' : 'share');
   const unit = given === undefined ? chosen : typeof given === 'number' ? 'value' : 'share';
   const set = (/** @type {"min" | "max"} */ key, /** @type {number | null} */ value) => {
@@ -82,13 +132,23 @@ function Limits({ k, light, hands, asked = {} }) {
       [key]: value === null ? null : unit === 'share' ? `${value}%` : value,
     };
     const kept = Object.fromEntries(Object.entries(made).filter(([, x]) => x !== null));
+    const [least, most] = [amount(made.min), amount(made.max)];
+    const isPair = least !== null && most !== null && typeof made.min === typeof made.max;
+    if (isPair && least > most) {
+      const spoken = (/** @type {number} */ x) => (unit === 'share' ? `${x} %` : number(x, 6));
+      const [low, high] = [least, most].map(spoken);
+      hands.session.toast(
+        `At least ${low} is above At most ${high}: the limits stay as they were.`,
+      );
+      return;
+    }
     const { limits: _, ...rest } = asked;
     hands.session.ask(k, Object.keys(kept).length ? { ...rest, limits: kept } : rest);
   };
   const into = (/** @type {string} */ to) => {
     setUnit(to);
     if (given === undefined || to === unit) return;
-    const now = luminance(light.present);
+    const now = nowOf(light);
     const turned = Object.fromEntries(
       Object.entries(limits).map(([key, x]) => [
         key,
@@ -99,19 +159,14 @@ function Limits({ k, light, hands, asked = {} }) {
     );
     hands.session.ask(k, { ...asked, limits: turned });
   };
-  const units = [
-    { value: 'share', label: '% of now' },
-    { value: 'value', label: light.unit || 'value' },
-  ];
-  return html`<div class="ask-row">
+  return html`<div class="ask-fields">
     <${Number_} label="At least" value=${amount(limits.min)} least=${0} empty="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} digits=${4} />
     <${Number_} label="At most" value=${amount(limits.max)} least=${0} empty="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('max', value)} digits=${4} />
     ${
       canShare &&
-      html`<${Select} label="Limits in" hidden value=${unit} choices=${units}
-      change=${into} />`
+      html`<${Select} label="Unit" value=${unit} choices=${unitsOf(light)} change=${into} />`
     }
   </div>`;
 }
@@ -122,10 +177,14 @@ function amount(level) {
   return Array.isArray(level) ? luminance(level) : parseFloat(level);
 }
 
+/** What is asked of a light's colour. @param {Asked} asked */
+const colourOf = (asked) =>
+  ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any';
+
 /** @param {import("./light.js").Props} props */
 function Colours(props) {
   const { k, hands, asked = {}, rgb } = props;
-  const kind = ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any';
+  const kind = colourOf(asked);
   const { color, kelvin, duv, primaries, ...rest } = asked;
   const change = (/** @type {string} */ to) => {
     const made = {
@@ -175,7 +234,7 @@ function Whites({ k, hands, asked, rest }) {
       ...(duv ? { duv } : {}),
     });
   const duv = asked.duv ?? 0;
-  return html`<div class="ask-row">
+  return html`<div class="ask-fields">
     <${Number_} label="From" value=${low} least=${1000} most=${25000} step=${100} digits=${0}
       unit="K" change=${(/** @type {number} */ to) => set(to, high, duv)} />
     <${Number_} label="To" value=${high} least=${1000} most=${25000} step=${100} digits=${0}
@@ -223,7 +282,4 @@ function Words({ label, value, take }) {
 }
 
 /** @param {RGB} rgb */
-function hexOf(rgb) {
-  const top = Math.max(...rgb) || 1;
-  return toHex(rgb.map((x) => x / top));
-}
+const hexOf = (rgb) => toHex(atFull(rgb));

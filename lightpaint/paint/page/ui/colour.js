@@ -3,12 +3,16 @@
 import { html, useState } from '../vendor/preact.js';
 import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './colours.js';
 import { Choice, Slider } from './controls.js';
+import { signed } from './format.js';
+import { KelvinSlider, gradient, withinKelvin } from './kelvin.js';
+import { paintOf } from './model.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").RGB} RGB */
 /** @typedef {import("./keys.js").Hands} Hands */
 
-const WHITES = [1900, 2700, 3200, 4300, 5600, 6500, 9000];
+/** Warm is right: as on the sliders, and where somebody asks by a drag. */
+const WHITES = [9000, 6500, 5600, 4300, 3200, 2700, 1900];
 const GELS = [
   ['Red', '#ff2a1a'],
   ['Amber', '#ff9a1f'],
@@ -31,7 +35,8 @@ export function ColourPanel({ ui, hands }) {
   const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
     <div class="colour-row">
-      <span class="patch" style=${{ background: toHex(ui.colour) }}></span>
+      <span class="patch" data-tip="The colour; and on the right as it is shown, at its brightness"
+        style=${{ '--colour': toHex(ui.colour), '--shown': shownAs(ui, hands) }}></span>
       <${Hex} colour=${ui.colour} set=${set} />
       <${Choice} label="Mix colours by" value=${ui.mixer} choices=${MIXERS}
         change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
@@ -42,6 +47,11 @@ export function ColourPanel({ ui, hands }) {
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
     <${Swatches} ui=${ui} hands=${hands} />
   </div>`;
+}
+
+/** What the pictures show of the paint in the hand, on white. @param {Ui} ui @param {Hands} hands */
+export function shownAs(ui, { engine }) {
+  return `rgb(${engine.codes(paintOf(ui), ui.show.stops).join(' ')})`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
@@ -61,18 +71,6 @@ function Hex({ colour, set }) {
         event.key === 'Enter' && take(event.currentTarget.value)} /></label>`;
 }
 
-/** @param {RGB[]} colours */
-const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(', ')})`;
-
-/** By the mired, in which equal steps look equal; warm is left. */
-const MIRED = {
-  to: (/** @type {number} */ k) => -1e6 / k,
-  of: (/** @type {number} */ t) => Math.round(-1e6 / t / 50) * 50,
-};
-const KELVIN_TRACK = gradient(
-  Array.from({ length: 12 }, (_, i) => ofKelvin(MIRED.of(-667 + (i / 11) * (667 - 66.7)))),
-);
-
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function White({ colour, set }) {
   // Of what is no white, the last one stays on the dials; black keeps them, too.
@@ -88,11 +86,10 @@ function White({ colour, set }) {
     const rgb = ofKelvin(made.kelvin, made.green);
     set(/** @type {RGB} */ (rgb.map((x) => x * level)));
   };
-  const kelvin = Math.min(15000, Math.max(1500, dials.kelvin));
+  const kelvin = withinKelvin(dials.kelvin);
   const green = Math.min(20, Math.max(-20, dials.green));
   return html`<div class=${`white ${isWhite ? '' : 'is-dim'}`}>
-    <${Slider} label="Kelvin" value=${kelvin} least=${1500} most=${15000} step=${100}
-      unit="K" curve=${MIRED} track=${KELVIN_TRACK}
+    <${KelvinSlider} value=${kelvin}
       change=${(/** @type {number} */ made) => dial({ kelvin: made })} />
     <${Slider} label="Green" value=${green} least=${-20} most=${20} step=${1} digits=${0} rest=${0}
       track=${gradient([-20, 0, 20].map((by) => ofKelvin(kelvin, by)))}
@@ -145,19 +142,30 @@ function Rgb({ colour, set }) {
 function Swatches({ ui, hands }) {
   const { store } = hands;
   const swatch = (/** @type {RGB} */ rgb, /** @type {string} */ tip, /** @type {number} */ stops) =>
-    html`<button type="button" class="swatch" key=${tip} aria-label=${tip} data-tip=${tip}
-      style=${{ background: toHex(rgb) }} onClick=${() => store.set({ colour: rgb, stops })}></button>`;
+    html`<${Swatch} key=${tip} rgb=${rgb} tip=${tip}
+      act=${() => store.set({ colour: rgb, stops })} />`;
   const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (ofHex(hex)) }));
   return html`<div class="swatches" role="group" aria-label="Swatches">
     ${WHITES.map((kelvin) => swatch(ofKelvin(kelvin), `${kelvin} K`, ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
   </div>
-  ${
-    ui.recent.length > 0 &&
-    html`<div class="swatches" role="group" aria-label="Used lately">
-    ${ui.recent.map(({ colour, stops }, k) =>
-      swatch(colour, `Used lately ${k + 1}: ${toHex(colour)}`, stops),
-    )}
-  </div>`
-  }`;
+  <div class="swatches is-recent" role="group" aria-label="Used lately">
+    ${!ui.recent.length && html`<span class="faint">Used lately</span>`}
+    ${ui.recent.map(({ colour, stops }, k) => {
+      const by = signed(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
+      const bright = by === '0' ? '' : `, ${by} stops`;
+      return html`<${Swatch} key=${k} rgb=${colour} stops=${bright && by}
+        tip=${`Used lately ${k + 1}: ${toHex(colour)}${bright}`}
+        act=${() => store.set({ colour, stops })} />`;
+    })}
+  </div>`;
+}
+
+/** A colour, and its brightness where that goes along.
+ * @param {{rgb: RGB, tip: string, stops?: string, act: () => void}} props */
+function Swatch({ rgb, tip, stops, act }) {
+  return html`<button type="button" class="swatch" aria-label=${tip} data-tip=${tip}
+    style=${{ background: toHex(rgb) }} onClick=${act}>${
+      stops && html`<span aria-hidden="true">${stops}</span>`
+    }</button>`;
 }

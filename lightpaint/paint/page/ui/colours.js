@@ -13,3 +13,9 @@ export {
 } from '../engine/colour.js';
 
 /** @typedef {import('./engine.js').RGB} RGB */
+
+/** A colour whatever its brightness: its largest channel is 1. @param {RGB} rgb @returns {RGB} */
+export function atFull(rgb) {
+  const top = Math.max(...rgb) || 1;
+  return /** @type {RGB} */ (rgb.map((x) => x / top));
+}

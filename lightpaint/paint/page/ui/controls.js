@@ -1,6 +1,8 @@
 /** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
 
+import { slideByTouch } from '../touch.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
+import { asTyped } from './format.js';
 import { Icon } from './icons.js';
 
 let counter = 0;
@@ -77,11 +79,11 @@ export function Check({ label, on, change, tip, disabled }) {
  * A number that is typed: taken on Enter or when it is left, stepped by the arrow keys.
  * @param {{label: string, value: number | null, change: (value: number | null) => void,
  *   least?: number, most?: number, step?: number, digits?: number, unit?: string,
- *   hidden?: boolean, empty?: string, disabled?: boolean}} props
+ *   hidden?: boolean, empty?: string, disabled?: boolean, tip?: string}} props
  */
 export function Number_(props) {
   const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
-  const { least = -Infinity, most = Infinity } = props;
+  const { least = -Infinity, most = Infinity, tip } = props;
   const [typed, setTyped] = useState(/** @type {string | null} */ (null));
   const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))));
   // What is shown is what is taken.
@@ -89,10 +91,7 @@ export function Number_(props) {
     Math.min(most, Math.max(least, Number(x.toFixed(digits))));
   const take = (/** @type {string} */ text) => {
     setTyped(null);
-    const plain = text
-      .trim()
-      .replace(/^\u2212/, '-')
-      .replace(',', '.');
+    const plain = asTyped(text);
     const made = Number(plain);
     if (!plain && empty !== undefined) change(null);
     else if (plain && Number.isFinite(made)) change(within(made));
@@ -107,7 +106,7 @@ export function Number_(props) {
       change(within((Number(shown) || 0) + by));
     }
   };
-  return html`<label class="field number">
+  return html`<label class="field number" data-tip=${tip}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
       disabled=${disabled} onKeyDown=${press}
@@ -119,7 +118,8 @@ export function Number_(props) {
 
 /**
  * A slider with its number beside it. `change(value, done)`: done is false while it moves.
- * `curve` bends the way between the ends: a value to 0..1 and back.
+ * `curve` bends the way between the ends: a value to a place and back. Where it falls, the greatest
+ * value is left.
  * @param {{label: string, value: number, least: number, most: number, step?: number, unit?: string,
  *   digits?: number, change: (value: number, done: boolean) => void, track?: string, rest?: number,
  *   curve?: {to: (x: number) => number, of: (t: number) => number}, text?: string, plain?: boolean,
@@ -130,13 +130,30 @@ export function Slider(props) {
   const { curve, text, plain, disabled, keys, tip } = props;
   const to = curve?.to ?? ((/** @type {number} */ x) => x);
   const of = curve?.of ?? ((/** @type {number} */ x) => x);
+  const move = (/** @type {number} */ place, /** @type {boolean} */ done) =>
+    change(of(place), done);
   const moved = (/** @type {any} */ event, /** @type {boolean} */ done) =>
-    change(of(Number(event.currentTarget.value)), done);
-  const [low, high] = [to(least), to(most)];
+    move(Number(event.currentTarget.value), done);
+  const input = useRef(/** @type {HTMLInputElement | null} */ (null));
+  const latest = useRef({ move, place: to(value) });
+  latest.current = { move, place: to(value) };
+  useLayoutEffect(() => {
+    const element = input.current;
+    if (!element) return undefined;
+    const ends = new AbortController();
+    slideByTouch(
+      element,
+      (place, done) => latest.current.move(place, done),
+      () => (element.value = String(latest.current.place)),
+      ends.signal,
+    );
+    return () => ends.abort();
+  }, []);
+  const [low, high] = [to(least), to(most)].sort((a, b) => a - b);
   const at = Math.min(1, Math.max(0, (to(value) - low) / (high - low)));
   return html`<div class="slider" data-tip=${tip} data-keys=${keys}>
     ${!plain && html`<span class="name" aria-hidden="true">${label}</span>`}
-    <input type="range" aria-label=${label} min=${low} max=${high}
+    <input type="range" ref=${input} aria-label=${label} min=${low} max=${high}
       step=${curve ? (high - low) / 200 : step} value=${to(value)} disabled=${disabled}
       aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ''}`.trim()}
       class=${track ? 'has-track' : ''}
@@ -168,6 +185,19 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
     </div>
     <div class="fold-body" id=${id} hidden=${!open}>${open && children}</div>
   </section>`;
+}
+
+/**
+ * Have a part of the painter seen, once it is there; maybe with the focus.
+ * @param {HTMLElement} beside whatever in the same painter @param {string} name @param {boolean} [isFocused]
+ */
+export function comeInto(beside, name, isFocused = false) {
+  const root = beside.closest('.lightpaint');
+  requestAnimationFrame(() => {
+    const part = /** @type {HTMLElement | null | undefined} */ (root?.querySelector(name));
+    part?.scrollIntoView({ block: 'nearest' });
+    if (isFocused) part?.focus({ preventScroll: true });
+  });
 }
 
 /** Pixels below which what is seen of a painter is too low for a window. */

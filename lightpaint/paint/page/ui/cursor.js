@@ -46,21 +46,49 @@ function place(element, x, y, size, hardness) {
   element.style.setProperty('--hard', String(hardness));
 }
 
-/** @type {WeakMap<UiStore, number>} */
+/** Where a pointer is, of which is said in the next frame what lies there.
+ * @type {WeakMap<UiStore, {x: number, y: number, frame: number}>} */
 const waiting = new WeakMap();
+
+/** Where pointers rest. @type {WeakMap<UiStore, {x: number, y: number}>} */
+const last = new WeakMap();
 
 /** Say what is under the pointer, once a frame. @param {Engine} engine @param {UiStore} store
  * @param {number} x @param {number} y */
 export function point(engine, store, x, y) {
+  last.set(store, { x, y });
+  const place = waiting.get(store) ?? { x, y, frame: 0 };
+  Object.assign(place, { x, y });
   if (waiting.has(store)) return;
-  waiting.set(
-    store,
-    requestAnimationFrame(() => {
-      waiting.delete(store);
-      const pane = paneAt(engine, x, y);
-      const found =
-        pane && engine.pointed((x - pane.left) / pane.scale, (y - pane.top) / pane.scale);
-      if (found || store.value.pointed) store.set({ pointed: found });
-    }),
-  );
+  waiting.set(store, place);
+  place.frame = requestAnimationFrame(() => {
+    waiting.delete(store);
+    const pane = paneAt(engine, place.x, place.y);
+    const pointed = pane && pointedIn(engine, pane, place.x, place.y);
+    if (pointed || store.value.pointed) store.set({ pointed });
+  });
+}
+
+/** The pointer is not over the pictures any more. @param {UiStore} store */
+export function pointAway(store) {
+  cancelAnimationFrame(waiting.get(store)?.frame ?? 0);
+  waiting.delete(store);
+  last.delete(store);
+  store.set({ pointed: null });
+}
+
+/** The pictures have changed below a pointer that rests. @param {Engine} engine
+ * @param {UiStore} store */
+export function pointAgain(engine, store) {
+  const place = last.get(store);
+  if (place) point(engine, store, place.x, place.y);
+}
+
+/** @param {Engine} engine @param {import('./engine.js').Pane} pane @param {number} x
+ * @param {number} y @returns {import('./engine.js').Pointed | null} */
+function pointedIn(engine, { kind, left, top, scale }, x, y) {
+  const [px, py] = [(x - left) / scale, (y - top) / scale];
+  const found = engine.pointed(px, py);
+  if (!found) return null;
+  return { ...found, light: engine.lightAt(kind, px, py), paint: engine.paintAt(kind, px, py) };
 }

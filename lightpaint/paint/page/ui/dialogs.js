@@ -1,10 +1,9 @@
-/** Windows over the painter: all keys, files to write, how a painting is answered. */
+/** Windows over the painter: all keys, files to write. */
 
 import { html, useState } from '../vendor/preact.js';
 import { Bar } from './bar.js';
-import { Button, Check, Choice, Dialog, Number_ } from './controls.js';
-import { number } from './format.js';
-import { KEYS } from './keys.js';
+import { Button, Check, Dialog } from './controls.js';
+import { KEYS, MOD } from './keys.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -15,16 +14,12 @@ export function Dialogs({ ui, hands }) {
   if (ui.dialog === 'keys') return html`<${KeysDialog} close=${close} />`;
   if (ui.dialog === 'export')
     return html`<${ExportDialog} ui=${ui} hands=${hands} close=${close} />`;
-  if (ui.dialog === 'settings') {
-    return html`<${SettingsDialog} ui=${ui} hands=${hands} close=${close} />`;
-  }
   return null;
 }
 
 /** @param {{close: () => void}} props */
 function KeysDialog({ close }) {
-  const isMac = /mac/i.test(navigator.platform);
-  const spoken = (/** @type {string} */ key) => (isMac && key === 'Ctrl' ? '⌘' : key);
+  const spoken = (/** @type {string} */ key) => (key === 'Ctrl' ? MOD : key);
   return html`<${Dialog} title="Keys" close=${close} class="keys">
     ${KEYS.map(
       ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
@@ -41,10 +36,13 @@ function KeysDialog({ close }) {
 
 const FILES = [
   { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
+  { key: 'picture', label: 'Picture', about: 'answer.png: the answer, to be shown' },
   { key: 'lighting', label: 'Lighting', about: 'lighting.json: every light, in numbers' },
   { key: 'relit', label: 'Scene', about: 'relit.xml: the scene with this lighting' },
   { key: 'report', label: 'Report', about: 'report.html: what was painted, what came of it' },
 ];
+
+const UNPAINTED = 'Nothing is painted yet: no painting was written, and no report of one.';
 
 /** @param {{ui: Ui, hands: Hands, close: () => void}} props */
 function ExportDialog({ ui, hands, close }) {
@@ -60,6 +58,7 @@ function ExportDialog({ ui, hands, close }) {
     hands.session.send('export', { what });
   };
   const { exported } = ui;
+  const folder = ui.state?.folder ?? '';
   return html`<${Dialog} title="Write files" close=${close} class="export">
     ${can.map(
       ({ key, label, about }) => html`<div class="export-row" key=${key}>
@@ -67,7 +66,8 @@ function ExportDialog({ ui, hands, close }) {
         setWhat(on ? [...what, key] : what.filter((one) => one !== key))} />
       <span class="faint">${about}</span></div>`,
     )}
-    <div class="row"><span class="faint folder">into ${ui.state?.folder}</span>
+    <div class="row"><span class="faint folder">into ${folder}</span>
+      <${CopyButton} text=${folder} tip="Copy the folder's path" />
       ${isBusy && ui.writing && html`<${Bar} progress=${ui.writing} label="Writing" />`}
       <${Button} label=${isBusy ? 'Writing …' : 'Write'} primary disabled=${isBusy || !what.length}
         act=${write} /></div>
@@ -75,7 +75,8 @@ function ExportDialog({ ui, hands, close }) {
       exported &&
       html`<div class="exported" role="status">
       <h3>Written</h3>
-      <ul>${exported.files.map((file) => html`<li key=${file}><code>${file}</code></li>`)}</ul>
+      <ul>${exported.files.map((file) => html`<li key=${file}><code>${within(file, folder)}</code></li>`)}</ul>
+      ${exported.is_unpainted && html`<p>${UNPAINTED}</p>`}
       ${
         exported.command &&
         html`<h3>The same on the command line</h3>
@@ -86,91 +87,26 @@ function ExportDialog({ ui, hands, close }) {
   </${Dialog}>`;
 }
 
+/** A file as it is called in its folder. @param {string} file @param {string} folder */
+function within(file, folder) {
+  return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
+}
+
 /** @param {{text: string}} props */
 function Copied({ text }) {
+  return html`<div class="command"><code tabindex="0">${text}</code>
+    <${CopyButton} text=${text} label="Copy" />
+  </div>`;
+}
+
+/** Says by itself that it has copied. @param {{text: string, label?: string, tip?: string}} props */
+function CopyButton({ text, label, tip }) {
   const [isDone, setDone] = useState(false);
   const copy = () =>
     navigator.clipboard?.writeText(text).then(
       () => setDone(true),
       () => undefined,
     );
-  return html`<div class="command"><code tabindex="0">${text}</code>
-    <${Button} label=${isDone ? 'Copied' : 'Copy'} icon=${isDone ? 'check' : 'copy'} act=${copy} />
-  </div>`;
-}
-
-const SPACES = [
-  { value: null, label: 'Automatic' },
-  { value: 'display', label: 'As it looks', tip: 'Differences count as the display shows them' },
-  { value: 'linear', label: 'As light', tip: 'Differences count as light: bright places more' },
-];
-const COLOURS = [
-  { value: null, label: 'Automatic' },
-  { value: 'free', label: 'Free', tip: 'Any colour that fits' },
-  {
-    value: 'gentle',
-    label: 'Keep theirs',
-    tip: 'Their own colour, unless the painting asks for another',
-  },
-  { value: 'white', label: 'Whites', tip: 'From 2200 K to 9000 K' },
-];
-
-/** @param {{ui: Ui, hands: Hands, close: () => void}} props */
-function SettingsDialog({ ui, hands, close }) {
-  const { settings, meant } = ui;
-  const set = (/** @type {string} */ key) => (/** @type {any} */ value) =>
-    hands.session.setting(key, value);
-  const hold = settings.hold ?? null;
-  const manner = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold';
-  const holds = [
-    { value: 'auto', label: 'Automatic' },
-    { value: 'hold', label: 'Keep', tip: 'What is not painted stays near the present look' },
-    { value: 'go', label: 'Let go', tip: 'What is not painted may become anything' },
-  ];
-  return html`<${Dialog} title="How the painting is answered" close=${close} class="settings">
-    <${Row} title="What is not painted" is=${kept(meant.hold)}>
-      <${Choice} label="What is not painted" value=${manner} choices=${holds}
-        change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || 1, go: 0 }[to])} />
-      ${
-        manner === 'hold' &&
-        html`<${Number_} label="Strength" value=${hold} least=${0.01} most=${100}
-        step=${0.1} unit="×" change=${set('hold')} />`
-      }
-    </${Row}>
-    <${Row} title="Compared" is=${
-      { display: 'as it looks', linear: 'as light' }[/** @type {string} */ (meant.space)] ?? ''
-    }>
-      <${Choice} label="Compared" value=${settings.space ?? null} choices=${SPACES}
-        change=${set('space')} /></${Row}>
-    <${Row} title="Colours of lamps" is=${
-      { free: 'are free', gentle: 'stay theirs unless asked', white: 'are whites' }[
-        /** @type {string} */ (meant.colors)
-      ] ?? ''
-    }>
-      <${Choice} label="Colours of lamps" value=${settings.colors ?? null} choices=${COLOURS}
-        change=${set('colors')} /></${Row}>
-    <${Row} title="How exact the paint is" is=${
-      settings.literal ? 'taken at its word' : 'taken as a sketch'
-    }>
-      <${Check} label="Take the paint at its word" on=${Boolean(settings.literal)}
-        change=${set('literal')} /></${Row}>
-    <${Row} title="Lights that hardly matter" is="">
-      <${Number_} label="Stay as now, strength" value=${settings.prefer_current ?? 0} least=${0}
-        most=${10} step=${0.01} digits=${3} change=${set('prefer_current')} />
-      <${Number_} label="Use at most" value=${settings.sparse ?? null} least=${1} digits=${0}
-        most=${ui.lights.length || 1} empty="all" unit="lights" change=${set('sparse')} /></${Row}>
-  </${Dialog}>`;
-}
-
-/** @param {number | null | undefined} hold */
-function kept(hold) {
-  if (hold === undefined || hold === null) return '';
-  const much = hold === 1 ? '' : `, ${number(hold)} times as firmly as usual`;
-  return hold ? `is kept near the present look${much}` : 'is let go';
-}
-
-/** @param {{title: string, is: string, children?: any}} props */
-function Row({ title, is, children }) {
-  return html`<section class="setting"><h3>${title}${is && html`<span class="faint">${is}</span>`}</h3>
-    <div class="row">${children}</div></section>`;
+  return html`<${Button} label=${label && (isDone ? 'Copied' : label)} tip=${isDone && tip ? 'Copied' : tip}
+    icon=${isDone ? 'check' : 'copy'} act=${copy} />`;
 }

@@ -8,7 +8,7 @@
 /** @typedef {{kind: string, reply?: number, arrays?: Record<string, Picture>, [field: string]: any}} Message */
 
 /**
- * The session, wherever it is: behind a socket, a notebook's model, or a report that only reads.
+ * The session, wherever it is: behind a socket, or a notebook's model.
  * `on` hears messages of a kind, asked for or not, and "connection" with
  * {state: "open" | "lost" | "stale"}, and "silence" with {isSilent}. `send` is answered by the reply.
  * @typedef {object} Host
@@ -45,7 +45,8 @@
 
 /**
  * The tool in the hand. `rgb`: linear light of the colour, its stops included. `size`: diameter in
- * pixels of the picture. `importance`: what the importance brush paints, 0 to 1.
+ * pixels of the picture. `importance`: how many times as much as before counts what the importance
+ * brush goes over.
  * @typedef {object} Use
  * @property {Tool} tool
  * @property {RGB} rgb
@@ -60,6 +61,14 @@
 /** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */
 /** In CSS pixels of the element. @typedef {{kind: Kind, x: number, y: number, width: number,
  *   height: number, left: number, top: number, scale: number}} Pane */
+
+/**
+ * What is under the pointer. `object`: its name, `index`: its number, -1 for none. `shares`: of
+ * each light in the answer's light there. `light`: that of the picture that is pointed at.
+ * @typedef {{object: string | null, index: number, shares: number[], light: RGB,
+ *   paint: RGB}} Pointed paint: what to paint with, as the hand does, to have that light there */
+/** Numbers of objects, (height, width).
+ * @typedef {{data: ArrayLike<number>, width: number, height: number}} Objects */
 
 /**
  * @typedef {object} Engine
@@ -78,12 +87,16 @@
  * @property {(asked: {stops: number, mired: number, object: number | null}) => void} ask
  *   brighter and warmer by so much, in an object or, for null, in the whole picture
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
- * @property {(x: number, y: number) => {object: string | null, shares: number[]} | null} pointed
- *   what is seen there, and the share of each light in the answer's light
+ * @property {(kind: Kind, x: number, y: number) => RGB} paintAt what to paint with, in the manner
+ *   that is in the hand, to have that light there
+ * @property {(x: number, y: number) => Omit<Pointed, 'light' | 'paint'> | null} pointed
+ * @property {() => Objects | null} objects which object each pixel shows, once that is known
+ * @property {() => number} greatest importance that is painted; 1 at least
+ * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, hear: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total} planes; "asking": {stops, mired} while a drag asks;
- *   "view": {view} in which something was undone; "lost": {count} strokes that another page, which
- *   has painted meanwhile, has kept from being sent; "trouble": {text}
+ *   "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
+ *   sent any more, since another page has painted meanwhile, or the session is there no more; "trouble": {text}
  * @property {() => void} close
  */
 

@@ -1,5 +1,7 @@
 /** Numbers as people read them. A true minus, a thin choice of digits, the unit behind. */
 
+import { luminance, toKelvin } from './colours.js';
+
 const MINUS = '\u2212';
 
 /** @param {number} value @param {number} [digits] @returns {string} */
@@ -12,6 +14,10 @@ export function number(value, digits = 3) {
       : String(Number(value.toPrecision(digits)));
   return text.replace('-', MINUS);
 }
+
+/** A number as it is typed, with the minus and the comma that people may write.
+ * @param {string} text */
+export const asTyped = (text) => text.trim().replace(MINUS, '-').replace(',', '.');
 
 /** @param {number} value @param {number} [digits] @returns {string} "+0.5", "−1.2", "0" */
 export function signed(value, digits = 1) {
@@ -38,6 +44,26 @@ export const kelvinText = (kelvin) => {
   const step = kelvin < 4000 ? 10 : kelvin < 8000 ? 50 : 500;
   return `${Math.round(kelvin / step) * step} K`;
 };
+
+/** How far from a white's line, in thousandths of (u, v), light is called by its kelvin. */
+const WHITE = 20;
+
+/** Light as it is spoken of: stops from what is shown as white, and kelvin where it is a white;
+ * nothing where there is none.
+ * @param {number[]} rgb linear, the exposure included @returns {string} */
+export const lightText = (rgb) => spoken(rgb, luminance(rgb));
+
+/** Paint, as its panel speaks of it: its stops are those of its largest channel.
+ * @param {number[]} rgb linear, the exposure included @returns {string} */
+export const paintText = (rgb) => spoken(rgb, Math.max(...rgb));
+
+/** @param {number[]} rgb @param {number} level */
+function spoken(rgb, level) {
+  if (!(level > 0)) return '';
+  const found = toKelvin(rgb);
+  const isWhite = found && Math.abs(found.green) <= WHITE;
+  return `${signed(Math.log2(level))} st${isWhite ? ` · ${kelvinText(found.kelvin)}` : ''}`;
+}
 
 /** @param {number} count @param {string} one @param {string} [many] @returns {string} */
 export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;

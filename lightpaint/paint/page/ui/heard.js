@@ -48,11 +48,21 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
         ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
         : null,
     ...(isApart(looks ?? [], before) ? unmixed(before) : {}),
+    ...(message.verified ? rendersOf(message.verified, view) : {}),
     // A scene is first shown as it is painted.
     ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
     ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
     ...weightsOf(message),
   };
+}
+
+/** Renders that were made before the page began. @param {any[]} verified @param {number} view
+ * @returns {Partial<Ui>} */
+function rendersOf(verified, view) {
+  const verifiedOf = Object.fromEntries(
+    verified.map((one) => [one.view, { ...one, isOld: one.is_old }]),
+  );
+  return { verifiedOf, verified: verifiedOf[view] ?? null };
 }
 
 /** Which looks there are. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
@@ -83,7 +93,7 @@ function shownAs(transform) {
 function answerFields(answer, before) {
   const { headline, lights, shares = null, of_views: ofViews = null } = answer;
   /** @type {Partial<Ui>} */
-  const made = { isLive: false };
+  const made = { isLive: false, isJudged: headline !== undefined };
   if (headline !== undefined)
     Object.assign(made, { ofViews }, seenOf({ ...answer, ofViews }, before));
   // Without paint there is nothing to be sure of, or to be held back from.
@@ -104,9 +114,11 @@ function answerFields(answer, before) {
 function seenOf(answer, { view, views }) {
   const isOne = views.length < 2;
   const its = isOne || !answer.ofViews ? answer : answer.ofViews[view];
-  if (!its) return { headline: UNPAINTED, deltaE: null, deltaAsked: null, sentences: [] };
+  if (!its)
+    return { headline: UNPAINTED, help: null, deltaE: null, deltaAsked: null, sentences: [] };
   return {
     headline: its.headline,
+    help: its.help ?? null,
     deltaE: its.delta_e ?? null,
     deltaAsked: its.delta_e_asked ?? null,
     sentences: its.sentences ?? [],
@@ -178,6 +190,7 @@ export function answerOf(message, ui) {
   if (message.lights) Object.assign(made, answerFields(message, ui));
   else if (!message.exact) {
     made.isLive = true;
+    made.isJudged = false;
     // What was said before anything was painted is so no more.
     if (ui.deltaE === null) made.headline = '';
   }
@@ -194,7 +207,6 @@ export function answerOf(message, ui) {
 /** @param {any} message @returns {Partial<Ui>} */
 export function progressOf({ what, done, total, unit }) {
   const made = { what, done, total, unit };
-  if (!what) return { basis: null, verifying: null, writing: null };
   if (what === 'export') return { writing: made };
   if (/verif/i.test(what)) return { verifying: made };
   return { basis: total && done >= total ? null : made };

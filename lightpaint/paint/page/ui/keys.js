@@ -1,13 +1,31 @@
 /** All keys: one table, for the keyboard and for the overlay that shows them. */
 
+import { keepLook } from './keeping.js';
 import { seeNext } from './views.js';
-import { choose, harden, LAYOUTS, look, next, OVERLAYS, resize, swap, TOOLS } from './tools.js';
+import {
+  choose,
+  fold,
+  harden,
+  LAYOUTS,
+  look,
+  next,
+  OVERLAYS,
+  resize,
+  setFlow,
+  swap,
+  TOOLS,
+} from './tools.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./session.js").Session} Session */
 /** @typedef {import("./model.js").UiStore} UiStore */
 /** @typedef {{store: UiStore, session: Session, engine: Engine}} Hands */
-/** @typedef {{keys: string, shown: string[], does: string, act?: (hands: Hands) => void}} Key */
+/** isOnce: a key that is held down does it once.
+ * @typedef {{keys: string, shown: string[], does: string, act?: (hands: Hands) => void,
+ *   isOnce?: boolean}} Key */
+
+/** What Ctrl is called here. */
+export const MOD = /mac/i.test(navigator.platform) ? '⌘' : 'Ctrl';
 
 const zoomBy =
   (/** @type {number} */ factor) =>
@@ -16,6 +34,12 @@ const zoomBy =
     const pane = engine.panes()[0] ?? { x: 0, y: 0, width, height };
     look(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
   };
+
+/** One pixel of the picture on one of the page. @param {Hands} hands */
+export function showPixels({ store, engine }) {
+  const scale = engine.panes()[0]?.scale;
+  if (scale) look(store, { zoom: store.value.show.zoom / scale });
+}
 
 /** @param {number} by */
 const expose =
@@ -42,14 +66,14 @@ export const KEYS = [
         keys: 'mod+s',
         shown: ['Ctrl', 'S'],
         does: 'keep this look',
-        act: ({ session, store }) =>
-          void session.send('save_look', { name: `Look ${store.value.looks.length + 1}` }),
+        act: (hands) => void keepLook(hands),
+        isOnce: true,
       },
       {
         keys: 'p',
         shown: ['P'],
         does: 'panels away, and back',
-        act: ({ store }) => store.set({ side: !store.value.side }),
+        act: ({ store }) => fold(store),
       },
       {
         keys: '?',
@@ -59,6 +83,7 @@ export const KEYS = [
       },
       { keys: '', shown: ['Tab'], does: 'from control to control' },
       { keys: '', shown: ['← ↑ ↓ →'], does: 'on the pictures: the brush, Enter paints' },
+      { keys: '', shown: ['Shift', 'Enter'], does: 'there: line from the last stroke' },
     ],
   },
   {
@@ -77,8 +102,8 @@ export const KEYS = [
         shown: ['Esc'],
         does: 'give up the stroke',
         act: ({ engine, store }) => {
-          engine.cancel();
-          store.set({ asking: null, hovered: null });
+          const isClosed = engine.cancel() ? {} : { panel: null };
+          store.set({ asking: null, hovered: null, ...isClosed });
         },
       },
       {
@@ -112,6 +137,7 @@ export const KEYS = [
         does: 'fit',
         act: ({ store }) => look(store, { zoom: 1, pan: [0, 0] }),
       },
+      { keys: 'shift+f', shown: ['Shift', 'F'], does: 'one to one', act: showPixels },
       {
         keys: 'v',
         shown: ['V'],
@@ -166,6 +192,7 @@ const isMod = (event) => (event.ctrlKey || event.metaKey) && !event.getModifierS
 function named(event) {
   const key = event.key.toLowerCase();
   if (isMod(event)) return `mod+${event.shiftKey ? 'shift+' : ''}${key}`;
+  if (key === 'f' && event.shiftKey) return 'shift+f';
   return key === '=' ? '+' : key;
 }
 
@@ -178,20 +205,33 @@ export function isTyping(event) {
   return ['TEXTAREA', 'SELECT'].includes(tagName) || element.isContentEditable;
 }
 
+/** Have what is typed in a field taken, before something is done with it.
+ * @param {KeyboardEvent} event in that field */
+function commit(event) {
+  const field = /** @type {HTMLElement} */ (event.composedPath()[0]);
+  field.blur();
+  field.focus({ preventScroll: true });
+}
+
 /**
  * What a key does, if it does anything here.
  * @param {KeyboardEvent} event @param {Hands} hands
  */
 export function press(event, hands) {
   const isAlt = event.altKey && !event.getModifierState('AltGraph');
-  if (event.defaultPrevented || isAlt || isTyping(event)) return;
-  if (hands.store.value.dialog || hands.store.value.readonly) return;
+  if (event.defaultPrevented || isAlt) return;
   const name = named(event);
+  const isIn = isTyping(event);
+  // A page is no file that anybody keeps, and nothing of it but fields has text to be marked.
+  if (name === 'mod+s' || (name === 'mod+a' && !isIn)) event.preventDefault();
+  if (hands.store.value.dialog) return;
+  if (name === 'mod+s' && isIn) commit(event);
+  else if (isIn) return;
   const digit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey;
   const found = BY_KEY.get(name);
-  if (digit) hands.store.set({ flow: (Number(event.key) || 10) / 10 });
-  else if (found) /** @type {any} */ (found).act(hands);
-  else return;
+  if (digit) setFlow(hands.store, (Number(event.key) || 10) / 10);
+  else if (found && !(found.isOnce && event.repeat)) found.act?.(hands);
+  else if (!found) return;
   if (name !== 'escape') event.preventDefault();
 }
 

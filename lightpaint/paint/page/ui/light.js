@@ -1,11 +1,12 @@
 /** One light: what it is in the answer, whether it is shown, and its dimmer. */
 
 import { Component, html } from '../vendor/preact.js';
-import { luminance, toHex, toKelvin } from './colours.js';
+import { atFull, luminance, toHex, toKelvin } from './colours.js';
 import { Asking } from './asking.js';
 import { Button, Slider } from './controls.js';
 import { kelvinText, number, percent, stopsText } from './format.js';
 import { Icon } from './icons.js';
+import { BRIGHTEST, DARKEST, Level, atLevel, nowOf, stopsOf } from './level.js';
 import { Thumb } from './thumb.js';
 
 /** @typedef {import("./model.js").Light} Light */
@@ -16,14 +17,15 @@ import { Thumb } from './thumb.js';
 /**
  * @typedef {{k: number, light: Light, hands: Hands, rgb: RGB, lit?: Lit, asked?: Asked,
  *   tied?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
- *   here?: number, readonly: boolean, hasSlider: boolean, picture: string, thumb?: number, others?: Light[]}} Props
+ *   here?: number, hasSlider: boolean, picture: string, thumb?: number, others?: Light[]}} Props
  */
-
-/** Ends of the dimmer, in stops from the present. */
-const [DARKEST, BRIGHTEST] = [-8, 6];
 
 /** @extends {Component<Props>} */
 export class LightRow extends Component {
+  /** The light as it was when its dimmer was taken in hand: on the way through the dark it keeps its
+   * colour. @type {RGB | null} */
+  grasped = null;
+
   /** A pointer that moves over the picture changes few of many rows. @param {Props} next */
   shouldComponentUpdate(next) {
     const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
@@ -39,7 +41,7 @@ export class LightRow extends Component {
   }
 
   render() {
-    const { k, light, hands, isOpen, readonly, hasSlider, here, isMute, asked } = this.props;
+    const { k, light, hands, isOpen, hasSlider, here, isMute, asked } = this.props;
     const { store } = hands;
     const dim = isMute || asked?.off ? 'is-dim' : '';
     const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
@@ -53,16 +55,16 @@ export class LightRow extends Component {
       <div class="light-main">
         <div class="light-head">
           <button type="button" class="light-name" aria-expanded=${String(isOpen)}
-            onClick=${() => unfold(store, k)} data-tip=${
+            aria-label=${light.label} onClick=${() => unfold(store, k)} data-tip=${
               light.members.length > 1
                 ? `${light.label}: ${light.members.join(', ')}`
                 : `${light.label}, ${light.plugin}`
             }>
-            <${Icon} name="fold" /><span>${light.label}</span></button>
+            <${Icon} name="fold" /><${Name} name=${light.label} /></button>
           ${this.marks()}
         </div>
         ${this.numbers()}
-        ${hasSlider && !readonly && !light.is_fixed && this.dimmer()}
+        ${hasSlider && !light.is_fixed && this.dimmer()}
       </div>
       ${isOpen && html`<${Asking} ...${this.props} />`}
     </div>`;
@@ -70,7 +72,7 @@ export class LightRow extends Component {
 
   /** Shown or not; then, apart, what is asked of the solve. */
   marks() {
-    const { k, light, hands, isSolo, isMute, asked = {}, readonly } = this.props;
+    const { k, light, hands, isSolo, isMute, asked = {} } = this.props;
     const { store, session } = hands;
     const turn = (/** @type {"solo" | "mute"} */ key, /** @type {boolean} */ on) =>
       store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }));
@@ -83,7 +85,6 @@ export class LightRow extends Component {
         tip=${`Mute: show the picture without ${light.label}. The answer stays.`} />
     </span>
     ${
-      !readonly &&
       !light.is_fixed &&
       html`<span class="marks is-solve" role="group"
       aria-label="Solve">
@@ -100,14 +101,17 @@ export class LightRow extends Component {
     const { light, rgb, lit, isLive } = this.props;
     const level = luminance(rgb);
     const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
-    const parts = [
-      white && kelvinText(white),
-      [number(level), light.unit, !isLive && lit?.error].filter(Boolean).join(' '),
-    ].filter(Boolean);
+    const value = [white && kelvinText(white), number(level)].filter(Boolean).join(' · ');
+    const error = isLive ? '' : (lit?.error ?? '');
+    const whole = [value, light.unit, error].filter(Boolean).join(' ');
+    // Where there is no room for all, it is the unit that goes.
+    const told = html`<span>${value}</span><span class="its-unit">${light.unit && ` ${light.unit}`}</span
+      ><span>${error && ` ${error}`}</span>`;
     return html`<div class="light-numbers">
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
-        style=${{ background: level > 0 ? toHex(scaled(rgb)) : 'none' }}></span>
-      <span class="values">${level > 0 ? parts.join(' · ') : 'off'}</span>
+        style=${{ background: level > 0 ? toHex(atFull(rgb)) : 'none' }}></span>
+      <span class="values" data-tip=${level > 0 ? whole : undefined}
+        >${level > 0 ? told : 'off'}</span>
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
     </div>`;
   }
@@ -115,16 +119,32 @@ export class LightRow extends Component {
   dimmer() {
     const { k, light, rgb, hands, asked } = this.props;
     const stops = stopsOf(rgb, light) ?? DARKEST;
-    const move = (/** @type {number} */ to, /** @type {boolean} */ done) =>
-      hands.session.hold(k, moved(rgb, light, to), done);
+    const move = (/** @type {number} */ to, /** @type {boolean} */ done) => {
+      this.grasped ??= rgb;
+      hands.session.hold(k, moved(this.grasped, light, to), done);
+      if (done) this.grasped = null;
+    };
     const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
     return html`<div class=${`dimmer ${asked?.lock !== undefined ? 'is-held' : ''}`}>
       <${Slider} plain label=${`${light.label}, stops from now`} value=${clamp(stops)}
         least=${DARKEST} most=${BRIGHTEST} step=${0.05} rest=${0} text=${text}
         disabled=${Boolean(asked?.off)} change=${move} />
-      <span class="stops" data-tip="Stops from the present">${text}</span>
+      <${Level} light=${light} rgb=${rgb} disabled=${Boolean(asked?.off)}
+        say=${(/** @type {string} */ words) => hands.session.toast(words)}
+        change=${(/** @type {RGB} */ made) => hands.session.hold(k, made, true)} />
     </div>`;
   }
+}
+
+/** The end of a long name that is always seen, since there names of many lights differ: a word of up
+ * to seven characters, or five. */
+const END = /[^\p{L}\p{N}][\p{L}\p{N}]{4,6}$|.{5}$/u;
+
+/** What there is no room for is left out before the end. @param {{name: string}} props */
+function Name({ name }) {
+  const line = name.replace(/\s+/g, ' ');
+  const at = line.length < 10 ? line.length : line.search(END);
+  return html`<span class="name-start">${line.slice(0, at)}</span><span>${line.slice(at)}</span>`;
 }
 
 /** @param {number | undefined} share */
@@ -142,15 +162,17 @@ function Share({ share, here }) {
 /** What is worth a word, below the picture: the rows keep their height while lights change.
  * @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} props */
 function Badge(props) {
-  const { lit, asked = {} } = props;
-  const isBack = Boolean(lit?.held) && asked.lock === undefined && !asked.off;
+  const { lit, asked = {}, tied } = props;
   const said = notes(props);
-  if (isBack) said.push(['bound', 'This holds it back']);
   if (!said.length) return null;
-  const tip = said.map(([, words]) => `${words}.`).join(' ');
-  const more = said.length > 1 + Number(isBack) ? ` +${said.length - 1 - Number(isBack)}` : '';
-  return html`<span class=${`badge ${isBack ? 'is-back' : ''}`} data-tip=${tip}
-    >${said[0][0]}${more}</span>`;
+  // What is asked of all lights, as their colours, says nothing of this one.
+  const isAsked = Boolean(tied ?? asked.limits ?? colourOf(asked));
+  const isBack = Boolean(lit?.held) && isAsked && asked.lock === undefined && !asked.off;
+  const words = said.map(([, its]) => `${its}.`);
+  if (isBack) words.push('That holds it back: the painting asks for something else.');
+  const more = said.length > 1 ? ` +${said.length - 1}` : '';
+  return html`<span class=${`badge ${isBack ? 'is-back' : ''}`} data-tip=${words.join(' ')}
+    >${isBack ? 'held back' : `${said[0][0]}${more}`}</span>`;
 }
 
 /** @param {import("./model.js").UiStore} store @param {number} k */
@@ -160,34 +182,23 @@ function unfold(store, k) {
   }));
 }
 
+/** What colour it may have, if that is asked. @param {Asked} asked */
+const colourOf = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
+
 /** In a word, and in words. @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} about
  * @returns {string[][]} */
 function notes({ light, lit, asked = {}, tied }) {
-  const colour = asked.color ?? asked.kelvin ?? asked.primaries;
   /** @type {[unknown, string, string][]} */
   const all = [
-    [light.is_fixed, 'fixed', 'It stays as it is'],
+    [light.is_fixed, 'fixed', 'It stays as the scene has it'],
     [asked.off, 'off', 'You have put it out'],
     [asked.lock !== undefined, 'held', 'You hold it at this level'],
     [asked.limits, 'limits', 'You have set limits to its level'],
-    [colour, 'colour', 'You have said what colour it may have'],
+    [colourOf(asked), 'colour', 'You have said what colour it may have'],
     [tied, 'tied', `It goes with ${tied?.filter((name) => name !== light.name).join(', ')}`],
     [lit?.unreached, 'unseen', 'None of its light reaches the picture'],
   ];
   return all.filter(([isSo]) => isSo).map(([, ...words]) => words);
-}
-
-/** @param {RGB} rgb @returns {RGB} */
-function scaled(rgb) {
-  const top = Math.max(...rgb) || 1;
-  return /** @type {RGB} */ (rgb.map((x) => x / top));
-}
-
-/** Stops from the present; of a light that is off now, from one unit. @param {RGB} rgb
- * @param {Light} light @returns {number | null} */
-function stopsOf(rgb, light) {
-  const level = luminance(rgb);
-  return level > 0 ? Math.log2(level / (luminance(light.present) || 1)) : null;
 }
 
 /** @param {number} stops */
@@ -196,9 +207,5 @@ const clamp = (stops) => Math.min(BRIGHTEST, Math.max(DARKEST, stops));
 /** The same colour, so many stops from the present; at the left end it is off.
  * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */
 function moved(rgb, light, stops) {
-  if (stops <= DARKEST) return [0, 0, 0];
-  const base = luminance(rgb) > 0 ? rgb : luminance(light.present) > 0 ? light.present : [1, 1, 1];
-  const level = (luminance(light.present) || 1) * 2 ** stops;
-  const factor = level / luminance(base);
-  return /** @type {RGB} */ (base.map((x) => x * factor));
+  return atLevel(rgb, light, stops <= DARKEST ? 0 : nowOf(light) * 2 ** stops);
 }

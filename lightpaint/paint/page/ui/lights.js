@@ -6,6 +6,7 @@ import { luminance } from './colours.js';
 import { Button, Select } from './controls.js';
 import { counted, percent } from './format.js';
 import { Icon } from './icons.js';
+import { comparedAnswer, isUnseen } from './keeping.js';
 import { LightRow } from './light.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
@@ -27,9 +28,8 @@ export function LightsPanel({ ui, hands }) {
   const { store } = hands;
   const found = sorted(ui, matching(ui));
   const groups = grouped(ui, found);
-  const isMuted = ui.solo.length + ui.mute.length > 0;
   const isMany = ui.lights.length > MANY;
-  return html`<div class="lights">
+  return html`<div class=${`lights ${isUnseen(ui) ? 'is-unseen' : ''}`}>
     ${
       ui.lights.length > 5 &&
       html`<div class="lights-tools">
@@ -41,11 +41,6 @@ export function LightsPanel({ ui, hands }) {
         change=${(/** @type {any} */ sort) => store.set({ sort })} />
     </div>`
     }
-    ${
-      isMuted &&
-      html`<p class="note"><span>Some lights are not shown. The answer has them
-      all.</span> <${Button} label="Show all" act=${() => store.set({ solo: [], mute: [] })} /></p>`
-    }
     ${ui.ready && !found.length && html`<p class="faint">No light is called so.</p>`}
     ${groups.map(({ name, members }) =>
       name === null
@@ -56,6 +51,20 @@ export function LightsPanel({ ui, hands }) {
   </div>`;
 }
 
+/** Beside the title, where it moves no row: some lights are not shown; or of which of two looks
+ * they are. @param {{ui: Ui, hands: Hands}} props */
+export function ShowAll({ ui, hands }) {
+  const isPart = ui.solo.length > 0 || ui.mute.length > 0;
+  if (ui.mix && !isPart) {
+    const whose = comparedAnswer(ui)?.name ?? 'the answer, not shown';
+    return html`<span class="whose">of ${whose}</span>`;
+  }
+  if (!isPart) return null;
+  return html`<${Button} label="Show all" class="show-all"
+    tip="Some lights are not shown. The answer has them all."
+    act=${() => hands.store.set({ solo: [], mute: [] })} />`;
+}
+
 /** @param {Ui} ui @param {Hands} hands @param {number} k @param {boolean} isMany */
 function row(ui, hands, k, isMany) {
   const light = ui.lights[k];
@@ -64,7 +73,7 @@ function row(ui, hands, k, isMany) {
   return html`<${LightRow} key=${light.name} k=${k} light=${light} hands=${hands}
     rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${ui.asked[light.name]} tied=${tied}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
-    here=${ui.pointed?.shares[k]} readonly=${ui.readonly} hasSlider=${isOpen || !isMany}
+    here=${ui.pointed?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
     others=${isOpen ? ui.lights : undefined} />`;
 }
@@ -79,7 +88,7 @@ function Group({ name, ui, hands, members, isMany }) {
   const solo = ui.solo.filter((k) => !members.includes(k));
   return html`<div class="light-group" role="group" aria-label=${name}>
     <div class="group-head">
-      <button type="button" class="group-name" aria-expanded=${String(open)}
+      <button type="button" class="group-name" aria-expanded=${String(open)} data-tip=${name}
         onClick=${() => store.set({ open: { ...ui.open, [key]: !open } })}>
         <${Icon} name="fold" /><strong>${name}</strong>
         <span class="faint">${counted(members.length, 'light')} · ${percent(share)}</span></button>

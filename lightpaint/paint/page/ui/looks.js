@@ -1,9 +1,12 @@
-/** Looks that were kept: pictures with names, to go on from, to compare and to mix. */
+/** Looks that were kept: small pictures with names, to go on from, to compare and to mix. They lie in
+ * a strip that is always as high, so that the pictures above it stay as they are. */
 
 import { inView } from '../engine/protocol.js';
-import { html, useEffect, useRef, useState } from '../vendor/preact.js';
+import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
-import { mixOf, unmixed } from './model.js';
+import { currentLook, goOnFrom } from './keeping.js';
+import { MOD } from './keys.js';
+import { betweenOf, mixOf, unmixed } from './model.js';
 import { Thumb } from './thumb.js';
 import { look } from './tools.js';
 
@@ -13,32 +16,55 @@ import { look } from './tools.js';
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Looks({ ui, hands }) {
-  if (!ui.looks.length) return null;
-  return html`<section class="looks" aria-label="Looks">
-    <ul>${ui.looks.map((one) => html`<${Kept} key=${one.id} one=${one} ui=${ui} hands=${hands} />`)}
-    </ul>
-    ${ui.looks.length > 1 && html`<${Mix} ui=${ui} hands=${hands} />`}
-  </section>`;
+  const { looks } = ui;
+  const list = useRef(/** @type {HTMLElement | null} */ (null));
+  const count = useRef(Infinity);
+  // What has just been kept is seen, at the end.
+  useLayoutEffect(() => {
+    if (looks.length > count.current) list.current?.scrollTo({ left: list.current.scrollWidth });
+    count.current = ui.ready ? looks.length : Infinity;
+  }, [looks.length, ui.ready]);
+  const current = currentLook(ui);
+  const kind = !looks.length ? 'is-empty' : ui.mix ? 'is-comparing' : '';
+  return html`<section class=${`looks ${kind}`} aria-label="Looks"><div class="looks-row">
+    ${
+      looks.length > 0 &&
+      html`<ul ref=${list}>${looks.map(
+        (one) => html`<${Kept} key=${one.id} one=${one} isCurrent=${one.id === current}
+          ui=${ui} hands=${hands} />`,
+      )}</ul>`
+    }
+    ${
+      !looks.length &&
+      ui.ready &&
+      html`<p class="faint">No look kept yet: <kbd>${MOD} S</kbd> keeps painting and answer.</p>`
+    }
+    ${looks.length > 1 && html`<${Mix} ui=${ui} hands=${hands} />`}
+  </div></section>`;
 }
 
-/** @param {{one: Look, ui: Ui, hands: Hands}} props */
-function Kept({ one, ui, hands }) {
+/** @param {{one: Look, isCurrent: boolean, ui: Ui, hands: Hands}} props */
+function Kept({ one, isCurrent, ui, hands }) {
   const { session } = hands;
   const [isNaming, setNaming] = useState(false);
   const [isSure, setSure] = useState(false);
   const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
   const its = inView(one.thumbnail, ui.view);
   const picture = its in ui.resources ? its : one.thumbnail;
-  return html`<li class="look" onPointerLeave=${() => setSure(false)}>
+  const tip = isCurrent
+    ? 'Painting and answer are this look'
+    : 'Go on from this look; undo comes back';
+  return html`<li class=${`look ${isCurrent ? 'is-current' : ''}`}
+    onPointerLeave=${() => setSure(false)}>
     <button type="button" class="look-picture" aria-label=${`Go on from ${one.name}`}
-      data-tip="Go on from this look; undo comes back"
-      onClick=${() => session.send('load_look', { look: one.id })}>
+      aria-current=${isCurrent ? 'true' : undefined} data-tip=${tip}
+      onClick=${() => goOnFrom(hands, one.id)}>
       <${Thumb} name=${picture} generation=${ui.resources[picture] ?? 0} hands=${hands} />
     </button>
     ${
       isNaming
         ? html`<${Naming} one=${one} hands=${hands} done=${() => setNaming(false)} />`
-        : html`<button type="button" class="look-name" data-tip="Rename"
+        : html`<button type="button" class="look-name" data-tip=${`Rename ${one.name}`}
           onClick=${() => setNaming(true)}>${one.name}</button>`
     }
     <span class="look-tools">
@@ -62,43 +88,55 @@ function Naming({ one, hands, done }) {
   const press = (/** @type {KeyboardEvent} */ event) => {
     if (event.key === 'Enter') take();
     if (event.key === 'Escape') done();
-    event.stopPropagation();
   };
   return html`<input class="naming" ref=${ref} type="text" aria-label=${`Name of ${one.name}`}
     defaultValue=${one.name} value=${one.name} maxlength="60" onBlur=${take} onKeyDown=${press} />`;
 }
 
+/** The look that painting and answer are now, or else the newest, beside the one before it.
+ * @param {Ui} ui */
+function pairOf(ui) {
+  const ids = ui.looks.map((one) => one.id);
+  const b = currentLook(ui) ?? Math.max(...ids);
+  const at = ids.indexOf(b);
+  return { a: ids[at > 0 ? at - 1 : 1], b };
+}
+
 /** Two looks beside each other, and what lies between them. @param {{ui: Ui, hands: Hands}} props */
 function Mix({ ui, hands }) {
   const { store } = hands;
-  const ids = ui.looks.map((one) => one.id);
-  const [a, b] = [ui.mix?.a ?? ids[0], ui.mix?.b ?? ids[1]];
+  const now = ui.mix ?? { ...pairOf(ui), share: 1 };
   const choices = ui.looks.map((one) => ({ value: String(one.id), label: one.name }));
+  const nameOf = (/** @type {number} */ id) => ui.looks.find((one) => one.id === id)?.name ?? '';
   const set = (/** @type {{a?: number, b?: number, share?: number}} */ changed) => {
-    const mix = { a, b, share: ui.mix?.share ?? 1, ...changed };
+    const mix = { ...now, ...changed };
     store.set({ mix });
     look(store, { left: 'solution', right: 'other', instead: mixOf(ui, { ...mix, share: 0 }) });
   };
-  const keep = () => {
-    const names = [a, b].map((id) => ui.looks.find((one) => one.id === id)?.name ?? '');
-    const part = ui.mix?.share ?? 1;
-    const name = `${names.join(' to ')}, ${Math.round(100 * part)} %`;
-    hands.session.send('mix_looks', { first: a, second: b, part, name });
-  };
+  const keep = () =>
+    hands.session.send('mix_looks', {
+      first: now.a,
+      second: now.b,
+      part: now.share,
+      name: betweenOf(ui.looks, now),
+    });
   return html`<div class="mix" role="group" aria-label="Compare two looks">
-    <div class="row">
-      <${Button} label=${ui.mix ? 'Back to the painting' : 'Compare looks'} on=${Boolean(ui.mix)}
-        act=${() => (ui.mix ? store.set(unmixed) : set({}))} />
-      <${Select} label="First look" hidden value=${String(a)} choices=${choices}
-        change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
-      <${Select} label="Second look" hidden value=${String(b)} choices=${choices}
-        change=${(/** @type {string} */ id) => set({ b: Number(id) })} /></div>
     ${
       ui.mix &&
-      html`<div class="row"><${Slider} label="Between" value=${100 * ui.mix.share} least=${0}
-          most=${100} unit="%"
-          change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
-        <${Button} label="Keep as look" act=${keep} /></div>`
+      html`<${Select} label="First look" hidden value=${String(now.a)} choices=${choices}
+        tip=${`From ${nameOf(now.a)}`}
+        change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
+      <${Slider} label="Between" value=${100 * now.share} least=${0} most=${100} unit="%"
+        tip=${`How far from ${nameOf(now.a)} to ${nameOf(now.b)}`}
+        change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
+      <${Select} label="Second look" hidden value=${String(now.b)} choices=${choices}
+        tip=${`To ${nameOf(now.b)}`}
+        change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
+      <${Button} icon="plus" label="Keep as look" class="keep" act=${keep}
+        tip=${`Keep ${betweenOf(ui.looks, now)}`} />`
     }
+    <${Button} icon="side" label=${ui.mix ? 'Back to the painting' : 'Compare looks'} class="compare"
+      tip=${ui.mix ? 'Painting and answer again' : 'Two looks side by side, and what lies between'}
+      on=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(unmixed) : set({}))} />
   </div>`;
 }

@@ -14,15 +14,16 @@ import { ofKelvin } from './colours.js';
 /** stamp: when it was kept, in seconds since 1970.
  * @typedef {{id: number, name: string, weights: RGB[], stamp: number, thumbnail: string}} Look */
 /** @typedef {Record<string, any>} Asked */
-/** @typedef {{headline: string, delta_e: number, delta_e_asked: number, sentences: string[]}}
- * Seen */
+/** What keeps the lights from the paint, and can be let go of by a setting.
+ * @typedef {"hold" | "colors"} Help */
+/** @typedef {{headline: string, help: Help | null, delta_e: number, delta_e_asked: number,
+ *   sentences: string[]}} Seen */
 /** @typedef {{what: string, done: number, total: number, unit: string}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
 /**
  * @typedef {object} Ui
  * @property {boolean} ready whether the session has said what there is
- * @property {boolean} readonly
  * @property {string} waiting why there is nothing yet, if something went wrong
  * @property {boolean} isWriting files
  * @property {Progress | null} writing how far that is, where it takes long
@@ -37,26 +38,32 @@ import { ofKelvin } from './colours.js';
  * @property {Lit[]} lit the last exact answer
  * @property {RGB[]} weights the last answer
  * @property {string} headline
+ * @property {Help | null} help what the headline advises
  * @property {number | null} deltaE
  * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
  * @property {string[]} sentences
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
+ * @property {boolean} isJudged whether what is said of the answer is of the last one
  * @property {Record<string, Asked>} asked
  * @property {string[][]} ties
  * @property {Record<string, any>} settings
  * @property {Record<string, any>} meant
- * @property {{undo: string[], redo: string[]}} history
+ * @property {{undo: string[], redo: string[], count?: number}} history labels of the last steps,
+ *   and how many there are
  * @property {Look[]} looks
+ * @property {{look: number, version: number, steps: number} | null} lastLook that was kept or
+ *   gone on from last, with the version and the number of steps then
  * @property {Progress | null} basis
  * @property {Progress | null} verifying
  * @property {{done: number, total: number} | null} loading
  * @property {{agrees: boolean, text: string, isOld?: boolean} | null} verified
  * @property {string[]} explained
  * @property {boolean} explaining
- * @property {{files: string[], command: string} | null} exported
+ * @property {{files: string[], command: string, is_unpainted?: boolean} | null} exported
  * @property {"wait" | "open" | "lost" | "stale"} connection
  * @property {boolean} isSilent whether an answer is long in coming
  * @property {{reason: string, text: string} | null} closed
+ * @property {number} unheard strokes that were lost since no session is there to hear them
  * @property {Toast[]} toasts
  * @property {Record<string, number>} resources
  * @property {boolean} hint whether somebody still has to be told what to do
@@ -64,24 +71,27 @@ import { ofKelvin } from './colours.js';
  * @property {number} size
  * @property {number} hardness
  * @property {number} flow
+ * @property {number} fillFlow that of Fill
  * @property {number} importance
  * @property {"light" | "look"} as
  * @property {"spot" | "object"} about what a drag asks about
  * @property {RGB} colour linear, its largest channel at most 1
  * @property {number} stops brightness of the paint over `colour`
- * @property {{colour: RGB, stops: number}} second
- * @property {{colour: RGB, stops: number}[]} recent
+ * @property {import("./tools.js").Paint} second
+ * @property {import("./tools.js").Paint[]} recent
  * @property {"white" | "hsv" | "rgb"} mixer
  * @property {{stops: number, mired: number} | null} asking by a drag
  * @property {Show} show
  * @property {number[]} solo lights
  * @property {number[]} mute
  * @property {number | null} hovered light whose own picture is shown
- * @property {{object: string | null, shares: number[]} | null} pointed
+ * @property {import("./engine.js").Pointed | null} pointed
+ * @property {number | null} fit CSS pixels for each of the picture where all of it is seen
  * @property {{a: number, b: number, share: number} | null} mix of two looks, by their ids
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
- * @property {null | "keys" | "export" | "settings"} dialog
+ * @property {null | "settings"} panel what lies over the panels
+ * @property {null | "keys" | "export"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
  * @property {number[]} unfolded lights whose controls are open
@@ -111,7 +121,6 @@ const SHOW = {
 export function first() {
   return {
     ready: false,
-    readonly: false,
     waiting: '',
     isWriting: false,
     writing: null,
@@ -126,16 +135,19 @@ export function first() {
     lit: [],
     weights: [],
     headline: '',
+    help: null,
     deltaE: null,
     deltaAsked: null,
     sentences: [],
     isLive: false,
+    isJudged: true,
     asked: {},
     ties: [],
     settings: {},
     meant: {},
     history: { undo: [], redo: [] },
     looks: [],
+    lastLook: null,
     basis: null,
     verifying: null,
     loading: null,
@@ -146,6 +158,7 @@ export function first() {
     connection: 'wait',
     isSilent: false,
     closed: null,
+    unheard: 0,
     toasts: [],
     resources: {},
     hint: false,
@@ -153,7 +166,8 @@ export function first() {
     size: 60,
     hardness: 0.2,
     flow: 0.5,
-    importance: 1,
+    fillFlow: 1,
+    importance: 4,
     as: 'light',
     about: 'spot',
     colour: ofKelvin(3200),
@@ -167,9 +181,11 @@ export function first() {
     mute: [],
     hovered: null,
     pointed: null,
+    fit: null,
     mix: null,
     open: { colour: true, lights: true, truth: false },
     side: true,
+    panel: null,
     dialog: null,
     search: '',
     sort: 'scene',
@@ -182,7 +198,7 @@ export function first() {
  * @param {Ui} ui @returns {Show}
  */
 export function shown(ui) {
-  const show = { ...ui.show };
+  const show = { ...ui.show, overlay: overlayOf(ui) };
   const isAlone = ui.solo.length > 0;
   if (isAlone || ui.mute.length) {
     show.gains = ui.lights.map((_, k) => (isAlone ? ui.solo.includes(k) : !ui.mute.includes(k)));
@@ -198,6 +214,11 @@ export function shown(ui) {
     show.gains = null;
   }
   return show;
+}
+
+/** What lies over the pictures. Whoever paints importance sees it. @param {Ui} ui */
+export function overlayOf({ show, tool }) {
+  return show.overlay ?? (tool === 'weight' ? 'importance' : null);
 }
 
 /** By how much a light alone is shown brighter, so that one of many can be seen: whole stops.
@@ -227,6 +248,13 @@ export function mixOf(ui, { a, b, share }) {
   return from
     .map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * to[k][c]))
     .map((rgb) => /** @type {RGB} */ (rgb));
+}
+
+/** What lies between two looks is called so. @param {Look[]} looks
+ * @param {{a: number, b: number, share: number}} mix @returns {string} */
+export function betweenOf(looks, { a, b, share }) {
+  const [from, to] = [a, b].map((id) => looks.find((look) => look.id === id)?.name ?? '');
+  return `${from} → ${to}, ${Math.round(100 * share)} %`;
 }
 
 /** Linear light of the paint in the hand: at 0 stops it is as bright as what the scene's own

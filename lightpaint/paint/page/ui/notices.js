@@ -2,6 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
+import { counted } from './format.js';
 import { Icon } from './icons.js';
 import { Bar } from './bar.js';
 
@@ -22,38 +23,44 @@ export function Toasts({ ui, hands }) {
 const SILENT =
   'The kernel has not answered for 10 s: it is busy, or it has ended. What you paint is heard when it is free; if it was restarted, run the cell again.';
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function Banner({ ui, hands }) {
-  const { closed, connection, isSilent } = ui;
-  if (isSilent) {
-    return html`<div class="banner" role="alert"><${Icon} name="warn" />
-      <span>${SILENT}</span></div>`;
-  }
-  if (closed && connection !== 'stale') {
-    const canTake = closed.reason === 'taken';
-    return html`<div class="banner" role="alert"><${Icon} name="warn" /><span>${closed.text}</span>
-      ${
-        canTake &&
-        html`<${Button} label="Take over" primary
-        act=${() => hands.session.send('take_over')} />`
-      }
-      ${
-        closed.reason === 'version' &&
-        html`<${Button} label="Load the page anew" primary
-        act=${() => location.reload()} />`
-      }
-    </div>`;
-  }
-  if (connection !== 'lost' && connection !== 'stale') return null;
-  const text =
-    connection === 'lost'
-      ? 'The connection is lost. Finished strokes are safe; trying again …'
-      : 'This page is of an earlier start of the painter: open the address that its terminal shows.';
-  return html`<div class="banner" role="alert"><${Icon} name="warn" />
-    <span>${text}</span></div>`;
+const LOST =
+  'The connection is lost; trying again … What is finished is kept. What you paint now is sent if the same painter comes back.';
+
+/** @param {number} unheard strokes */
+function stale(unheard) {
+  const lost = unheard
+    ? ` Painted on it, never heard, and lost: ${counted(unheard, 'stroke')}.`
+    : '';
+  return `This page is of an earlier start of the painter: open the address that its terminal shows.${lost}`;
 }
 
-/** A basis that still renders, pictures that still load. @param {{ui: Ui}} props */
+/** Over the pictures; in the middle where there are none. @param {{ui: Ui, hands: Hands}} props */
+export function Banner({ ui, hands }) {
+  const { closed, connection, isSilent } = ui;
+  const said = (/** @type {string} */ text, /** @type {any} */ more = null) =>
+    html`<div class=${`banner ${ui.ready ? '' : 'is-alone'}`} role="alert">
+      <${Icon} name="warn" /><span>${text}</span>${more}</div>`;
+  if (isSilent) return said(SILENT);
+  if (closed && connection !== 'stale')
+    return said(closed.text, html`<${WayOn} ui=${ui} hands=${hands} />`);
+  if (connection === 'lost') return said(LOST);
+  if (connection === 'stale') return said(stale(ui.unheard));
+  return null;
+}
+
+/** What can be done where the session is not. @param {{ui: Ui, hands: Hands}} props */
+function WayOn({ ui, hands }) {
+  const reason = ui.closed?.reason;
+  if (reason === 'taken') {
+    return html`<${Button} label="Take over" primary tip="Go on here, and no longer there"
+      act=${() => hands.session.send('take_over')} />`;
+  }
+  if (reason !== 'version') return null;
+  return html`<${Button} label="Load the page anew" primary act=${() => location.reload()} />`;
+}
+
+/** A basis that still renders, pictures that still load; in short while the pointer is on a picture,
+ * of which more is said beside it. @param {{ui: Ui}} props */
 export function Working({ ui }) {
   const { basis, loading } = ui;
   const work = basis ?? (loading && loading.done < loading.total ? loading : null);
@@ -62,7 +69,8 @@ export function Working({ ui }) {
   const text = basis
     ? `Rendering the lights:${count} ${basis.unit ?? ''}. You can paint already.`
     : `Loading pictures of the lights:${count}`;
-  return html`<div class="working"><${Bar} progress=${work} label=${text} /><span>${text}</span></div>`;
+  return html`<div class="working"><${Bar} progress=${work} label=${text} />
+    <span>${ui.pointed ? count.trim() : text}</span></div>`;
 }
 
 /** How long a pointer rests before a tip is shown. */

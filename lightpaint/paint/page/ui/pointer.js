@@ -52,7 +52,7 @@ export class Pointer {
 
   /** @param {PointerEvent} event */
   down(event) {
-    if (this.store.value.closed) return;
+    if (isElsewhere(this.store.value)) return;
     const place = this.place(event);
     this.fingers.set(event.pointerId, place);
     capture(event);
@@ -71,10 +71,10 @@ export class Pointer {
   /** @param {PointerEvent} event */
   press(event) {
     const point = this.point(event);
-    const { tool, readonly } = this.store.value;
+    const { tool } = this.store.value;
     if (!point) return;
-    if (event.altKey || tool === 'pick' || readonly) {
-      if (!readonly) take(this.store, this.engine.lightAt(point.kind, point.x, point.y));
+    if (event.altKey || tool === 'pick') {
+      take(this.store, this.engine.paintAt(point.kind, point.x, point.y));
       this.pane = null;
       return;
     }
@@ -126,25 +126,32 @@ export class Pointer {
 
   /** Nobody paints on what they do not see. */
   canPaint() {
-    const { left, right } = this.store.value.show;
+    const { mix, show } = this.store.value;
+    const { left, right } = show;
     const isShown = left === 'painting' || right === 'painting';
-    if (!isShown)
-      this.say('The painting is not shown: compare Painting | Answer to go on with it.');
+    const way = mix ? 'press Back to the painting' : 'compare Painting | Answer';
+    if (!isShown) this.say(`The painting is not shown: ${way} to go on with it.`);
     return isShown;
   }
 
-  /** A stroke of one place, by keys. @param {number} x @param {number} y in CSS pixels */
-  dab(x, y) {
+  /** A stroke of one place, by keys; or a line to it, from where the last one was.
+   * @param {number} x @param {number} y in CSS pixels @param {boolean} [isLine] */
+  dab(x, y, isLine = false) {
     const pane = paneAt(this.engine, x, y);
-    const { closed, readonly, tool } = this.store.value;
-    if (!pane || closed || readonly) return;
+    const { tool } = this.store.value;
+    if (!pane || isElsewhere(this.store.value)) return;
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
-    if (tool === 'pick') return take(this.store, this.engine.lightAt(pane.kind, point.x, point.y));
+    if (tool === 'pick') return take(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
+    if (tool === 'ask')
+      return this.say('Ask is a drag. In numbers, above the pictures, asks without one.');
     if (!this.canPaint()) return;
     remember(this.store);
     this.store.set({ hint: false });
-    this.engine.begin(point);
-    this.engine.end();
+    if (isLine && this.last) this.engine.line(this.last, point);
+    else {
+      this.engine.begin(point);
+      this.engine.end();
+    }
     this.last = point;
   }
 
@@ -196,6 +203,9 @@ export class Pointer {
   /** @type {import("./engine.js").Pane | null} */
   pane = null;
 }
+
+/** Whether nobody hears what is painted here. @param {import("./model.js").Ui} ui */
+const isElsewhere = ({ closed, connection }) => closed !== null || connection === 'stale';
 
 /** @param {Engine} engine @param {number} x @param {number} y */
 export function paneAt(engine, x, y) {

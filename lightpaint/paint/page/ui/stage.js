@@ -3,14 +3,17 @@
 import { inView } from '../engine/protocol.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
 import { toHex } from './colours.js';
-import { point, ring } from './cursor.js';
+import { point, pointAgain, pointAway, ring } from './cursor.js';
 import { counted } from './format.js';
 import { isTyping } from './keys.js';
-import { gainOf, paintOf, shown } from './model.js';
+import { betweenOf, gainOf, paintOf, shown } from './model.js';
+import { Near } from './near.js';
+import { Outline } from './outline.js';
 import { Pointer } from './pointer.js';
-import { look } from './tools.js';
+import { firstHintOf, flowOf, look } from './tools.js';
 import { Legend } from './truth.js';
 import { Bar } from './bar.js';
+import { Button } from './controls.js';
 
 /** @typedef {import("./engine.js").Engine} Engine */
 /** @typedef {import("./engine.js").Pane} Pane */
@@ -34,14 +37,28 @@ function nameOf(ui, kind) {
     return `${ui.lights[ui.hovered].label} alone${stops > 0 ? `, ${counted(stops, 'stop')} brighter` : ''}`;
   }
   if (kind === 'other' && ui.mix) {
-    const [a, b] = [ui.mix.a, ui.mix.b].map((id) => ui.looks.find((one) => one.id === id)?.name);
-    return ui.mix.share === 1 ? `${b}` : `${a} → ${b}, ${Math.round(100 * ui.mix.share)} %`;
+    const { b, share } = ui.mix;
+    const to = ui.looks.find((one) => one.id === b)?.name;
+    return share === 1 && to ? to : betweenOf(ui.looks, ui.mix);
   }
   if (kind === 'solution' && ui.show.instead && ui.mix) {
     return ui.looks.find((one) => one.id === ui.mix?.a)?.name ?? NAMES.solution;
   }
+  if (isPartly(ui, kind)) return `${NAMES.solution}: ${partOf(ui)}`;
   if (kind === 'verified' && ui.verified?.isOld) return 'Render of an earlier answer';
   return NAMES[kind] ?? kind;
+}
+
+/** Whether a picture shows some of the lights only. @param {Ui} ui @param {string} kind */
+function isPartly(ui, kind) {
+  return kind === 'solution' && ui.solo.length + ui.mute.length > 0 && ui.hovered === null;
+}
+
+/** Which lights are shown, of an answer that has them all. @param {Ui} ui */
+function partOf({ solo, mute, lights }) {
+  const some = solo.length ? solo : mute;
+  const names = some.length > 2 ? `${some.length} lights` : some.map((k) => lights[k]?.label);
+  return `${solo.length ? 'only' : 'without'} ${[names].flat().join(' and ')}`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -74,7 +91,7 @@ export function Stage({ ui, hands }) {
   // At once, so that names lie where the pictures will.
   useMemo(
     () => engine.show(shown(ui)),
-    [ui.show, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights, ui.view],
+    [ui.show, ui.tool, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights, ui.view],
   );
   const hasAlbedo = ui.resources[inView('albedo', ui.view)] !== undefined;
   // Before the next press of a pointer.
@@ -86,7 +103,7 @@ export function Stage({ ui, hands }) {
         as: hasAlbedo ? ui.as : 'look',
         size: ui.size,
         hardness: ui.hardness,
-        flow: ui.flow,
+        flow: flowOf(ui),
         importance: ui.importance,
         about: ui.about,
       }),
@@ -97,53 +114,48 @@ export function Stage({ ui, hands }) {
       ui.as,
       ui.size,
       ui.hardness,
-      ui.flow,
+      flowOf(ui),
       ui.importance,
       ui.about,
       hasAlbedo,
     ],
   );
+  useEffect(() => pointAgain(engine, store), [ui.weights, ui.version, ui.show, ui.view, ui.as]);
   useEffect(() => ring(rings.current, engine, ui), [ui.size, ui.tool, ui.hardness, ui.show]);
   useSurface(frame, pointer, hands);
   const panes = ui.ready ? engine.panes() : [];
+  const fit = panes.length ? panes[0].scale / ui.show.zoom : null;
+  useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
   return html`<div class=${`stage is-${ui.tool}`} ref=${frame} tabindex="0" role="application"
-    aria-label="Pictures. Arrow keys move the brush, Enter paints." aria-describedby="lp-status">
+    aria-label="Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line." aria-describedby="lp-status">
+    ${ui.ready && html`<${Outline} ui=${ui} engine=${engine} panes=${panes} />`}
     <div class="rings" ref=${rings} hidden aria-hidden="true">
       <i class="ring" style=${{ '--paint': toHex(ui.colour) }}></i><i class="ring is-twin"></i>
     </div>
-    ${panes.map((pane, k) => html`<${Tag} key=${k} ui=${ui} pane=${pane} panes=${panes} />`)}
+    ${panes.map(
+      (pane, k) => html`<${Tag} key=${k} ui=${ui} hands=${hands} pane=${pane} panes=${panes} />`,
+    )}
     ${ui.ready && html`<${Legend} ui=${ui} hands=${hands} panes=${panes} />`}
     ${ui.show.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} hands=${hands} />`}
-    ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} />`}
-    ${ui.asking && html`<div class="asking" role="status">${asked(ui.asking)}</div>`}
+    ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} tool=${ui.tool} />`}
+    ${ui.ready && html`<${Near} ui=${ui} engine=${engine} rings=${rings} />`}
     ${!ui.ready && html`<${Waiting} ui=${ui} />`}
   </div>`;
 }
 
 /** Before there is anything to see. @param {{ui: Ui}} props */
 function Waiting({ ui }) {
-  const { basis } = ui;
+  const { basis, closed, connection } = ui;
+  // Nothing comes; why, the banner says.
+  if (closed || connection === 'stale') return null;
   const text = ui.waiting || (basis ? 'Rendering the first picture …' : 'Opening the scene …');
   return html`<div class="waiting" role="status"><span>${text}</span>
     ${!ui.waiting && html`<${Bar} progress=${basis ?? { done: 0, total: 0 }} label=${text} />`}
   </div>`;
 }
 
-/** @param {{stops: number, mired: number}} asking */
-function asked({ stops, mired }) {
-  const bright =
-    Math.abs(stops) < 0.05
-      ? 'as bright'
-      : `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
-  const warm =
-    Math.abs(mired) < 3
-      ? ''
-      : `, ${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
-  return bright + warm;
-}
-
-/** @param {{ui: Ui, pane: Pane, panes: Pane[]}} props */
-function Tag({ ui, pane, panes }) {
+/** @param {{ui: Ui, hands: Hands, pane: Pane, panes: Pane[]}} props */
+function Tag({ ui, hands, pane, panes }) {
   const isRight = ui.show.layout === 'wipe' && pane === panes[0] && panes.length > 1;
   const size = /** @type {[number, number]} */ ([...ui.state.size].reverse());
   if (pane.width < 90) return null;
@@ -154,20 +166,28 @@ function Tag({ ui, pane, panes }) {
     left: `${(isRight ? right : Math.max(pane.x, pane.left)) + (isRight ? -8 : 8)}px`,
     transform: isRight ? 'translateX(-100%)' : '',
   };
-  return html`<span class="tag" style=${style}>${nameOf(ui, pane.kind)}</span>`;
+  const isPart = isPartly(ui, pane.kind);
+  const all = () => hands.store.set({ solo: [], mute: [] });
+  return html`<span class=${`tag ${isPart ? 'is-part' : ''}`} style=${style}>
+    <span>${nameOf(ui, pane.kind)}</span>
+    ${
+      isPart &&
+      html`<span onPointerDown=${(/** @type {Event} */ event) => event.stopPropagation()}>
+        <${Button} icon="close" tip="Show all lights" act=${all} /></span>`
+    }</span>`;
 }
 
-/** @param {{panes: Pane[]}} props */
-function Hint({ panes }) {
+/** @param {{panes: Pane[], tool: import("./engine.js").Tool}} props */
+function Hint({ panes, tool }) {
   const pane = panes.find((one) => one.kind === 'painting');
   if (!pane) return null;
+  const { title, text } = firstHintOf(tool);
   return html`<div class="hint" style=${{
     left: `${pane.x + pane.width / 2}px`,
     top: `${pane.y + pane.height / 2}px`,
     maxWidth: `${Math.min(320, pane.width - 24)}px`,
   }}>
-    <strong>Paint how it should look</strong>
-    <span>Choose a colour, drag over this picture. The lights follow on the other one.</span>
+    <strong>${title}</strong><span>${text}</span>
   </div>`;
 }
 
@@ -229,7 +249,7 @@ function useSurface(frame, pointer, hands) {
     on('wheel', (event) => pointer.wheel(event));
     on('contextmenu', (event) => event.preventDefault());
     on('pointerleave', () => {
-      store.set({ pointed: null });
+      pointAway(store);
       const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'));
       if (rings && !pointer.doing) rings.hidden = true;
     });
@@ -255,7 +275,7 @@ function useSurface(frame, pointer, hands) {
   }, []);
 }
 
-/** The brush by keys: arrows move it, Enter paints a dab. @param {KeyboardEvent} event
+/** The brush by keys: arrows move it, Enter paints a dab, or with Shift a line. @param {KeyboardEvent} event
  * @param {Pointer} pointer @param {Engine} engine @param {UiStore} store */
 function byKeys(event, pointer, engine, store) {
   const way = /** @type {Record<string, [number, number]>} */ ({
@@ -274,5 +294,5 @@ function byKeys(event, pointer, engine, store) {
   const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
   const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
   pointer.moved(x, y);
-  if (event.key === 'Enter') pointer.dab(x, y);
+  if (event.key === 'Enter') pointer.dab(x, y, event.shiftKey);
 }

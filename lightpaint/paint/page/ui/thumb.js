@@ -5,10 +5,10 @@ import { html, useEffect, useRef } from '../vendor/preact.js';
 /** @typedef {import("./keys.js").Hands} Hands */
 
 /**
- * @param {{name: string, generation?: number, hands: Hands, label?: string}} props generation:
+ * @param {{name: string, generation?: number, hands: Hands}} props generation:
  *   undefined while there is no such picture
  */
-export function Thumb({ name, generation, hands, label }) {
+export function Thumb({ name, generation, hands }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {
     if (generation === undefined) return undefined;
@@ -36,8 +36,8 @@ export function Thumb({ name, generation, hands, label }) {
       end();
     };
   }, [name, generation]);
-  return html`<canvas class="thumb" ref=${ref} width="1" height="1" role=${label ? 'img' : undefined}
-    aria-label=${label} aria-hidden=${label ? undefined : 'true'}></canvas>`;
+  return html`<canvas class="thumb" ref=${ref} width="1" height="1"
+    aria-hidden="true"></canvas>`;
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./engine.js").Picture} picture (h, w, 3) */

@@ -3,8 +3,10 @@
 import { inView } from '../engine/protocol.js';
 import { html, useState } from '../vendor/preact.js';
 import { toHex } from './colours.js';
+import { shownAs } from './colour.js';
 import { Button, Choice, Number_, Select, Slider } from './controls.js';
-import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from './tools.js';
+import { signed } from './format.js';
+import { choose, flowOf, LEAST_SIZE, MOST_SIZE, setFlow, swap, TOOLS } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -13,6 +15,12 @@ import { choose, LEAST_SIZE, MOST_SIZE, swap, TOOLS } from './tools.js';
 const RATIO = {
   to: (/** @type {number} */ x) => Math.log2(x),
   of: (/** @type {number} */ t) => Math.round(2 ** t),
+};
+
+/** As much more as less; what is near 1 is 1. */
+const TIMES = {
+  to: (/** @type {number} */ x) => Math.log10(x),
+  of: (/** @type {number} */ t) => Number((10 ** (Math.abs(t) < 0.02 ? 0 : t)).toPrecision(2)),
 };
 
 const ABOUT = [
@@ -27,7 +35,13 @@ const PAINT_AS = [
 /** @param {{ui: Ui, hands: Hands}} props */
 export function ToolBar({ ui, hands }) {
   const { store } = hands;
-  const style = { '--first': toHex(ui.colour), '--second': toHex(ui.second.colour) };
+  const both = { ...ui, ...ui.second };
+  const style = {
+    '--first': toHex(ui.colour),
+    '--first-shown': shownAs(ui, hands),
+    '--second': toHex(both.colour),
+    '--second-shown': shownAs(both, hands),
+  };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
@@ -36,7 +50,7 @@ export function ToolBar({ ui, hands }) {
     )}
     <div class="spring"></div>
     <button type="button" class="two-colours" style=${style} data-tip="Other colour" data-keys="X"
-      aria-keyshortcuts="X" aria-label=${`Swap colours: ${toHex(ui.colour)} in the hand`}
+      aria-keyshortcuts="X" aria-label=${`Swap colours: ${toHex(ui.colour)}, ${signed(ui.stops)} stops, in the hand`}
       onClick=${() => swap(store)}><i></i><i></i></button>
   </nav>`;
 }
@@ -47,6 +61,9 @@ export function ToolOptions({ ui, hands }) {
   const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? '';
   const strokes = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
   const paints = ['brush', 'fill', 'line'].includes(ui.tool);
+  const isAsking = ui.side && !ui.panel && Boolean(ui.open.ask);
+  const numbers = () =>
+    store.set({ side: true, panel: null, open: { ...ui.open, ask: !isAsking } });
   return html`<div class="options" role="group" aria-label=${`${label} settings`}>
     <strong>${label}</strong>
     ${
@@ -57,8 +74,9 @@ export function ToolOptions({ ui, hands }) {
     }
     ${
       ui.tool === 'weight' &&
-      html`<${Slider} label="Importance" value=${ui.importance} least=${0}
-      most=${1} step=${0.05} digits=${2} rest=${1}
+      html`<${Slider} label="Counts" value=${ui.importance} least=${0.1}
+      most=${10} curve=${TIMES} step=${0.1} digits=${2} rest=${1} unit="×"
+      tip="How many times as much a place counts as it did: above 1 the answer fits better there"
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
     ${
@@ -82,9 +100,18 @@ export function ToolOptions({ ui, hands }) {
     }
     ${
       (strokes || ui.tool === 'fill') &&
-      html`<${Slider} label="Flow" value=${100 * ui.flow}
-      least=${1} most=${100} unit="%" keys="1 … 0" tip="Flow: how much paint each touch leaves"
-      change=${(/** @type {number} */ flow) => store.set({ flow: flow / 100 })} />`
+      html`<${Slider} label="Flow" value=${100 * flowOf(ui)}
+      least=${1} most=${100} unit="%" keys="1 … 0" tip=${
+        strokes
+          ? 'Flow: how much paint each touch leaves'
+          : 'Flow of Fill: how much paint it leaves'
+      }
+      change=${(/** @type {number} */ flow) => setFlow(store, flow / 100)} />`
+    }
+    ${
+      ui.tool === 'ask' &&
+      html`<${Button} label="In numbers" on=${isAsking}
+      tip="Ask for so many stops and mired, of an object or of the whole picture" act=${numbers} />`
     }
   </div>`;
 }

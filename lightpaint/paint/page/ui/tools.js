@@ -15,7 +15,7 @@ export const TOOLS = [
     label: 'Eraser',
     icon: 'eraser',
     keys: 'E',
-    tip: 'Eraser: take paint away; what is not painted stays near the present look',
+    tip: 'Eraser: take paint away; what is not painted stays near how it looks now',
   },
   {
     tool: 'weight',
@@ -42,23 +42,67 @@ export const TOOLS = [
   },
 ];
 
-export const HINTS = /** @type {Record<Tool, string>} */ ({
+const HINTS = /** @type {Record<Tool, string>} */ ({
   brush: 'Drag on the painting. Shift-click draws a line, Alt-click takes a colour.',
-  eraser: 'Erased places are free again, and held near the present look.',
-  weight: 'Paint where it matters most. At 0 a place does not count.',
+  eraser: 'Takes paint away. What is not painted is kept near how it looks now.',
+  weight: 'Paint where the answer has to fit best: a place counts so many times as much as before.',
   pick: 'Click on either picture: the light there becomes the paint.',
   fill: 'Click on an object to paint all of it.',
   line: 'Drag from one end of the line to the other.',
   ask: 'Drag on a place: up brighter, down darker, right warmer, left cooler.',
 });
 
+/** Where fingers point. @type {Partial<Record<Tool, string>>} */
+const TOUCH_HINTS = {
+  brush: 'Drag on the painting with one finger. Two fingers move and zoom.',
+  pick: 'Tap on either picture: the light there becomes the paint.',
+  fill: 'Tap on an object to paint all of it.',
+};
+
+/** What a tool does. @param {Tool} tool */
+export function hintOf(tool) {
+  const isTouch = matchMedia('(pointer: coarse)').matches;
+  return (isTouch && TOUCH_HINTS[tool]) || HINTS[tool];
+}
+
+const PAINT = {
+  title: 'Paint how it should look',
+  text: 'Choose a colour, drag over this picture. The lights follow on the other one.',
+};
+
+/** What is said first, on the painting, where it is not to be painted with a brush.
+ * @type {Partial<Record<Tool, {title: string, text: string}>>} */
+const FIRST = {
+  weight: { title: 'Say where it has to fit', text: 'Drag over what matters on this picture.' },
+  pick: {
+    title: 'Take light from a picture',
+    text: 'It becomes the paint. Then choose the brush.',
+  },
+  fill: {
+    title: PAINT.title,
+    text: 'Choose a colour, then an object of this picture. The lights follow on the other one.',
+  },
+  ask: {
+    title: 'Ask how it should look',
+    text: 'Drag on a place of this picture: up brighter, down darker, right warmer, left cooler.',
+  },
+};
+
+/** @param {Tool} tool */
+export const firstHintOf = (tool) => FIRST[tool] ?? PAINT;
+
 export const LEAST_SIZE = 2;
 export const MOST_SIZE = 1000;
 
+/** Of paint, over or under white, that its slider has. */
+export const MOST_STOPS = 8;
+
+/** Colours that were used lately, at most. */
+const MOST_RECENT = 7;
+
 /** @param {UiStore} store @param {Tool} tool */
 export function choose(store, tool) {
-  // Who asks by a drag may want to do it in numbers.
-  store.set(({ open }) => ({ tool, open: tool === 'ask' ? { ...open, ask: true } : open }));
+  store.set({ tool });
 }
 
 /** @param {UiStore} store */
@@ -75,21 +119,39 @@ export function take(store, light) {
   const shown = light.map((x) => Math.max(0, x) * 2 ** exposureOf(store.value.state));
   const top = Math.max(...shown);
   if (!(top > 0)) return store.set({ colour: [0, 0, 0], stops: 0 });
-  const scale = Math.max(1, top);
-  store.set({
-    colour: /** @type {RGB} */ (shown.map((x) => x / scale)),
-    stops: Math.log2(scale),
-  });
+  const stops = Math.min(MOST_STOPS, Math.max(-MOST_STOPS, Math.log2(top)));
+  // What is darker than that is a darker colour.
+  const scale = Math.max(top, 2 ** stops);
+  store.set({ colour: /** @type {RGB} */ (shown.map((x) => x / scale)), stops: Math.log2(scale) });
 }
+
+/** @typedef {{colour: RGB, stops: number}} Paint */
 
 /** Remember what was painted with. @param {UiStore} store */
 export function remember(store) {
   const { colour, stops, recent, tool } = store.value;
   if (!['brush', 'fill', 'line'].includes(tool)) return;
-  const same = (/** @type {{colour: RGB, stops: number}} */ one) =>
-    toHex(one.colour) === toHex(colour) && Math.abs(one.stops - stops) < 0.01;
-  if (recent.length && same(recent[0])) return;
-  store.set({ recent: [{ colour, stops }, ...recent.filter((one) => !same(one))].slice(0, 7) });
+  if (recent.length && isSame({ colour, stops }, recent[0])) return;
+  store.set({ recent: used([{ colour, stops }, ...recent]) });
+}
+
+/** Each once, and no more than there is room for. @param {Paint[]} paints the latest first */
+export function used(paints) {
+  const once = paints.filter((one, k) => !paints.slice(0, k).some((other) => isSame(one, other)));
+  return once.slice(0, MOST_RECENT);
+}
+
+/** @param {Paint} one @param {Paint} other */
+const isSame = (one, other) =>
+  toHex(one.colour) === toHex(other.colour) && Math.abs(one.stops - other.stops) < 0.01;
+
+/** That of the tool in the hand: who fills wants all of it, whatever the brush leaves.
+ * @param {import("./model.js").Ui} ui */
+export const flowOf = (ui) => (ui.tool === 'fill' ? ui.fillFlow : ui.flow);
+
+/** @param {UiStore} store @param {number} flow */
+export function setFlow(store, flow) {
+  store.set(store.value.tool === 'fill' ? { fillFlow: flow } : { flow });
 }
 
 /** @param {UiStore} store @param {number} way +1 or −1 */
@@ -107,6 +169,11 @@ export function harden(store, way) {
 /** @param {UiStore} store @param {Partial<import("./engine.js").Show>} changes */
 export function look(store, changes) {
   store.set((ui) => ({ show: { ...ui.show, ...changes } }));
+}
+
+/** Panels away, and back. @param {UiStore} store */
+export function fold(store) {
+  store.set(({ side, panel }) => ({ side: !(side || panel), panel: null }));
 }
 
 /** The next of some values. @template T @param {readonly T[]} values @param {T} now @returns {T} */

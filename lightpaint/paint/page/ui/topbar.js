@@ -3,7 +3,8 @@
 import { html } from '../vendor/preact.js';
 import { Button, Check, Choice, Select, Slider } from './controls.js';
 import { signed } from './format.js';
-import { look } from './tools.js';
+import { showPixels } from './keys.js';
+import { fold, look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -22,15 +23,12 @@ export function TopBar({ ui, hands }) {
   const redo = history.redo.at(-1);
   return html`<header class="top">
     <div class="title"><strong>${ui.state?.scene || 'lightpaint'}</strong></div>
-    ${
-      !ui.readonly &&
-      html`<div class="group" role="group" aria-label="History">
+    <div class="group" role="group" aria-label="History">
       <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : 'Undo'} keys="Control+Z"
         disabled=${!undo} act=${() => session.send('undo')} />
       <${Button} icon="redo" tip=${redo ? `Redo: ${redo}` : 'Redo'} keys="Control+Shift+Z"
         disabled=${!redo} act=${() => session.send('redo')} />
-    </div>`
-    }
+    </div>
     <div class="spring"></div>
     <${Choice} label="Pictures" icons value=${show.layout} choices=${LAYOUTS}
       change=${(/** @type {any} */ layout) => look(store, { layout })} />
@@ -40,27 +38,32 @@ export function TopBar({ ui, hands }) {
       text=${`${signed(show.stops)} stops`}
       change=${(/** @type {number} */ stops) => look(store, { stops })} />
     <${ViewChoice} ui=${ui} hands=${hands} />
-    <div class="group" role="group" aria-label="Zoom">
-      <${Button} label=${`${Math.round(100 * show.zoom)} %`} class="zoom" keys="F"
-        tip="Zoom: back to the whole picture. Ctrl and wheel, or + and −, zoom."
-        act=${() => look(store, { zoom: 1, pan: [0, 0] })} />
-    </div>
+    <${Zoom} ui=${ui} hands=${hands} />
     <div class="group" role="group" aria-label="Painter">
-      ${
-        !ui.readonly &&
-        html`<${Button} icon="settings" tip="How the painting is answered"
-        act=${() => store.set({ dialog: 'settings' })} />`
-      }
-      ${
-        !ui.readonly &&
-        html`<${Button} icon="export" tip="Write files"
-        act=${() => store.set({ dialog: 'export' })} />`
-      }
+      <${Button} icon="settings" tip="How the painting is answered"
+        on=${ui.panel === 'settings'}
+        act=${() => store.set({ panel: ui.panel ? null : 'settings' })} />
+      <${Button} icon="export" tip="Write files"
+        act=${() => store.set({ dialog: 'export' })} />
       <${Button} icon="keys" tip="All keys" keys="?" act=${() => store.set({ dialog: 'keys' })} />
-      <${Button} icon="panel" tip="Panels" keys="P" on=${ui.side}
-        act=${() => store.set({ side: !ui.side })} />
+      <${Button} icon="panel" tip="Panels" keys="P" on=${ui.side || ui.panel !== null}
+        act=${() => fold(store)} />
     </div>
   </header>`;
+}
+
+/** How large a pixel of the picture is on the page, unless all of it is fitted in.
+ * @param {{ui: Ui, hands: Hands}} props */
+function Zoom({ ui: { show, fit }, hands }) {
+  const scale = (fit ?? 1) * show.zoom;
+  const isFitted = show.zoom === 1 && show.pan.every((x) => x === 0);
+  return html`<div class="group" role="group" aria-label="Zoom">
+    <${Button} label=${isFitted ? 'Fit' : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
+      tip="Zoom: fit all of the picture. Ctrl and wheel, or + and −, zoom."
+      act=${() => look(hands.store, { zoom: 1, pan: [0, 0] })} />
+    <${Button} label="1:1" class="zoom pixels" keys="Shift+F" on=${Math.abs(scale - 1) < 1e-3}
+      tip="100 %: one pixel of the picture on one of the page" act=${() => showPixels(hands)} />
+  </div>`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */

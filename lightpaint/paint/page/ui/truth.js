@@ -1,11 +1,13 @@
 /** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
 
-import { html, useEffect, useLayoutEffect, useRef } from '../vendor/preact.js';
+import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
 import { Bar } from './bar.js';
-import { Button, Choice } from './controls.js';
-import { number } from './format.js';
+import { Button, Choice, comeInto } from './controls.js';
+import { lightText, number } from './format.js';
 import { Icon } from './icons.js';
-import { HINTS, look } from './tools.js';
+import { isUnseen, keepLook } from './keeping.js';
+import { exposureOf, overlayOf } from './model.js';
+import { hintOf, look } from './tools.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
@@ -19,12 +21,14 @@ const OVERLAYS = [
   { value: 'importance', label: 'Painted', tip: 'What counts, and how much' },
 ];
 
+const COUNTS = 'counts';
+
 /** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
 const MEANINGS = {
   missed: ['too dark', 'fits', 'too bright'],
   beyond: ['in reach', 'out of reach'],
   falsecolor: ['−6 stops', 'grey', '+6'],
-  importance: ['free', 'counts'],
+  importance: ['free', COUNTS],
 };
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -39,41 +43,65 @@ export function TruthPanel({ ui, hands }) {
     <${Choice} label="Over the pictures" value=${ui.show.overlay} choices=${OVERLAYS}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
-    ${
-      !ui.readonly &&
-      html`<div class="row">
+    <div class="row">
       <${Button} label="Why not closer?" act=${() => session.explain()}
         tip="What keeps the lights from what was painted" />
       ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
-    </div>`
-    }
+    </div>
     ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
   </div>`;
 }
 
-/** What the colours over a picture mean, on that picture. What is out of reach is found anew when it
+/** CSS pixels of a legend, of one on a single line, and between it and its picture. */
+const LEGEND = { width: 210, height: 60, low: 22, gap: 8 };
+
+/** Where it covers nothing: below the picture, else beside it; where its pane has no room for that,
+ * on it, on a low line. @param {Pane} pane @param {[height: number, width: number]} size */
+function placed(pane, [rows, columns]) {
+  const { width, height, low, gap } = LEGEND;
+  const left = Math.max(pane.x, pane.left);
+  // The handle of the wipe lies there.
+  const inside = left > Math.max(0, pane.left) ? 3 * gap : gap;
+  const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale);
+  const bottom = Math.min(pane.y + pane.height, pane.top + rows * pane.scale);
+  const below = pane.y + pane.height - bottom;
+  if (below >= height + gap) return { left: left + inside, top: bottom + gap };
+  if (below >= low + 4) return { left: left + inside, top: bottom + 2, isLow: true };
+  const room = width + 2 * gap;
+  if (pane.x + pane.width - right >= room) return { left: right + gap, top: bottom - height };
+  if (left - pane.x >= room) return { left: left - gap - width, top: bottom - height };
+  return { left: left + inside, top: bottom - low - gap, isLow: true };
+}
+
+/** What the colours over a picture mean, at that picture. What is out of reach is found anew when it
  * is looked at and the answer is another one.
  * @param {{ui: Ui, hands: Hands, panes: Pane[]}} props */
 export function Legend({ ui, hands, panes }) {
-  const { overlay } = ui.show;
+  const overlay = overlayOf(ui);
   const isSought = overlay === 'beyond' && ui.deltaE !== null && !ui.isLive && !ui.explained.length;
   useEffect(() => {
     if (isSought && !ui.explaining) hands.session.explain();
   }, [isSought, ui.explaining]);
+  const isCounted = overlay === 'importance';
+  const most = useMemo(
+    () => (isCounted ? hands.engine.greatest() : 1),
+    [isCounted, ui.version, ui.weights, ui.view],
+  );
   const on = overlay === 'importance' ? 'painting' : 'solution';
   const pane =
     panes.find(({ kind }) => kind === on) ?? (overlay === 'falsecolor' ? panes[0] : undefined);
   if (!overlay || !pane) return null;
   const { label } = OVERLAYS.find(({ value }) => value === overlay) ?? OVERLAYS[0];
   const isOld = overlay === 'beyond' && !ui.explained.length;
-  const bottom = Math.min(pane.y + pane.height, pane.top + ui.state.size[0] * pane.scale);
-  return html`<div class="legend" style=${{
-    top: `${bottom - 8}px`,
-    left: `${Math.max(pane.x, pane.left) + 8}px`,
-  }}>
+  const { left, top, isLow } = placed(pane, ui.state.size);
+  const words = MEANINGS[overlay].map((text) =>
+    text === COUNTS && most > 1 ? `${text} ${number(most, 2)} ×` : text,
+  );
+  return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
+    style=${{ top: `${top}px`, left: `${left}px` }}>
     <b>${label}${isOld && ui.deltaE !== null ? ', being found …' : ''}</b>
     <i class=${`is-${overlay}`}></i>
-    ${MEANINGS[overlay].map((text) => html`<span key=${text}>${text}</span>`)}
+    ${words.map((text, k) => html`<span key=${k}>${text}</span>`)}
   </div>`;
 }
 
@@ -116,57 +144,99 @@ function Verified({ ui, hands }) {
 const DELTA_E =
   'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear; and of the light as it was';
 
+const STATES = {
+  live: 'A quick answer while you paint, without what takes longer; the exact one follows',
+  judging: 'The lights are found; how close they come is being worked out',
+  'answer not shown': 'It is said of the answer, which is neither of the looks that are compared',
+};
+
+/** What the sentence advises, as a button: which setting it changes, and to what.
+ * @type {Record<import("./model.js").Help, {key: string, value: any, label: string, tip: string}>} */
+const HELPS = {
+  hold: {
+    key: 'hold',
+    value: 0,
+    label: 'Let it go',
+    tip: 'What you did not paint may become anything. Undo holds it again.',
+  },
+  colors: {
+    key: 'colors',
+    value: 'free',
+    label: 'Any colour',
+    tip: 'Lamps may have whatever colour is best. Undo gives them theirs again.',
+  },
+};
+
+/** @param {{ui: Ui, hands: Hands}} props */
+function Help({ ui, hands }) {
+  const its = ui.help && HELPS[ui.help];
+  if (!its || ui.settings[its.key] === its.value) return null;
+  return html`<${Button} label=${its.label} tip=${its.tip} class="help"
+    act=${() => hands.session.setting(its.key, its.value)} />`;
+}
+
 /** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
-  const { store, session } = hands;
+  const { store } = hands;
   const text = ui.headline || (ui.ready ? 'Finding the lighting …' : '');
-  const isOpen = ui.side && ui.open.truth;
+  const isOpen = ui.side && !ui.panel && ui.open.truth;
+  const isOld = ui.headline !== '' && !ui.isJudged;
+  const busy = ui.isLive ? 'live' : isOld ? 'judging' : null;
+  const isApart = isUnseen(ui);
+  const state = isApart && text ? 'answer not shown' : busy;
+  const turn = (/** @type {MouseEvent} */ event) => {
+    const button = /** @type {HTMLElement} */ (event.currentTarget);
+    store.set({ side: true, panel: null, open: { ...ui.open, truth: !isOpen } });
+    if (!isOpen) comeInto(button, '.is-truth');
+  };
   return html`<div class="answer">
-    <p class="headline" role="status">
-      ${
-        ui.isLive
-          ? html`<span class="live" data-tip=${'A quick answer while you paint, without what takes longer; the exact one follows'}>live</span>`
-          : null
-      }
+    <p class=${`headline ${isOld || isApart ? 'is-old' : ''}`} role="status">
       <span class="said" data-tip=${text.length > 100 ? text : undefined}>${text}</span>
       ${
+        // In one place, so that the sentence keeps its lines.
+        state && html`<span class="live" data-tip=${STATES[state]}><b>${state}</b></span>`
+      }
+      ${
+        !state &&
         ui.deltaE !== null &&
         html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
-          ui.deltaAsked !== null && `, was ${number(ui.deltaAsked, 2)}`
+          ui.deltaAsked !== null && html`<span class="was">, was ${number(ui.deltaAsked, 2)}</span>`
         }</span>`
       }
     </p>
+    <${Help} ui=${ui} hands=${hands} />
     ${
-      !ui.readonly &&
       ui.ready &&
       html`<${Button} label="Keep look" icon="plus" keys="Control+S"
       tip="Keep painting and answer under a name"
-      act=${() => session.send('save_look', { name: `Look ${ui.looks.length + 1}` })} />`
+      act=${() => keepLook(hands)} />`
     }
     ${
       // It stays where it is when it is pressed: nothing else slides under the pointer.
-      ui.ready &&
-      html`<${Button} label="How true?" on=${isOpen} act=${() =>
-        store.set({ side: true, open: { ...ui.open, truth: !isOpen } })} />`
+      ui.ready && html`<${Button} label="How true?" on=${isOpen} act=${turn} />`
     }
   </div>`;
 }
 
-/** Which lights make up what is under the pointer; else what the tool does. @param {{ui: Ui}}
- * props */
+/** What light is under the pointer, and which lights make it up; else what the tool does.
+ * @param {{ui: Ui}} props */
 export function Here({ ui }) {
   if (!ui.pointed) {
-    const text = ui.readonly ? '' : HINTS[ui.tool];
+    const text = hintOf(ui.tool);
     return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
   }
-  const { object, shares } = ui.pointed;
-  const most = shares
+  const { object, shares, light } = ui.pointed;
+  const exposed = light.map((x) => x * 2 ** exposureOf(ui.state));
+  const most = (isUnseen(ui) ? [] : shares)
     .map((share, k) => ({ share, k }))
     .filter(({ share }) => share >= 0.01)
     .sort((a, b) => b.share - a.share)
     .slice(0, 5);
   return html`<p class="here" id="lp-status">${object && html`<span class="object">${object}</span>`}
+    <span class="light-here">${lightText(exposed)}${
+      ui.tool === 'pick' && html` · RGB ${exposed.map((x) => number(x, 3)).join(' ')}`
+    }</span>
     ${most.map(
       ({ share, k }) => html`<span key=${k}>${ui.lights[k]?.label}
       <b>${Math.round(100 * share)} %</b></span>`,

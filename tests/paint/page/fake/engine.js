@@ -226,12 +226,13 @@ export class FakeEngine {
   }
 
   cancel() {
-    if (!this.before) return;
+    if (!this.before) return false;
     this.calls.push(['cancel']);
     this.image = this.before;
     this.before = null;
     this.host.send('drop', { stroke: this.strokes });
     this.draw();
+    return true;
   }
 
   line(from, to) {
@@ -258,6 +259,24 @@ export class FakeEngine {
     return [...this.picture(kind).slice(3 * at, 3 * at + 3)];
   }
 
+  paintAt(kind, x, y) {
+    return this.lightAt(kind, x, y);
+  }
+
+  objects() {
+    const { w: width, h: height, surfaces } = this.room;
+    this.numbers ??= Int16Array.from(surfaces, ({ object }) => object);
+    return { data: this.numbers, width, height };
+  }
+
+  greatest() {
+    return this.importance ?? 1;
+  }
+
+  codes(rgb, stops) {
+    return rgb.map((x) => Math.round(encode(x * 2 ** stops)));
+  }
+
   pointed(x, y) {
     if (x < 0 || y < 0 || x >= this.room.w || y >= this.room.h) return null;
     const at = this.at(x, y);
@@ -265,8 +284,10 @@ export class FakeEngine {
       this.weights[k].reduce((sum, rgb, c) => sum + rgb * plane[3 * at + c], 0),
     );
     const total = each.reduce((a, b) => a + b, 1e-9);
+    const index = this.room.surfaces[at].object;
     return {
-      object: this.room.objects[this.room.surfaces[at].object],
+      object: this.room.objects[index],
+      index,
       shares: each.map((one) => one / total),
     };
   }

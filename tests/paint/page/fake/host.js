@@ -14,8 +14,8 @@ function halves(floats) {
 }
 
 export class FakeHost {
-  constructor(room, { isFirst }) {
-    Object.assign(this, { room, isFirst, said: [], hearers: {}, looks: [], ids: 0, stroke: 0 });
+  constructor(room, { isFirst, isElsewhere }) {
+    Object.assign(this, { room, isFirst, isElsewhere, said: [], hearers: {}, looks: [], ids: 0, stroke: 0 });
     this.weights = room.lights.map(({ present }) => [...present]);
     this.asked = {};
     this.ties = [];
@@ -50,7 +50,8 @@ export class FakeHost {
     for (const hear of this.hearers[message.kind] ?? []) hear(message);
   }
   open() {
-    this.tell(this.state());
+    const text = 'the painter is open in another tab';
+    this.tell(this.isElsewhere ? { kind: 'closed', reason: 'taken', text } : this.state());
   }
   close() {}
 
@@ -104,7 +105,7 @@ export class FakeHost {
         ? { spp: 4, wanted: 64, done: false, method: 'one pass' }
         : { spp: 64, wanted: 64, done: true, method: '' },
       first: !this.steps.length,
-      folder: 'gallery-evening',
+      folder: '/shows/gallery-evening',
       answer: this.exact(),
       ...this.asks(),
       arrays: flat(this.weights),
@@ -120,6 +121,7 @@ export class FakeHost {
       history: {
         undo: this.steps.map(({ label }) => label),
         redo: this.undone.map(({ label }) => label),
+        count: this.steps.length,
       },
     };
   }
@@ -161,6 +163,7 @@ export class FakeHost {
   patch() {
     return {
       kind: 'patch',
+      version: (this.version = (this.version ?? 0) + 1),
       region: [0, 0, 0, 0],
       ...this.exact(),
       ...this.asks(),
@@ -260,15 +263,26 @@ export class FakeHost {
     this.looks.push({ ...one, id: (this.ids += 1), name: `${one.name} 2` });
     return this.kept();
   }
+  mix_looks({ first, second, part, name }) {
+    const [a, b] = [first, second].map((look) => this.looks.find(({ id }) => id === look));
+    const id = (this.ids += 1);
+    const weights = a.weights.map((rgb, k) =>
+      rgb.map((x, c) => (1 - part) * x + part * b.weights[k][c]),
+    );
+    this.looks.push({ ...b, id, name, weights });
+    return this.kept();
+  }
   drop_look({ look }) {
     this.looks = this.looks.filter(({ id }) => id !== look);
     return this.kept();
   }
   export({ what }) {
+    const files = this.unpainted ? what.filter((one) => !['target', 'report'].includes(one)) : what;
     return {
       kind: 'exported',
-      files: what.map((one) => `gallery-evening/${one}`),
-      command: 'lightpaint solve gallery.xml gallery-evening/target.exr',
+      files: files.map((one) => `/shows/gallery-evening/${one}`),
+      command: files.includes('target') ? 'lightpaint solve gallery.xml gallery-evening/target.exr' : '',
+      is_unpainted: files.length < what.length,
     };
   }
   verify({ run }) {

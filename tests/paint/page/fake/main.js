@@ -1,4 +1,5 @@
-/** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`;
+/** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`,
+ * `?elsewhere`;
  * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
 import { mount } from '../app.js';
@@ -10,7 +11,10 @@ import { makeRoom } from './room.js';
 
 const asked = new URLSearchParams(location.search);
 const room = makeRoom(Number(asked.get('lights') ?? 7), asked.get('size') ?? '192x108');
-const host = new FakeHost(room, { isFirst: asked.has('first') });
+const host = new FakeHost(room, {
+  isFirst: asked.has('first'),
+  isElsewhere: asked.has('elsewhere'),
+});
 let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
 if (asked.has('shadow')) {
   const shadow = element.attachShadow({ mode: 'open' });

@@ -1,0 +1,485 @@
+"""What a painter's page says of an answer; how it is looked at, kept, written and sought."""
+
+from typing import Any
+
+import pytest
+from interface import Painter
+
+
+def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:
+    painter.stroke()
+    painter.still()
+    line, badge = painter.page.locator(".headline"), painter.page.locator(".headline .live")
+    said = line.locator(".said").inner_text()
+    assert badge.count() == 0
+    box = line.locator(".said").bounding_box()
+    lights = painter.page.evaluate("() => window.host.exact().lights")
+    painter.tell(kind="answer", version=100, exact=False)
+    assert badge.inner_text() == "live"
+    painter.tell(kind="answer", version=101, exact=True, lights=lights)
+    assert badge.inner_text() == "judging"
+    assert line.locator(".said").bounding_box() == box
+    assert "is-old" in line.get_attribute("class")
+    assert line.locator(".said").inner_text() == said
+    about = {"lights": lights, "delta_e": 2.0, "sentences": []}
+    painter.tell(kind="answer", version=101, exact=True, headline="Nearly.", **about)
+    assert line.locator(".said").inner_text() == "Nearly."
+    assert badge.count() == 0
+    assert "is-old" not in line.get_attribute("class")
+
+
+def test_names_from_files_are_text(painter: Painter) -> None:
+    painter.page.keyboard.press("a")
+    painter.button("In numbers", exact=True).click()
+    assert "blue <b>ball</b>" in painter.page.get_by_role("combobox", name="Where").inner_text()
+    painter.tell(kind="say", text="<img src=x>", tone="info")
+    assert painter.page.get_by_text("<img src=x>").is_visible()
+    assert painter.page.locator(".toasts img").count() == 0
+
+
+def test_an_answer_to_what_was_undone_says_nothing(painter: Painter) -> None:
+    asked, history = {"key": {"lock": 1}}, {"undo": ["brush"], "redo": []}
+    painter.tell(kind="answer", version=6, asked=asked, history=history)
+    assert (painter.ui("asked"), painter.ui("history")) == (asked, history)
+    undone = {"undo": [], "redo": ["brush"]}
+    painter.tell(kind="patch", version=7, asked={}, history=undone)
+    painter.tell(kind="answer", version=6, exact=True, asked=asked, history=history, headline="Old")
+    assert (painter.ui("asked"), painter.ui("history")) == ({}, undone)
+    painter.page.evaluate("() => host.tell({ ...host.state(), headline: '' })")  # counts anew
+    painter.tell(kind="answer", version=1, asked=asked, history=history)
+    assert (painter.ui("asked"), painter.ui("history")) == (asked, history)
+
+
+def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> None:
+    legend, press = painter.page.locator(".legend"), painter.page.keyboard.press
+    painter.page.locator(".stage").focus()
+    assert legend.count() == 0
+    press("o")
+    assert "too dark" in legend.inner_text()
+    press("o")  # asks for what it shows
+    painter.page.get_by_text("Out of reach", exact=True).wait_for()
+    asked = len(painter.said("explain"))
+    assert asked == 1
+    # An answer to an earlier painting is none.
+    painter.tell(kind="explained", sentences=["Old"], view=0, is_old=True)
+    painter.page.wait_for_function(
+        "(asked) => host.said.filter(({ kind }) => kind === 'explain').length > asked", arg=asked
+    )
+    painter.page.get_by_text("Out of reach", exact=True).wait_for()
+    assert len(painter.said("explain")) == asked + 1
+    press("o")
+    assert "grey" in legend.inner_text()
+    press("o")
+    assert "counts" in legend.inner_text()
+    press("o")
+    assert legend.count() == 0
+
+
+#: Pictures and how they are shown; whether there is room for a legend beside them.
+LEGENDS = [("48x27", "side", True), ("27x48", "wipe", True), ("48x27", "wipe", False)]
+
+
+@pytest.mark.parametrize(("size", "layout", "has_room"), LEGENDS)
+def test_a_legend_lies_on_no_picture_where_there_is_room(
+    opened: Any, size: str, layout: str, has_room: bool
+) -> None:
+    painter = opened(f"size={size}")
+    if layout == "wipe":
+        painter.page.keyboard.press("v")
+    painter.page.evaluate("() => { engine.importance = 10; }")
+    painter.page.keyboard.press("w")
+    legend = painter.page.locator(".legend")
+    assert legend.get_by_text("counts 10 ×").is_visible()
+    box, stage = legend.bounding_box(), painter.page.locator(".stage").bounding_box()
+    left, top, width, height = painter.page.evaluate(
+        "() => { const pane = engine.panes().find(({ kind }) => kind === 'painting');"
+        " const { w, h } = engine.room;"
+        " return [pane.left, pane.top, w * pane.scale, h * pane.scale]; }"
+    )
+    x, y = box["x"] - stage["x"], box["y"] - stage["y"]
+    apart = x + box["width"] <= left or x >= left + width or y >= top + height
+    assert apart == has_room
+    assert box["height"] <= (60 if has_room else 24)
+    assert 0 <= x <= stage["width"] - box["width"]
+    assert 0 <= y <= stage["height"] - box["height"]
+
+
+def test_truth(painter: Painter) -> None:
+    how = painter.page.locator(".answer").get_by_role("button", name="How true?")
+    box = how.bounding_box()
+    how.click()
+    assert how.bounding_box() == box  # or Keep look, and its tip, would be under the pointer
+    assert how.get_attribute("aria-pressed") == "true"
+    painter.button("False colour").click()
+    assert painter.ui("show")["overlay"] == "falsecolor"
+    painter.button("Out of reach").click()  # asks for what it shows
+    assert painter.said("explain")
+    assert painter.page.get_by_text("The cove is at its limit").is_visible()
+    painter.button("Verify").click()
+    assert painter.said("verify")[-1]["run"] is True
+    bar = painter.page.get_by_role("progressbar", name="Verifying")
+    painter.tell(kind="progress", what="verify", done=5, total=16, unit="passes")
+    assert bar.get_attribute("aria-valuenow") == "5"
+    painter.button("Stop the render").click()
+    assert painter.said("verify")[-1]["run"] is False
+    painter.button("Verify").click()
+    painter.tell(kind="progress", what="lights", done=5, total=16, unit="passes")
+    painter.tell(kind="stopped", what="verify")
+    assert painter.button("Verify").is_visible()
+    assert painter.page.locator(".working").is_visible()  # what else is under way goes on
+    painter.tell(kind="verified", agrees=True, text="The render agrees.")
+    painter.button("Answer | Render").click()
+    show = painter.ui("show")
+    assert (show["left"], show["right"], show["layout"]) == ("solution", "verified", "wipe")
+    painter.slide("Wipe", "ArrowRight")
+    assert painter.ui("show")["wipe"] == pytest.approx(0.52)
+
+
+def test_how_pictures_are_shown(painter: Painter) -> None:
+    painter.choose("Compare", "present solution")
+    painter.choose("View", "agx")
+    painter.type("Exposure", "1.5")
+    painter.page.get_by_label("Clean").uncheck()
+    show = painter.page.evaluate("() => window.engine.shown")
+    assert (show["left"], show["transform"], show["stops"]) == ("present", "agx", 1.5)
+    assert show["clean"] is False
+    assert not painter.said("set")  # for the eye only
+
+
+def test_looks(painter: Painter) -> None:
+    painter.button("Keep look").click()
+    painter.stroke()
+    painter.page.keyboard.press("Control+s")
+    assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
+    painter.button("Look 2", exact=True).click()
+    painter.page.get_by_label("Name of Look 2").fill("Dawn")
+    painter.page.get_by_label("Name of Look 2").press("Enter")
+    assert painter.said("rename_look")[-1] == {"kind": "rename_look", "look": 2, "name": "Dawn"}
+    painter.button("Go on from Look 1").click()
+    assert painter.said("load_look")[-1]["look"] == 1
+    painter.button("Compare looks").click()
+    painter.type("Between", "25")
+    one, two = (look["weights"] for look in painter.ui("looks"))
+    shown = painter.page.evaluate("() => window.engine.shown")
+    assert shown["instead"] == two  # what is there now lies on the right
+    between = [0.75 * a + 0.25 * b for a, b in zip(two[0], one[0], strict=True)]
+    assert shown["other"][0] == pytest.approx(between)
+    painter.stroke()
+    painter.page.get_by_text("The painting is not shown: press Back to the painting").wait_for()
+    assert len(painter.calls("begin")) == 1  # the one before
+    painter.button("Back to the painting").click()
+    assert painter.ui("show")["left"] == "painting"
+    painter.page.locator(".look").first.hover()
+    painter.button("Duplicate Look 1").click()
+    painter.button("Delete Look 1", exact=True).click()
+    assert not painter.said("drop_look")  # asks once more
+    painter.button("Delete Look 1: press again").click()
+    assert painter.said("drop_look")[-1]["look"] == 1
+    assert painter.said("copy_look")[-1]["look"] == 1
+
+
+@pytest.mark.parametrize("way", ["deleted", "elsewhere"])
+def test_looks_are_compared_while_both_are_there(opened: Any, way: str) -> None:
+    painter = opened(viewport={"width": 1600, "height": 900})
+    for _ in range(3):
+        painter.page.keyboard.press("Control+s")
+        painter.still()
+    painter.button("Compare looks").click()
+    assert painter.ui("mix") == {"a": 2, "b": 3, "share": 1}  # the newest, and the one before
+    painter.choose("First look", "1")
+    assert painter.ui("mix") == {"a": 1, "b": 3, "share": 1}
+    if way == "deleted":
+        painter.page.locator(".look").first.hover()
+        painter.button("Delete Look 1", exact=True).click()
+        painter.button("Delete Look 1: press again").click()
+        assert painter.said("drop_look")
+    else:
+        painter.page.evaluate("() => { host.drop_look({ look: 1 }); host.tell(host.state()); }")
+    painter.still()
+    show = painter.page.evaluate("() => engine.shown")
+    assert [show[name] for name in ("left", "right", "instead")] == ["painting", "solution", None]
+    compared = painter.page.get_by_role("combobox", name="Compare")
+    assert compared.input_value() == "painting solution"
+    painter.stroke()
+    assert painter.calls("begin")
+    painter.button("Compare looks").click()
+    chosen = [
+        painter.page.get_by_role("combobox", name=name).input_value()
+        for name in ("First look", "Second look")
+    ]
+    assert chosen == ["2", "3"]
+    painter.page.evaluate("() => painter.session.send('drop_look', { look: 3 })")
+    painter.still()
+    assert painter.page.get_by_role("combobox", name="First look").count() == 0
+    painter.stroke()
+    assert len(painter.calls("begin")) == 2
+
+
+def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter) -> None:
+    for _ in range(3):
+        painter.stroke()
+        painter.still()
+        painter.page.keyboard.press("Control+s")
+        painter.still()
+    badge, whose = painter.page.locator(".live"), painter.page.locator(".whose")
+    places = painter.page.locator(".stage, .said, .answer button, .light, .fold-head")
+
+    def boxes() -> Any:
+        return [place.bounding_box() for place in places.all()]
+
+    before = boxes()
+    painter.button("Compare looks").click()
+    assert (badge.count(), whose.inner_text()) == (0, "of Look 3")
+    assert boxes() == before
+    painter.type("Between", "25")  # which no answer is
+    assert badge.inner_text() == "answer not shown"
+    assert whose.inner_text() == "of the answer, not shown"
+    assert whose.evaluate("(one) => one.scrollWidth <= one.clientWidth")
+    assert boxes() == before
+    assert painter.page.locator(".is-unseen .light").count() == 7
+    painter.choose("Second look", "1")
+    painter.type("Between", "100")
+    assert badge.inner_text() == "answer not shown"
+    painter.choose("First look", "3")
+    assert (badge.count(), whose.inner_text()) == (0, "of Look 3")
+    painter.button("Back to the painting").click()
+    assert (badge.count(), whose.count()) == (0, 0)
+
+
+def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
+    render = painter.button("Answer | Render")
+    painter.button("How true?").click()
+    assert render.count() == 0
+    begin = "(is_old) => host.tell({ ...host.state(), verified: [{ agrees: true, view: 0,"
+    begin += " text: 'The render agrees.', is_old }] })"
+    painter.page.evaluate(begin, False)
+    assert "The render agrees." in painter.page.locator(".verified").inner_text()
+    assert "earlier answer" not in painter.page.locator(".verified").inner_text()
+    painter.page.evaluate(begin, True)
+    assert "of an earlier answer" in painter.page.locator(".verified").inner_text()
+    render.click()
+    assert painter.ui("show")["right"] == "verified"
+
+
+#: Windows, a column beside panels, one without room for them.
+WITH_LOOKS = [(1280, 720), (1600, 900), (780, 600), (690, 560), (480, 640)]
+
+
+@pytest.mark.parametrize("size", WITH_LOOKS)
+def test_pictures_stay_as_large_whatever_is_done_with_looks(
+    opened: Any, size: tuple[int, int]
+) -> None:
+    painter = opened(viewport={"width": size[0], "height": size[1]})
+    stage, strip = painter.page.locator(".stage"), painter.page.locator(".looks")
+    before = stage.bounding_box()
+    assert "keeps painting and answer" in strip.inner_text()
+    for _ in range(12):  # more than there is room for
+        painter.page.keyboard.press("Control+s")
+        painter.still()
+        assert stage.bounding_box() == before
+    place = painter.button("Compare looks").bounding_box()
+    assert place["x"] + place["width"] <= strip.bounding_box()["x"] + strip.bounding_box()["width"]
+    painter.button("Compare looks").click()
+    assert stage.bounding_box() == before
+    slider = painter.page.get_by_role("slider", name="Between").bounding_box()
+    assert slider["width"] >= 160
+    around = strip.bounding_box()
+    assert around["height"] <= 56
+    for control in painter.page.locator(".mix :is(select, input, button)").all():
+        if control.is_visible():
+            box = control.bounding_box()
+            assert around["x"] <= box["x"]
+            assert box["x"] + box["width"] <= around["x"] + around["width"]
+            assert around["y"] <= box["y"]
+            assert box["y"] + box["height"] <= around["y"] + around["height"]
+    # The pointer is where it goes back.
+    back = painter.button("Back to the painting").bounding_box()
+    assert back["x"] <= place["x"] + place["width"] / 2 <= back["x"] + back["width"]
+    painter.button("Back to the painting").click()
+    for look in range(1, 13):
+        painter.page.evaluate("(look) => painter.session.send('drop_look', { look })", look)
+    painter.still()
+    assert stage.bounding_box() == before
+    assert "keeps painting and answer" in strip.inner_text()
+
+
+def test_in_a_low_painter_an_empty_strip_gives_pictures_its_room(opened: Any) -> None:
+    painter = opened(viewport={"width": 1280, "height": 300})
+    assert not painter.page.locator(".looks").is_visible()
+    painter.page.keyboard.press("Control+s")
+    painter.page.locator(".look").wait_for()
+    assert painter.page.locator(".looks").bounding_box()["height"] <= 36
+
+
+def test_what_lies_between_two_looks_is_kept_under_a_name_that_says_so(painter: Painter) -> None:
+    painter.page.keyboard.press("Control+s")
+    painter.stroke()
+    painter.page.keyboard.press("Control+s")
+    painter.still()
+    painter.button("Compare looks").click()
+    painter.type("Between", "60")
+    painter.button("Keep as look").click()
+    said = painter.said("mix_looks")[-1]
+    assert (said["first"], said["second"], said["part"]) == (1, 2, 0.6)
+    assert said["name"] == "Look 1 → Look 2, 60 %"
+    painter.button("Back to the painting").click()
+    name = painter.page.get_by_role("button", name=said["name"], exact=True)
+    assert said["name"] in name.get_attribute("data-tip")
+
+
+def test_the_look_that_is_seen_is_marked(painter: Painter) -> None:
+    def marked() -> list[str]:
+        painter.still()
+        found = painter.page.locator("[aria-current=true]").all()
+        return [str(one.get_attribute("aria-label")) for one in found]
+
+    painter.page.keyboard.press("Control+s")
+    assert marked() == ["Go on from Look 1"]
+    painter.stroke()
+    assert marked() == []
+    painter.page.keyboard.press("Control+s")
+    assert marked() == ["Go on from Look 2"]
+    painter.button("Go on from Look 1").click()
+    assert marked() == ["Go on from Look 1"]
+    # It has the same lights as another.
+    painter.page.evaluate("() => painter.session.send('copy_look', { look: 1 })")
+    assert marked() == ["Go on from Look 1"]
+    painter.button("Go on from Look 1 2").click()
+    assert marked() == ["Go on from Look 1 2"]
+    for way in ("undo", "redo"):  # and is the one that was gone on from, after that, too
+        painter.page.evaluate("(way) => { painter.session.send(way); }", way)
+    assert marked() == ["Go on from Look 1 2"]
+    # Where all lights are held, they stay as they are while somebody paints.
+    painter.page.evaluate("() => painter.session.send('drop_look', { look: 1 })")
+    painter.page.evaluate(
+        "() => { host.asked = Object.fromEntries(host.room.lights.map(({ name }) =>"
+        " [name, { lock: true }])); }"
+    )
+    weights = painter.ui("weights")
+    painter.stroke()
+    painter.still()
+    assert painter.ui("weights") == weights
+    assert marked() == []
+
+
+def test_a_key_that_is_held_down_keeps_one_look(painter: Painter) -> None:
+    painter.page.keyboard.down("Control")
+    for _ in range(4):
+        painter.page.keyboard.down("s")
+    painter.page.keyboard.up("s")
+    painter.page.keyboard.up("Control")
+    assert [said["name"] for said in painter.said("save_look")] == ["Look 1"]
+    painter.page.keyboard.down("]")
+    size = painter.ui("size")
+    painter.page.keyboard.down("]")  # what goes by steps goes on
+    assert painter.ui("size") > size
+
+
+def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
+    painter.button("Write files").click()
+    painter.page.get_by_label("Report").uncheck()
+    painter.button("Write", exact=True).click()
+    assert painter.said("export")[-1]["what"] == ["target", "picture", "lighting", "relit"]
+    window = painter.page.get_by_role("dialog")
+    assert window.locator(".exported li").all_inner_texts() == [
+        "target", "picture", "lighting", "relit",
+    ]  # fmt: skip
+    assert window.inner_text().count("/shows/gallery-evening") == 1
+    painter.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    painter.button("Copy the folder's path").click()
+    painter.button("Copied").wait_for()
+    assert painter.page.evaluate("navigator.clipboard.readText()") == "/shows/gallery-evening"
+    assert painter.page.get_by_text("lightpaint solve gallery.xml").is_visible()
+    assert not painter.page.get_by_text("Nothing is painted yet").count()
+    painter.page.evaluate("() => { host.unpainted = true; }")
+    painter.button("Write", exact=True).click()
+    painter.page.get_by_text("Nothing is painted yet: no painting was written").wait_for()
+    assert not painter.page.get_by_text("lightpaint solve gallery.xml").count()
+
+
+def test_settings(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.button("Let go").click()
+    assert painter.said("set")[-1]["values"]["hold"] == 0
+    painter.button("Hold", exact=True).click()
+    painter.type("How firmly", "2.5")
+    painter.button("Linear").click()
+    painter.button("White", exact=True).click()
+    painter.button("At its word").click()
+    painter.type("At most", "3")
+    painter.button("Stay", exact=True).click()
+    painter.type("How strongly", "0.02")
+    asked: dict[str, Any] = {}
+    for said in painter.said("set"):
+        asked |= said["values"]
+    assert asked == {
+        "hold": 2.5, "space": "linear", "colors": "white", "literal": True,
+        "prefer_current": 0.02, "sparse": 3,
+    }  # fmt: skip
+    painter.type("At most", "")
+    assert painter.said("set")[-1]["values"]["sparse"] is None
+    painter.button("May change").click()
+    assert painter.said("set")[-1]["values"]["prefer_current"] is None
+
+
+def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -> None:
+    stage, panel = painter.page.locator(".stage"), painter.page.locator(".settings")
+    opener = painter.button("How the painting is answered")
+    before = stage.bounding_box()
+    for close in ("Escape", "button", "pictures"):
+        opener.click()
+        assert stage.bounding_box() == before
+        box = panel.bounding_box()
+        assert box["x"] >= before["x"] + before["width"]
+        assert panel.evaluate("(panel) => panel === document.activeElement")
+        painter.page.keyboard.press("Tab")
+        painter.page.keyboard.press("e" if close == "Escape" else "b")
+        assert painter.ui("tool") == ("eraser" if close == "Escape" else "brush")
+        strokes = len(painter.calls("end"))
+        if close == "Escape":
+            painter.page.keyboard.press("Escape")
+        elif close == "button":
+            panel.get_by_role("button", name="Close").click()
+        else:
+            painter.stroke()
+            assert len(painter.calls("end")) == strokes + 1  # it paints beside them
+            assert panel.is_visible()
+            painter.page.keyboard.press("Escape")
+        panel.wait_for(state="detached")
+        if close != "pictures":
+            assert opener.evaluate("(button) => button === document.activeElement")
+    assert painter.page.locator(".side").is_visible()
+
+
+def test_settings_typed_into_are_closed_by_escape(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.page.get_by_role("textbox", name="At most").focus()
+    painter.page.keyboard.press("Escape")
+    painter.page.locator(".settings").wait_for(state="detached")
+
+
+def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.give_up()
+    assert painter.said("drop")
+    assert painter.page.locator(".settings").is_visible()
+
+
+@pytest.mark.parametrize(
+    ("helps", "label", "values"),
+    [("hold", "Let it go", {"hold": 0}), ("colors", "Any colour", {"colors": "free"})],
+)
+def test_what_is_advised_is_done_by_a_button(
+    painter: Painter, helps: str, label: str, values: dict[str, Any]
+) -> None:
+    button = painter.page.get_by_role("button", name=label)
+    assert button.count() == 0
+    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2}
+    how = painter.button("How true?").bounding_box()
+    painter.tell(**said, version=2, headline="A first step, 10 %.", help=helps)
+    assert painter.button("How true?").bounding_box() == how
+    button.click()
+    assert painter.said("set")[-1]["values"] == values
+    assert button.count() == 0
+    painter.tell(**said, version=90, headline="Nearly there, 90 %.", help=None, settings={})
+    assert button.count() == 0

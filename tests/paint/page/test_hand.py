@@ -1,0 +1,623 @@
+"""What the hand does on a painter's page: strokes, colours, what lies under the pointer."""
+
+import re
+from typing import Any
+
+import pytest
+from interface import Painter
+
+
+def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None:
+    painter = opened("first")
+    assert painter.page.get_by_text("Paint how it should look").is_visible()
+    assert painter.page.get_by_text("You can paint already").is_visible()
+    painter.stroke()
+    assert [call[1] for call in painter.calls("begin")] == ["brush"]
+    assert painter.calls("end")
+    assert painter.said("paint")[-1]["done"] is True
+    assert not painter.page.get_by_text("Paint how it should look").is_visible()
+    assert painter.page.get_by_text("Close to what was painted").is_visible()
+
+
+def test_keys_of_paint_programs(painter: Painter) -> None:
+    press = painter.page.keyboard.press
+    tools = {"e": "eraser", "w": "weight", "i": "pick", "g": "fill", "l": "line", "a": "ask"}
+    for key, tool in {**tools, "b": "brush"}.items():
+        press(key)
+        assert painter.ui("tool") == tool
+    size, hardness = painter.ui("size"), painter.ui("hardness")
+    press("]")
+    assert painter.ui("size") > size
+    press("[")
+    press("[")
+    assert painter.ui("size") < size
+    press("Shift+}")
+    assert painter.ui("hardness") > hardness
+    press("3")
+    assert painter.ui("flow") == 0.3
+    press("0")
+    assert painter.ui("flow") == 1
+    first, second = painter.ui("colour"), painter.ui("second")["colour"]
+    press("x")
+    assert (painter.ui("colour"), painter.ui("second")["colour"]) == (second, first)
+    press("Control+z")
+    press("Control+Shift+Z")
+    assert painter.said("undo")
+    assert painter.said("redo")
+    for layout in ("wipe", "blink", "side"):
+        press("v")
+        assert painter.ui("show")["layout"] == layout
+    press("c")
+    press("o")
+    press(".")
+    show = painter.ui("show")
+    assert (show["clean"], show["overlay"], show["stops"]) == (False, "missed", 0.5)
+    press("+")
+    assert painter.ui("show")["zoom"] > 1
+    press("f")
+    assert painter.ui("show")["zoom"] == 1
+
+
+def test_every_key_of_the_overlay_is_there(painter: Painter) -> None:
+    painter.page.keyboard.press("?")
+    dialog = painter.page.get_by_role("dialog", name="Keys")
+    dialog.wait_for()
+    assert dialog.locator("kbd").count() > 40
+    painter.page.keyboard.press("e")  # goes nowhere while a window is open
+    assert painter.ui("tool") == "brush"
+    painter.page.keyboard.press("Escape")
+    assert not dialog.is_visible()
+
+
+def test_mouse_with_modifiers(painter: Painter) -> None:
+    before = painter.ui("colour")
+    painter.stroke(modifiers="Alt")
+    assert not painter.calls("begin")
+    assert painter.ui("colour") != before
+    painter.stroke()
+    painter.page.keyboard.down("Shift")
+    x, y = painter.place()
+    painter.page.mouse.click(x + 40, y + 40)
+    painter.page.keyboard.up("Shift")
+    assert len(painter.calls("line")) == 1
+    painter.page.mouse.move(x, y)
+    painter.stroke(modifiers="Space")
+    assert painter.ui("show")["pan"][0] < 0
+    assert len(painter.calls("begin")) == 1
+    painter.page.keyboard.down("Control")
+    painter.page.mouse.wheel(0, -240)
+    painter.page.keyboard.up("Control")
+    painter.still()
+    assert painter.ui("show")["zoom"] == pytest.approx(2, rel=1e-6)
+
+
+def test_escape_leaves_a_stroke(painter: Painter) -> None:
+    painter.give_up()
+    assert painter.calls("cancel")
+    assert not painter.calls("end")
+    assert painter.said("drop")
+
+
+def test_one_finger_paints_and_two_move_and_zoom(opened: Any) -> None:
+    size = {"width": 1024, "height": 768}
+    painter = opened(viewport=size, has_touch=True, is_mobile=True)
+    touch = painter.page.context.new_cdp_session(painter.page)
+    x, y = painter.place()
+
+    def send(kind: str, *points: tuple[float, float]) -> None:
+        made = [{"x": a, "y": b, "id": k} for k, (a, b) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": made})
+
+    send("touchStart", (x, y))
+    send("touchMove", (x + 20, y))
+    send("touchMove", (x + 40, y))
+    send("touchEnd")
+    painter.still()
+    assert len(painter.calls("begin")) == len(painter.calls("end")) == 1
+    send("touchStart", (x, y))
+    send("touchStart", (x, y), (x + 50, y))
+    send("touchMove", (x - 25, y), (x + 75, y))
+    send("touchEnd")
+    painter.still()
+    assert painter.ui("show")["zoom"] == pytest.approx(2, rel=0.1)
+    assert painter.calls("cancel")  # of what the first finger had begun
+    assert len(painter.calls("end")) == 1
+
+
+def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
+    painter = opened("first")
+    hint, status = painter.page.locator(".hint"), painter.page.locator("#lp-status")
+    assert "Shift-click" in status.text_content()
+    for key, first in (
+        ("a", "up brighter"),
+        ("g", "an object of this picture"),
+        ("l", "drag over this picture"),
+        ("w", "where it has to fit"),
+        ("i", "Take light"),
+    ):
+        painter.page.keyboard.press(key)
+        painter.still()
+        assert first in hint.inner_text()
+    assert "Click" in status.text_content()
+    tablet = opened(
+        "first", viewport={"width": 1024, "height": 768}, has_touch=True, is_mobile=True
+    )
+    status = tablet.page.locator("#lp-status")
+    for key, words in (("b", "Two fingers move and zoom"), ("g", "Tap on"), ("i", "Tap on")):
+        tablet.page.keyboard.press(key)
+        tablet.still()
+        assert words in status.text_content()
+        assert "lick" not in status.text_content()
+
+
+def test_lines_by_keys_and_no_ask(painter: Painter) -> None:
+    painter.page.locator(".stage").focus()
+    press = painter.page.keyboard.press
+    for key in ("Shift+Enter", "ArrowRight", "ArrowDown", "Shift+Enter"):
+        press(key)
+    assert len(painter.calls("begin")) == 1  # there was none to go on from
+    [line] = painter.calls("line")
+    scale = painter.page.evaluate("() => window.engine.panes()[0].scale")
+    start, end = line[1:3]
+    way = [end[name] - start[name] for name in "xy"]
+    assert way == pytest.approx([12 / scale, 12 / scale])
+    press("a")
+    press("Enter")
+    assert "In numbers" in painter.ui("toasts")[-1]["text"]
+    assert len(painter.calls("begin")) == 1
+
+
+def test_the_colour_panel(painter: Painter) -> None:
+    painter.type("Hex", "#336699")
+    blue = painter.ui("colour")
+    assert blue == pytest.approx([0.0331, 0.1329, 0.3185], abs=1e-4)  # IEC 61966-2-1 by hand
+    painter.button("RGB").click()
+    painter.type("Red", "255")
+    assert painter.ui("colour") == pytest.approx([1, *blue[1:]])
+    painter.button("HSV", exact=True).click()
+    painter.type("Saturation", "0")
+    assert len({round(x, 9) for x in painter.ui("colour")}) == 1
+    painter.button("White", exact=True).click()
+    painter.type("Kelvin", "6504")
+    painter.type("Green", "10")
+    rgb = painter.ui("colour")
+    assert rgb[1] == max(rgb)  # greener than daylight, in which green is not the largest
+    painter.type("Brightness", "2")
+    assert painter.ui("stops") == 2
+    painter.button("2700 K").click()
+    warm = painter.ui("colour")
+    assert warm[0] > warm[1] > warm[2]
+    below = painter.page.locator(".is-ask").bounding_box()
+    painter.stroke()
+    lately = painter.page.get_by_role("group", name="Used lately")
+    assert lately.get_by_role("button").count() == 1
+    assert painter.page.locator(".is-ask").bounding_box() == below  # its room was there
+    painter.button("Look", exact=True).click()
+    assert painter.ui("as") == "look"
+
+
+def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
+    """On the patch, beside the colour itself; of what was used lately, in stops."""
+
+    def patch() -> list[str]:
+        styles: list[str] = painter.page.locator(".patch").evaluate(
+            "(one) => ['--colour', '--shown'].map((name) => one.style.getPropertyValue(name))"
+        )
+        return styles
+
+    painter.type("Hex", "#808080")
+    assert patch() == ["#808080", "rgb(128 128 128)"]
+    painter.type("Brightness", "1")  # 0.2159 of light twice, by IEC 61966-2-1
+    assert patch() == ["#808080", "rgb(176 176 176)"]
+    painter.stroke()
+    painter.type("Exposure", "1")  # and as the pictures show it
+    assert patch() == ["#808080", "rgb(239 239 239)"]
+    painter.type("Brightness", "-2.5")
+    painter.stroke()
+    lately = painter.page.get_by_role("group", name="Used lately").get_by_role("button")
+    names = [one.get_attribute("aria-label") for one in lately.all()]
+    said = ["1: #808080, \u22122.5 stops", "2: #808080, +1 stops"]
+    assert names == [f"Used lately {one}" for one in said]
+    assert lately.all_inner_texts() == ["\u22122.5", "+1"]
+
+
+#: What the hand has.
+HELD = ("colour", "stops", "second", "recent", "flow", "fillFlow", "hardness", "size")
+
+
+def open_again(painter: Painter, query: str = "") -> None:
+    url = painter.page.url
+    painter.page.goto("about:blank")
+    painter.page.goto(url.replace("?", f"?{query}&"))
+    painter.page.wait_for_selector(".lightpaint .tag")
+    painter.still()
+
+
+def test_a_page_that_is_loaded_anew_knows_what_was_in_the_hand(painter: Painter) -> None:
+    fresh = {name: painter.ui(name) for name in HELD}
+    painter.type("Hex", "#336699")
+    painter.type("Brightness", "1.5")
+    painter.stroke()
+    painter.page.keyboard.press("x")
+    painter.type("Brightness", "-1")
+    painter.page.locator(".stage").focus()
+    for key in "37]]":
+        painter.page.keyboard.press(key)
+    painter.page.keyboard.press("Shift+}")
+    painter.page.keyboard.press("g")
+    painter.page.keyboard.press("6")
+    held = {name: painter.ui(name) for name in HELD}
+    assert all(held[name] != fresh[name] for name in HELD)
+    open_again(painter)
+    assert {name: painter.ui(name) for name in HELD} == held
+    open_again(painter, "size=96x54")
+    assert painter.ui("size") == 2 * held["size"]  # it is a part of the picture
+
+
+@pytest.mark.parametrize(
+    "junk",
+    [
+        "nothing of ours",
+        "null",
+        "[3]",
+        '{"colour": [1, 2, 3], "stops": 0, "recent": [{"colour": "red"}, 7], "flow": 0}',
+        '{"colour": [1, 1, 1], "stops": "x", "second": 1, "recent": 5, "hardness": 9,'
+        ' "flow": null, "fillFlow": "1", "share": -1}',
+    ],
+)
+def test_what_is_remembered_is_not_believed(painter: Painter, junk: str) -> None:
+    names = (*HELD, "open")
+    fresh = {name: painter.ui(name) for name in names}
+    painter.page.evaluate(
+        "(junk) => { for (const key of ['hand', 'open'])"
+        " localStorage[`lightpaint.${key}`] = junk; }",
+        junk,
+    )
+    open_again(painter)
+    assert {name: painter.ui(name) for name in names} == fresh
+
+
+def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Painter) -> None:
+    """A notebook has several, and a browser several tabs."""
+    assert painter.page.evaluate("() => localStorage['lightpaint.hand']") is None
+    painter.type("Hex", "#112233")
+    beside = Painter(painter.page.context.new_page())
+    beside.page.goto(painter.page.url)
+    beside.page.wait_for_selector(".lightpaint .tag")
+    beside.type("Hex", "#445566")
+    beside.stroke()
+    painter.stroke()
+    painter.type("Hex", "#778899")
+    painter.stroke()
+    open_again(beside)
+    lately = beside.page.get_by_role("group", name="Used lately").get_by_role("button")
+    names = [str(one.get_attribute("aria-label")) for one in lately.all()]
+    assert [name.split(": ")[1] for name in names] == ["#778899", "#112233", "#445566"]
+
+
+def test_warm_is_right(painter: Painter) -> None:
+    """On the slider, among the swatches, and where somebody asks by a drag."""
+
+    def warmth() -> float:
+        red, green, blue = painter.ui("colour")
+        return float(red - blue - 0.1 * green)  # the warmest have no blue, and less green
+
+    found = []
+    for key in ("Home", "ArrowRight", "ArrowRight", "End"):
+        painter.slide("Kelvin", key)
+        found.append(warmth())
+    assert found == sorted(set(found))
+    for swatch in painter.page.locator(".swatch").all()[:7]:
+        swatch.click()
+        found.append(warmth())
+    assert found[4:] == sorted(set(found[4:]))
+    kelvin = painter.page.get_by_role("slider", name="Kelvin", exact=True)
+    track = kelvin.evaluate("(one) => one.style.getPropertyValue('--track')")
+    first, last = re.findall("#(..)..(..)", track)[:: len(re.findall("#", track)) - 1]
+    assert int(first[0], 16) < int(first[1], 16)
+    assert int(last[0], 16) > int(last[1], 16)
+    painter.page.keyboard.press("a")
+    x, y = painter.place()
+    painter.page.mouse.move(x, y)
+    painter.page.mouse.down()
+    painter.page.mouse.move(x + 40, y)
+    painter.page.locator(".asking", has_text="warmer").wait_for()
+    painter.page.mouse.up()
+
+
+def test_asking_in_numbers(painter: Painter) -> None:
+    lights = painter.page.get_by_role("region", name="Lights")
+    before = lights.bounding_box()
+    painter.page.keyboard.press("a")
+    assert lights.bounding_box() == before  # who drags needs no numbers: nothing moves
+    painter.button("In numbers", exact=True).click()
+    painter.choose("Where", "3")
+    painter.type("Brighter", "-1.5")
+    painter.type("Warmer", "40")
+    painter.button("Ask for it").click()
+    assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
+    painter.stroke()
+    assert painter.calls("begin")[-1][1] == "ask"
+
+
+def test_importance_is_seen_while_it_is_painted(painter: Painter) -> None:
+    painter.page.keyboard.press("w")
+    painter.still()
+    assert painter.page.evaluate("() => window.engine.shown.overlay") == "importance"
+    assert painter.page.locator(".legend").get_by_text("Painted").is_visible()
+    assert painter.page.evaluate("() => window.engine.hand.importance") == 4
+    painter.slide("Counts", "Home")
+    assert painter.ui("importance") == 0.1
+    painter.page.keyboard.press("o")  # another overlay is what was asked for
+    painter.still()
+    assert painter.page.evaluate("() => window.engine.shown.overlay") == "missed"
+
+
+def test_importance_is_hidden_with_its_brush(painter: Painter) -> None:
+    painter.page.keyboard.press("w")
+    painter.page.keyboard.press("b")
+    painter.still()
+    assert painter.page.evaluate("() => window.engine.shown.overlay") is None
+
+
+def test_space_is_not_held_in_a_window_that_is_left(painter: Painter) -> None:
+    painter.page.mouse.move(*painter.place())
+    painter.page.keyboard.down("Space")
+    assert painter.page.locator(".stage.is-panning").count() == 1
+    painter.page.evaluate("() => window.dispatchEvent(new Event('blur'))")
+    assert painter.page.locator(".stage.is-panning").count() == 0
+    painter.stroke()
+    assert painter.calls("begin")
+
+
+def test_what_is_picked_has_its_brightness_in_stops(painter: Painter) -> None:
+    """As its panel, and what stands beside the pointer, have it."""
+    for light, stops, colour in (
+        ([0.25, 0.125, 0.25], -2, [1, 0.5, 1]),
+        ([4, 4, 2], 2, [1, 1, 0.5]),
+        ([2**-10, 0, 0], -8, [0.25, 0, 0]),  # beyond the slider
+    ):
+        painter.page.evaluate("(light) => { engine.paintAt = () => light; }", light)
+        painter.stroke(modifiers="Alt")
+        assert painter.ui("stops") == pytest.approx(stops)
+        assert painter.ui("colour") == pytest.approx(colour)
+
+
+def test_what_is_under_a_pointer_that_rests_is_that_of_the_last_answer(painter: Painter) -> None:
+    painter.page.mouse.move(*painter.place())
+    painter.page.locator(".here", has_text="back wall").wait_for()
+    shares = painter.ui("pointed")["shares"]
+    painter.page.evaluate(
+        """() => {
+          const { pointed } = engine;
+          const alone = window.painter.store.value.lights.map((_, k) => Number(k === 1));
+          engine.pointed = (x, y) => ({ ...pointed.call(engine, x, y), shares: alone });
+        }"""
+    )
+    painter.tell(kind="answer", version=100, exact=False)
+    painter.page.locator(".here b", has_text="100 %").wait_for()
+    assert shares[1] < 1
+
+
+def test_what_is_under_the_pointer(painter: Painter) -> None:
+    painter.page.mouse.move(*painter.place())
+    painter.page.locator(".here", has_text="back wall").wait_for()
+    painter.page.evaluate("() => { engine.lightAt = () => [0.25, 0.25, 0.25]; }")
+    painter.page.mouse.move(*painter.place(0.1))
+    here = painter.page.locator(".light-here")
+    here.get_by_text("\u22122.0 st · 6500 K", exact=True).wait_for()  # D65, two stops below white
+    assert painter.page.locator(".near").count() == 0
+    painter.page.keyboard.press("i")
+    here.get_by_text("RGB 0.25 0.25 0.25").wait_for()
+    assert painter.page.locator(".near").inner_text() == "\u22122.0 st · 6500 K"
+    painter.page.evaluate("() => { engine.lightAt = () => [0, 0.5, 0]; }")
+    painter.page.mouse.move(*painter.place())
+    painter.page.locator(".near", has_text=re.compile(r"^\u22121.0 st$")).wait_for()  # no white
+    assert sum(painter.ui("pointed")["shares"]) == pytest.approx(1, abs=1e-6)
+    assert painter.page.locator(".share.is-here").count() == 7
+
+
+def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
+    """Also where it moved and left within one frame, and where it moved twice."""
+    moved = """([[x, y], [to, across], leaves]) => {
+        const stage = document.querySelector('.stage');
+        const tell = (kind, clientX, clientY) =>
+          stage.dispatchEvent(new PointerEvent(kind, { clientX, clientY, bubbles: true }));
+        tell('pointermove', x, y);
+        tell('pointermove', to, across);
+        if (leaves) tell('pointerleave', to, across);
+        return new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+    }"""
+    one, other = painter.place(-0.3), painter.place(0.3)
+    painter.page.evaluate(moved, [other, other, False])
+    there = painter.ui("pointed")
+    painter.page.evaluate(moved, [one, one, False])
+    assert painter.ui("pointed") != there
+    painter.page.evaluate(moved, [one, other, False])
+    assert painter.ui("pointed") == there
+    painter.page.evaluate(moved, [one, one, True])
+    assert painter.ui("pointed") is None
+
+
+@pytest.mark.parametrize("tool", ["ask", "pick"])
+def test_what_is_said_beside_the_pointer_lies_in_the_picture(painter: Painter, tool: str) -> None:
+    """Above it, or beside it where there is no room; never under the hand."""
+    page = painter.page
+    page.keyboard.press(tool[0] if tool == "ask" else "i")
+    stage = page.locator(".stage").bounding_box()
+    x, y = painter.place()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in (0, 1):
+        pane = page.evaluate("(k) => engine.panes()[k]", k)
+        left, top = stage["x"] + pane["left"], stage["y"] + pane["top"]
+        wide, high = (n * pane["scale"] for n in (48, 27))
+        for a, b in ((0.5, 0.5), (0.02, 0.02), (0.98, 0.02), (0.02, 0.98), (0.98, 0.98)):
+            x, y = left + a * wide, top + b * high
+            page.mouse.move(x, y)
+            page.evaluate("() => new Promise((done) => setTimeout(done, 50))")
+            box = page.locator(".near").bounding_box()
+            assert left - 1 <= box["x"] <= box["x"] + box["width"] <= left + wide + 1
+            assert top - 1 <= box["y"] <= box["y"] + box["height"] <= top + high + 1
+            across = max(box["x"] - x, x - box["x"] - box["width"], 0)
+            down = max(box["y"] - y, y - box["y"] - box["height"], 0)
+            assert 8 < max(across, down) < 40
+            assert box["y"] + box["height"] <= y or across
+    page.mouse.up()
+
+
+#: Outlines as they are drawn, beside what they are to be: (wrong pixels, white ones).
+OUTLINE = """(object) => {
+  const canvas = document.querySelector('.outline');
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
+  copy.drawImage(canvas, 0, 0);
+  const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data;
+  const { data, width, height } = engine.objects();
+  const panes = engine.panes();
+  const isIts = (x, y, pane) => {
+    const [i, j] = [x + 0.5 - pane.left, y + 0.5 - pane.top].map((n) => Math.floor(n / pane.scale));
+    return i >= 0 && j >= 0 && i < width && j < height && data[j * width + i] === object;
+  };
+  let [wrong, white] = [0, 0];
+  for (let y = 0; y < canvas.height; y += 1)
+    for (let x = 0; x < canvas.width; x += 1) {
+      const pane = panes.find((one) => x >= one.x && x < one.x + one.width &&
+        y >= one.y && y < one.y + one.height);
+      const own = pane && isIts(x, y, pane);
+      const isEdge = pane && [[1, 0], [-1, 0], [0, 1], [0, -1]].some(([a, b]) =>
+        isIts(x + a, y + b, pane) !== own);
+      const at = 4 * (y * canvas.width + x);
+      const wanted = isEdge ? (own ? [255, 255] : [0, 180]) : [0, 0];
+      if (pixels[at] !== wanted[0] || pixels[at + 3] !== wanted[1]) wrong += 1;
+      if (pixels[at] === 255) white += 1;
+    }
+  return [wrong, white];
+}"""
+
+
+@pytest.mark.parametrize("engine", ["", "engine"], ids=["made up", "real"])
+def test_the_object_that_would_be_filled_has_an_outline(opened: Any, engine: str) -> None:
+    painter = opened(engine)
+    page = painter.page
+    page.wait_for_function("() => engine.objects() !== null")
+    outline = page.locator(".outline")
+    page.evaluate(
+        "() => { window.drawn = 0; const put = CanvasRenderingContext2D.prototype.putImageData;"
+        " CanvasRenderingContext2D.prototype.putImageData = function (...of) {"
+        " if (this.canvas.className === 'outline') drawn += 1; return put.apply(this, of); }; }"
+    )
+    page.mouse.move(*painter.place())
+    painter.stroke()
+    painter.still()
+    assert not outline.is_visible()
+    page.keyboard.press("g")
+    page.mouse.move(*painter.place(0.05))
+    outline.wait_for()
+    wall = painter.ui("pointed")["index"]
+    wrong, white = page.evaluate(OUTLINE, wall)
+    assert wrong == 0
+    assert white > 400
+    assert page.evaluate("() => drawn") == 2  # on each picture, once
+    page.mouse.move(*painter.place(0.1))
+    painter.still()
+    assert page.evaluate("() => drawn") == 2  # it is the same one
+    page.keyboard.press("+")
+    page.wait_for_function("() => drawn === 4")
+    page.keyboard.press("v")
+    page.wait_for_function("() => drawn > 4")
+    assert page.evaluate(OUTLINE, wall)[0] == 0
+    page.keyboard.press("a")
+    painter.button("Object", exact=True).click()
+    page.mouse.move(*painter.place())
+    outline.wait_for()
+    page.mouse.down()
+    page.mouse.move(*painter.place(0.3))
+    page.locator(".asking").wait_for()
+    assert not outline.is_visible()  # it would hide what comes of it
+    page.mouse.up()
+    page.keyboard.press("b")
+    page.mouse.move(*painter.place())
+    painter.still()
+    assert not outline.is_visible()
+    # A view of which no objects are known has no outline, and none that is left of another.
+    page.keyboard.press("g")
+    page.mouse.move(*painter.place(0.05))
+    outline.wait_for()
+    page.evaluate(
+        "() => { engine.objects = () => null;"
+        " const pointed = engine.pointed.bind(engine);"
+        " engine.pointed = (x, y) => ({ ...pointed(x, y), object: null, index: -1 }); }"
+    )
+    page.mouse.move(*painter.place(0.1))
+    painter.still()
+    assert page.evaluate(
+        "() => { const one = document.querySelector('.outline'); return one.getContext('2d')"
+        ".getImageData(0, 0, one.width, one.height).data.every((code) => code === 0); }"
+    )
+
+
+def test_fill_has_a_flow_of_its_own(painter: Painter) -> None:
+    def flows() -> tuple[float, float]:
+        return painter.page.evaluate("() => engine.hand.flow"), painter.ui("flow")
+
+    painter.page.keyboard.press("3")
+    assert flows() == (0.3, 0.3)
+    painter.page.keyboard.press("g")
+    assert flows() == (1, 0.3)
+    painter.page.keyboard.press("6")
+    assert flows() == (0.6, 0.3)
+    painter.type("Flow", "80")
+    assert flows() == (0.8, 0.3)
+    painter.page.locator(".stage").focus()
+    painter.page.keyboard.press("b")
+    assert flows() == (0.3, 0.3)
+
+
+def test_zoom_is_said_in_pixels_of_the_picture(painter: Painter) -> None:
+    def told() -> tuple[str, float]:
+        painter.still()
+        scale = painter.page.evaluate("() => engine.panes()[0].scale")
+        return painter.page.locator(".zoom").first.inner_text(), scale
+
+    label, fitted = told()
+    assert label == "Fit"
+    painter.page.keyboard.press("+")
+    label, scale = told()
+    assert scale == pytest.approx(1.25 * fitted)
+    assert label == f"{round(100 * scale)} %"
+    painter.page.keyboard.press("Shift+F")
+    assert told() == ("100 %", pytest.approx(1))
+    painter.page.set_viewport_size({"width": 1600, "height": 900})  # a larger one to fit into
+    painter.page.wait_for_function("() => engine.panes()[0].scale > 1.05")
+    label, scale = told()
+    assert label == f"{round(100 * scale)} %"
+    painter.page.keyboard.press("f")
+    assert told()[0] == "Fit"
+    painter.page.mouse.move(*painter.place())
+    painter.stroke(modifiers="Space")
+    label, scale = told()
+    assert label == f"{round(100 * scale)} %"  # all of it is seen no more
+    painter.button("1:1", exact=True).click()
+    assert told() == ("100 %", pytest.approx(1))
+    painter.page.locator(".zoom").first.click()
+    assert told()[0] == "Fit"
+
+
+@pytest.mark.parametrize("width", [1600, 1280, 1024])
+def test_what_is_under_the_pointer_has_room_beside_what_goes_on(opened: Any, width: int) -> None:
+    painter = opened("first&lights=12", viewport={"width": width, "height": 720})
+    painter.tell(kind="progress", what="basis", done=128, total=1024, unit="samples")
+    painter.page.mouse.move(*painter.place())
+    here, working = painter.page.locator(".here"), painter.page.locator(".working")
+    here.locator(".light-here").wait_for()
+    assert working.inner_text() == "128 of 1024"
+    row, room = here.bounding_box(), working.bounding_box()
+    assert room["x"] + room["width"] <= painter.page.locator(".status").bounding_box()["x"] + width
+    assert row["x"] + row["width"] <= room["x"]
+    shown = 0
+    for one in here.locator("> span").all():
+        box = one.bounding_box()
+        if box["y"] < row["y"] + row["height"]:  # the others are not seen at all
+            shown += 1
+            assert box["x"] + box["width"] <= row["x"] + row["width"]
+    assert shown >= 4

@@ -1,0 +1,364 @@
+"""A painter's page in windows of all sizes, in notebooks, and by keyboard alone."""
+
+from typing import Any
+
+import pytest
+from interface import Painter
+
+
+def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None:
+    opener = painter.button("How the painting is answered")
+    opener.click()  # the pointer stays on it
+    opener.locator("xpath=self::*[contains(@class, 'is-on')]").wait_for()
+    colours = opener.evaluate(
+        "(one) => [getComputedStyle(one)].map((its) => [its.backgroundColor, its.color])[0]"
+    )
+    assert colours == ["rgb(242, 181, 92)", "rgb(29, 20, 4)"]
+
+
+def test_by_keyboard_alone(painter: Painter) -> None:
+    """All controls are reached by Tab, each says what it is, and the pictures take paint."""
+    reached = []
+    for _ in range(110):
+        painter.page.keyboard.press("Tab")
+        reached.append(painter.page.evaluate("() => document.activeElement.outerHTML.slice(0, 90)"))
+    controls = painter.page.evaluate(
+        "() => [...document.querySelectorAll('.lightpaint :is(button, input, select)')]"
+        ".filter((one) => !one.disabled && one.checkVisibility()).map((one) =>"
+        " one.outerHTML.slice(0, 90))"
+    )
+    assert set(controls) <= set(reached)
+    painter.page.locator(".stage").focus()
+    for key in ("ArrowRight", "ArrowDown", "Enter"):
+        painter.page.keyboard.press(key)
+    assert len(painter.calls("begin")) == len(painter.calls("end")) == 1
+
+
+@pytest.mark.parametrize("query", ["lights=12", "lights=40&shadow"])
+def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> None:
+    painter = opened(query)
+    before = painter.page.locator(".stage").bounding_box()
+    find = (
+        "() => { const all = document.activeElement; const one = all.shadowRoot?.activeElement"
+        " ?? all; return one.className + ' ' + (one.ariaLabel ?? one.textContent); }"
+    )
+
+    def focused() -> str:
+        painter.page.wait_for_timeout(50)
+        return str(painter.page.evaluate(find))
+
+    skips = painter.page.locator(".skips button")
+    painter.page.keyboard.press("Tab")
+    assert "To the pictures" in focused()
+    assert skips.first.bounding_box()["width"] > 80
+    assert skips.last.bounding_box()["width"] == 1  # not seen
+    painter.page.keyboard.press("Enter")
+    assert focused().startswith("stage")
+    painter.page.evaluate("() => painter.store.set({ side: false, open: {} })")
+    skips.first.focus()
+    painter.page.keyboard.press("Tab")
+    assert "To the lights" in focused()
+    painter.page.keyboard.press("Enter")
+    assert focused().startswith("light-name key" if "=12" in query else "light-name")
+    assert painter.page.locator(".stage").bounding_box() == before
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (900, 600)])
+def test_how_true_is_seen_where_it_opens(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    button = painter.button("How true?")
+    button.click()
+    painter.still()
+    panel = painter.page.get_by_role("region", name="How true?").bounding_box()
+    assert panel["height"] > 80
+    assert panel["y"] + panel["height"] <= size[1] + 1
+    painter.page.reload()
+    painter.page.wait_for_selector(".lightpaint .tag")
+    painter.still()
+    assert painter.ui("open")["truth"] is True
+    assert painter.page.locator(".side").evaluate("(one) => one.scrollTop") == 0
+
+
+def test_in_a_shadow_root_it_looks_the_same(opened: Any) -> None:
+    plain, shadow = opened(), opened("shadow")
+    width = "engine.element.getBoundingClientRect().width"
+    wide = plain.page.evaluate(f"() => {width}")
+    shadow.page.wait_for_function(f"(wide) => {width} === wide", arg=wide)
+    shadow.stroke()
+    assert shadow.calls("begin")
+    shadow.page.keyboard.press("e")  # the pictures have the focus
+    assert shadow.ui("tool") == "eraser"
+
+
+def test_around_it_nothing_hears_its_keys(opened: Any) -> None:
+    """In a notebook `B` makes a cell, Delete deletes the painter's own."""
+    painter = opened("shadow")
+    painter.page.evaluate(
+        "() => { window.heard = [];"
+        " window.addEventListener('keydown', (event) => window.heard.push(event.key)); }"
+    )
+
+    def heard(*keys: str) -> list[str]:
+        painter.page.evaluate("() => { window.heard = []; }")
+        for key in keys:
+            painter.page.keyboard.press(key)
+        return [key for key in painter.page.evaluate("() => window.heard") if key != "Control"]
+
+    painter.stroke()  # the pictures have the focus
+    assert heard("b", "Delete", "7", "d", "Escape", "Shift+Enter", "Alt+ArrowUp") == []
+    assert heard("Control+z", "Control+s", "Control+x", "Control+v", "Control+Enter") == []
+    assert heard("Control+k", "F2") == ["k", "F2"]
+    painter.stroke(modifiers="Space")
+    assert painter.ui("show")["pan"][0] < 0
+    painter.page.get_by_role("textbox").first.focus()
+    assert heard("f", "Delete", "Control+v") == ["v"]
+    painter.page.locator(".top").click(position={"x": 3, "y": 3})  # nothing is there
+    assert heard("e") == []
+    assert painter.ui("tool") == "eraser"
+    # Nor where what had the focus is gone.
+    painter.page.evaluate("() => document.activeElement.shadowRoot.activeElement.blur()")
+    assert painter.page.evaluate("() => document.activeElement === document.body")
+    assert heard("b", "Delete", "?", "Escape", "Delete") == []
+    assert painter.ui("tool") == "brush"
+    painter.page.evaluate(
+        "() => { const cell = document.body.appendChild(document.createElement('textarea'));"
+        " cell.focus(); cell.blur(); }"
+    )
+    assert heard("e") == ["e"]
+    assert painter.ui("tool") == "brush"
+
+
+@pytest.mark.parametrize("query", ["", "shadow"])
+def test_a_look_is_kept_from_anywhere(opened: Any, query: str) -> None:
+    """With what is being typed; the browser's own window for that never opens."""
+    painter = opened(query)
+    painter.page.evaluate(
+        "() => { window.prevented = []; window.addEventListener('keydown', (event) =>"
+        " setTimeout(() => event.key.length === 1 && window.prevented.push("
+        "event.key + event.defaultPrevented)), true); }"
+    )
+
+    def press(key: str) -> str:
+        painter.page.keyboard.press(key)
+        painter.still()
+        return str(painter.page.evaluate("() => window.prevented.at(-1)"))
+
+    def kept() -> int:
+        return len(painter.said("save_look"))
+
+    level = painter.page.get_by_role("textbox", name="key, level")
+    level.fill("-1")
+    assert press("Control+s") == "strue"
+    said = [one["kind"] for one in painter.page.evaluate("() => window.host.said")]
+    assert said[-2:] == ["ask", "save_look"]
+    assert level.input_value() == "\u22121.0 st"
+    assert level.evaluate("(one) => one.getRootNode().activeElement === one")
+    assert press("Control+a") == "afalse"  # marks what is in the field
+    painter.page.locator(".look-name").click()
+    assert press("Control+s") == "strue"
+    assert kept() == 2
+    painter.button("How the painting is answered").click()
+    painter.page.get_by_role("textbox", name="At most").focus()
+    assert press("Control+s") == "strue"
+    assert kept() == 3
+    painter.page.locator(".stage").focus()
+    assert press("Control+s") == "strue"
+    assert kept() == 4
+    assert press("Control+a") == "atrue"
+    assert painter.page.evaluate("() => String(getSelection())") == ""
+    painter.page.keyboard.press("?")
+    painter.page.get_by_role("dialog").wait_for()
+    assert press("Control+s") == "strue"
+    assert kept() == 4
+
+
+def test_a_window_is_open_before_the_next_key(opened: Any) -> None:
+    """An Escape that comes at once closes it, and is not lost."""
+    painter = opened()
+    painter.page.evaluate(
+        """() => {
+          const press = (key) => document.body.dispatchEvent(
+            new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
+          press('?');
+          window.isOpen = new Promise((tell) => setTimeout(() =>
+            tell(document.querySelector('dialog')?.open ?? null)));
+        }"""
+    )
+    assert painter.page.evaluate("() => window.isOpen") is True
+    painter.page.keyboard.press("Escape")
+    painter.page.wait_for_function("() => !document.querySelector('dialog')")
+
+
+def test_windows_lie_over_it(opened: Any) -> None:
+    """In a frame as high as all of a notebook; over the frame where hardly any of it is seen."""
+    painter = opened("shadow", viewport={"width": 1280, "height": 5000})
+
+    def shown(key: str, top: int) -> tuple[Any, Any]:
+        painter.page.evaluate(
+            "(top) => { document.getElementById('lightpaint').style = 'position: absolute;"
+            " left: 50px; width: 800px; height: 560px; top: ' + top + 'px'; }",
+            top,
+        )
+        # Where pictures lie is known once the page has been laid out again, and shown.
+        painter.page.evaluate(
+            "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
+        painter.stroke()
+        painter.page.keyboard.press(key)
+        window = painter.page.get_by_role("dialog")
+        boxes = window.bounding_box(), painter.page.locator(".lightpaint").bounding_box()
+        painter.page.keyboard.press("Escape")
+        assert not window.is_visible()
+        return boxes
+
+    window, around = shown("?", 4000)
+    assert window["x"] > around["x"]
+    assert window["x"] + window["width"] < around["x"] + around["width"]
+    assert window["y"] > around["y"]
+    assert window["y"] + window["height"] < around["y"] + around["height"]
+    painter.page.set_viewport_size({"width": 1280, "height": 720})
+    window, around = shown("?", 500)
+    assert 0 < window["y"] < window["y"] + window["height"] < 720
+    assert window["height"] > 300
+
+
+def test_a_space_is_typed_beside_it(opened: Any) -> None:
+    """Where the pointer rests on the pictures meanwhile."""
+    painter = opened("shadow")
+    painter.page.evaluate(
+        "() => { const cell = document.createElement('p'); cell.contentEditable = 'true';"
+        " document.body.append(cell); cell.focus(); }"
+    )
+    painter.page.mouse.move(*painter.place())
+    painter.page.keyboard.type("a b")
+    assert painter.page.locator("p[contenteditable]").inner_text() == "a b"
+
+
+#: Windows, and columns of notebooks.
+SIZES = [(1280, 720), (1920, 1080), (1100, 900), (1024, 768), (900, 600)]
+
+
+COLUMNS = [(970, 640), (780, 600), (760, 600), (690, 560), (584, 560), (480, 640)]
+
+
+LOW = [(1280, 300), (970, 260), (780, 300), (690, 300), (584, 260), (480, 300)]
+
+
+#: A long one.
+SENTENCE = (
+    "About half of the way, 46 %: brighter and redder light on the left is missing; what keeps it"
+    " from coming closer is that no light reaches the floor there, and the cove is at its limit."
+)
+
+
+def cut_off(painter: Painter) -> list[str]:
+    """What is wider, or higher, than what is seen of it."""
+    names: list[str] = painter.page.evaluate(
+        "() => ['.top', '.options', '.tools', '.side', '.answer', '.said', '.fold-body'].filter("
+        "(name) => [...document.querySelectorAll(`.lightpaint ${name}`)].some((one) =>"
+        " one.scrollWidth > one.clientWidth + 1 || (!['.side', '.fold-body'].includes(name) &&"
+        " one.scrollHeight > one.clientHeight + 1)))"
+    )
+    return names
+
+
+@pytest.mark.parametrize("size", SIZES + COLUMNS + LOW)
+def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    about = {"headline": SENTENCE, "help": "colors", "delta_e": 11.2, "delta_e_asked": 20.5}
+    painter.tell(kind="answer", version=2, exact=True, lights=[], **about)
+    painter.page.keyboard.press("Control+s")
+    for key in "bwa":
+        painter.page.keyboard.press(key)
+        assert cut_off(painter) == []
+
+
+@pytest.mark.parametrize("size", [(853, 480), (1024, 768), (1280, 720), (1600, 900)])
+def test_without_panels_pictures_have_all_there_is(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened(viewport=dict(zip(("width", "height"), size, strict=True)))
+    painter.page.keyboard.press("p")
+    painter.still()
+    tools, stage = (painter.page.locator(x).bounding_box() for x in (".tools", ".stage"))
+    assert stage["x"] == pytest.approx(tools["x"] + tools["width"], abs=1)
+    assert stage["x"] + stage["width"] == pytest.approx(size[0], abs=1)
+
+
+@pytest.mark.parametrize("size", LOW)
+def test_of_a_low_painter_the_sentence_comes_first(opened: Any, size: tuple[int, int]) -> None:
+    """Nothing that is needed lies below what is seen, and panels scroll."""
+    painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
+    stage = painter.page.locator(".stage").bounding_box()
+    said = painter.page.locator(".said").bounding_box()
+    assert said["y"] + said["height"] <= stage["y"]
+    assert stage["height"] > 60
+    for name in (".stage", ".tools .two-colours", ".answer button", ".options input >> nth=-1"):
+        box = painter.page.locator(name).first.bounding_box()
+        assert box["y"] + box["height"] <= size[1]
+    assert not painter.page.locator(".here").is_visible()
+    if not painter.ui("side"):
+        painter.button("Panels").click()
+    light = painter.page.locator(".light").last
+    light.scroll_into_view_if_needed()
+    assert light.bounding_box()["y"] < size[1]
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (690, 560), (690, 300)])
+def test_what_has_to_be_known_does_not_lie_over_a_name(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened(viewport={"width": size[0], "height": size[1]})
+    painter.page.keyboard.press("Control+s")
+    painter.tell(kind="closed", reason="taken", text="The painter is open at another place.")
+    top = painter.page.locator(".banner").bounding_box()["y"]
+    name = painter.page.locator(".tag", has_text="Painting").bounding_box()
+    assert name["y"] + name["height"] <= top
+
+
+def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) -> None:
+    painter = opened(viewport={"width": 690, "height": 560})
+    stage, side = painter.page.locator(".stage"), painter.page.locator(".side")
+    width = stage.bounding_box()["width"]
+    assert side.count() == 0
+    assert width > 600
+    painter.button("Panels").click()
+    assert side.is_visible()
+    assert stage.bounding_box()["width"] == width  # they lie over them while they are wanted
+    painter.button("Panels").click()
+    assert side.count() == 0
+    for room, count in ((1000, 1), (690, 0)):
+        painter.page.set_viewport_size({"width": room, "height": 560})
+        painter.page.wait_for_function(
+            "(count) => document.querySelectorAll('.lightpaint .side').length === count", arg=count
+        )
+
+
+@pytest.mark.parametrize("state", ["first", "busy", "keys", "export", "settings"])
+def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
+    painter = opened("first&lights=12", init=axe)
+    if state == "busy":
+        painter.button("How true?").click()
+        painter.button("False colour").click()
+        painter.button("Keep look").click()
+        painter.button("Keep look").click()
+        painter.button("Compare looks").click()
+        painter.choose("First look", "2")
+        painter.stroke()
+        painter.page.evaluate("() => painter.session.hold(0, [9, 9, 9], true)")
+        painter.page.locator(".is-unseen").wait_for()
+        painter.page.get_by_role("button", name="key", exact=True).click()
+        painter.button("Solo: show pendant").click()
+        painter.page.keyboard.press("v")
+        painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+        painter.tell(kind="say", text="Something is so.", tone="warn")
+        painter.page.get_by_text("Something is so.").wait_for()
+    elif state == "settings":
+        painter.button("How the painting is answered").click()
+        painter.button("Hold", exact=True).click()
+    elif state != "first":
+        painter.page.evaluate("(dialog) => painter.store.set({ dialog })", state)
+    painter.page.evaluate(
+        """async () => {  // toasts have faded in
+          const moving = document.querySelector('.toasts').getAnimations({ subtree: true });
+          await Promise.all(moving.map(({ finished }) => finished));
+        }"""
+    )
+    found = painter.page.evaluate("() => axe.run(document.querySelector('.lightpaint'))")
+    assert [(one["id"], [n["html"] for n in one["nodes"]]) for one in found["violations"]] == []

@@ -1,0 +1,429 @@
+"""What can be seen and asked of lights on a painter's page."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from interface import Finger, Painter
+
+
+def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
+    painter.slide("key, stops from now", "ArrowRight", 20)
+    asked = painter.said("ask")
+    assert asked[-1]["light"] == 0
+    assert asked[-1]["done"] is True
+    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    lock = asked[-1]["asked"]["lock"]
+    assert lock == pytest.approx([x * 2 for x in present], rel=1e-6)  # 20 steps of a twentieth
+    painter.button("Let the solve have key again").click()
+    assert painter.said("ask")[-1]["asked"] == {}
+    painter.slide("key, stops from now", "Home")
+    assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
+
+
+def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
+    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+
+    def lock() -> Any:
+        return painter.said("ask")[-1]["asked"]["lock"]
+
+    for text, factor in (
+        ("+1.5", 2**1.5),
+        ("\u22121 st", 0.5),
+        ("80 %", 0.8),
+        ("0,5", 2**0.5),
+        ("off", 0),
+        ("as now", 1),
+        ("-8", 2**-8),
+        ("12 st", 2**12),
+        ("-9 st", 2**-9),  # beyond the left end of the slider
+    ):
+        painter.type("key, level", text)
+        assert lock() == pytest.approx([factor * x for x in present], rel=1e-6)
+    count = len(painter.said("ask"))
+    for text in ("bright", "-3 %", "21 st", "12", "80", "-200"):
+        painter.type("key, level", text)
+        painter.page.get_by_role("textbox", name="key, level").blur()
+        words = "is no level. Type stops from now (+1.5), percent (80 %), as now, or off."
+        if text[-1].isdigit():
+            words = "may be stops or percent: type the unit, too (12 st, 80 %)."
+        assert painter.ui("toasts")[-1]["text"] == f"{text} {words}"
+    said = len(painter.ui("toasts"))
+    painter.type("key, level", " ")
+    assert len(painter.ui("toasts")) == said
+    assert len(painter.said("ask")) == count
+    level = painter.page.get_by_role("textbox", name="key, level")
+    assert level.input_value() == "\u22129.0 st"
+    level.press("ArrowUp")
+    assert lock() == pytest.approx([2**-8.9 * x for x in present], rel=1e-6)
+    painter.type("key, level", "off")
+    count = len(painter.said("ask"))
+    level.press("ArrowDown")  # there is nothing below it
+    assert len(painter.said("ask")) == count
+    assert level.input_value() == "off"
+    level.press("ArrowUp")
+    assert level.input_value() == "\u22127.9 st"
+
+
+def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
+    painter.page.get_by_role("button", name="key", exact=True).click()
+    panel = painter.page.get_by_role("group", name="What the solve may do with key")
+    panel.get_by_role("button", name="Held", exact=True).click()
+    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    level = sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), present, strict=True))
+    for unit, text, factor in (
+        ("stops", "-1.5", 2**-1.5),
+        ("share", "40", 0.4),
+        ("value", "3", 3 / level),
+        ("stops", "", 0),
+        ("stops", "2", 4),
+    ):
+        painter.choose("Unit", unit)
+        painter.type("Held at", text)
+        lock = painter.said("ask")[-1]["asked"]["lock"]
+        assert lock == pytest.approx([factor * x for x in present], rel=1e-6)
+
+
+def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
+    painter.type("cove, level", "80 %")
+    assert "cove is off now" in painter.ui("toasts")[-1]["text"]
+    assert painter.said("ask") == []
+    painter.type("cove, level", "as now")
+    assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
+
+
+def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
+    painter.page.get_by_role("button", name="key", exact=True).click()
+    painter.type("At most", "150")
+    count = len(painter.said("ask"))
+    for label, before, text, words in (
+        ("At least", "", "200", "At least 200 % is above At most 150 %"),
+        ("At least", "", "150", ""),
+        ("At most", "150", "140.5", "At least 150 % is above At most 140.5 %"),
+    ):
+        painter.type(label, text)
+        field = painter.page.get_by_role("textbox", name=label, exact=True)
+        if words:
+            assert painter.ui("toasts")[-1]["text"] == f"{words}: the limits stay as they were."
+            assert field.input_value() == before
+        else:
+            count += 1
+        assert len(painter.said("ask")) == count
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080), (690, 560), (480, 640)])
+def test_what_is_asked_of_a_level_stands_in_one_row(opened: Any, size: tuple[int, int]) -> None:
+    painter = opened(viewport={"width": size[0], "height": size[1]})
+    painter.page.evaluate("() => painter.store.set({ side: true, open: { lights: true } })")
+    painter.page.get_by_role("button", name="key", exact=True).click()
+    panel = painter.page.get_by_role("group", name="What the solve may do with key")
+    room = panel.bounding_box()
+
+    def in_a_row(*labels: str) -> None:
+        named = [
+            panel.get_by_role("combobox" if label == "Unit" else "textbox", name=label, exact=True)
+            for label in labels
+        ]
+        boxes = [one.bounding_box() for one in named]
+        assert len({box["y"] + box["height"] for box in boxes}) == 1
+        for box, after in zip(boxes, [*boxes[1:], None], strict=True):
+            assert box["width"] > 40
+            end = after["x"] if after else room["x"] + room["width"]
+            assert box["x"] + box["width"] < end
+
+    in_a_row("At least", "At most", "Unit")
+    painter.choose("Colour", "kelvin")
+    in_a_row("From", "To", "Green")
+    panel.get_by_role("button", name="Held", exact=True).click()
+    in_a_row("Held at", "Unit")
+
+
+def test_a_long_name_of_a_dimmer_has_one_line(painter: Painter) -> None:
+    painter.page.evaluate(
+        """() => {
+          const { lights } = painter.store.value;
+          const named = ['spotlight_figure_left', 'spotlight_knot_right'];
+          painter.store.set({
+            lights: lights.map((one, k) => ({ ...one, name: named[k] ?? one.name })),
+            ties: [named],
+          });
+        }"""
+    )
+    name = "spotlight_figure_left and spotlight_knot_right, on one dimmer"
+    head = painter.page.locator(".group-name")
+    assert head.get_attribute("data-tip") == name
+    assert head.bounding_box()["height"] == 28
+    strong = head.locator("strong")
+    assert strong.evaluate("(one) => one.scrollWidth > one.clientWidth")
+    assert strong.bounding_box()["height"] < 20
+
+
+@pytest.mark.parametrize("way", ["off", "slider"])
+def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, way: str) -> None:
+    """Also where an answer of before comes while the session has not heard of the hand."""
+    limits = {"limits": {"max": "150%"}}
+    painter.page.evaluate(
+        """async ([limits, way]) => {
+          const { session } = painter;
+          await session.ask(0, limits);
+          const asked = way === 'off' ? session.turn(0, true) : session.hold(0, [1, 1, 1], true);
+          host.tell({ kind: 'answer', exact: true, asked: { key: limits }, arrays: {} });
+          await asked;
+        }""",
+        [limits, way],
+    )
+    painter.still()
+    painter.page.evaluate("() => painter.session.release(0)")
+    assert painter.said("ask")[-1]["asked"] == limits
+
+
+def test_what_a_light_may_do(painter: Painter) -> None:
+    page = painter.page
+    page.get_by_role("button", name="key", exact=True).click()
+    painter.type("At most", "150")
+    assert painter.said("ask")[-1]["asked"] == {"limits": {"max": "150%"}}
+    painter.type("At least", "20")
+    assert painter.said("ask")[-1]["asked"] == {"limits": {"min": "20%", "max": "150%"}}
+    painter.choose("Colour", "kelvin")
+    painter.type("From", "3000")
+    asked = painter.said("ask")[-1]["asked"]
+    assert asked == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
+    panel = page.get_by_role("group", name="What the solve may do with key")
+    panel.get_by_role("button", name="Off", exact=True).click()
+    assert painter.said("ask")[-1]["asked"] == {"off": True}
+    panel.get_by_role("button", name="Free", exact=True).click()
+    assert painter.said("ask")[-1]["asked"] == asked  # as it was before it was off
+    painter.choose("Colour", "color")
+    painter.type("Hex or kelvin", "3200K")
+    assert painter.said("ask")[-1]["asked"]["color"] == "3200K"
+    painter.choose("Colour", "primaries")
+    assert len(painter.said("ask")[-1]["asked"]["primaries"]) == 3
+    panel.get_by_role("button", name="As now", exact=True).click()
+    assert painter.said("ask")[-1]["asked"] == {"lock": True}
+    painter.choose("On one dimmer with", "cove")
+    assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
+    group = painter.page.get_by_role("group", name="key and cove, on one dimmer")
+    painter.page.evaluate("() => painter.session.ask(0, { color: '3200K' })")
+    colour = painter.page.get_by_role("combobox", name="Colour", exact=True)
+    colour.select_option("any")
+    panel.get_by_text("lights keep the colours").wait_for()
+    assert colour.count() == 0
+    assert group.locator(".light").count() == 2
+    group.get_by_role("button", name="key and cove, on one dimmer").first.click()  # it folds
+    assert group.locator(".light").count() == 0
+    group.get_by_role("button", name="key and cove, on one dimmer").first.click()
+    painter.button("Untie").click()
+    assert painter.said("tie")[-1]["ties"] == []
+
+
+def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: Painter) -> None:
+    badge = painter.page.locator(".badge")
+    held = "(asked) => host.tell({ kind: 'answer', exact: true, asked, arrays: {}, lights:"
+    held += " painter.store.value.lights.map(() => ({ share: 0.1, held: true })) })"
+    painter.page.evaluate(held, {})
+    assert badge.count() == 0
+    painter.page.evaluate(held, {"key": {"limits": {"max": "150%"}, "kelvin": [2700, 3000]}})
+    assert badge.all_inner_texts() == ["held back"]
+    assert "That holds it back: the painting asks" in badge.get_attribute("data-tip")
+    within = "(one) => one.scrollWidth <= one.clientWidth"
+    assert badge.evaluate(within)
+    painter.page.evaluate(held, {"key": {"lock": [1, 1, 1]}})
+    assert badge.all_inner_texts() == ["held"]
+
+
+def test_names_that_differ_at_their_end_are_told_apart(opened: Any) -> None:
+    """On a tablet, whose buttons need most of a row."""
+    painter = opened(has_touch=True)
+    painter.page.evaluate(
+        """() => {
+          const [first, second, ...rest] = window.painter.store.value.lights;
+          const called = (light, label) => ({ ...light, label });
+          const lights = [called(first, 'ceiling_window_12_3'), called(second, 'key'), ...rest];
+          window.painter.store.set({ lights });
+        }"""
+    )
+    painter.still()
+    row = painter.page.get_by_role("button", name="ceiling_window_12_3", exact=True)
+    box, (start, end) = row.bounding_box(), row.locator("span").all()
+    assert (start.inner_text(), end.inner_text()) == ("ceiling_window", "_12_3")
+    widths = start.evaluate("(its) => [its.clientWidth, its.scrollWidth]")
+    assert 12 < widths[0] < widths[1]  # something is left out, and it is not all of it
+    its = end.bounding_box()
+    assert its["x"] + its["width"] <= box["x"] + box["width"] + 0.5
+    assert painter.page.get_by_role("button", name="key", exact=True).inner_text() == "key"
+
+
+def test_where_there_is_no_room_the_unit_of_a_light_goes_first(opened: Any) -> None:
+    painter = opened(viewport={"width": 1280, "height": 720})
+    values = painter.page.locator(".light").first.locator(".values")
+    value, unit, error = values.locator("span").all()
+    whole = values.bounding_box()
+    for its in (value, error):
+        box = its.bounding_box()
+        assert its.inner_text().strip()
+        assert whole["x"] - 0.5 <= box["x"]
+        assert box["x"] + box["width"] <= whole["x"] + whole["width"] + 0.5
+        assert its.evaluate("(its) => its.scrollWidth <= its.clientWidth + 1")
+    assert unit.evaluate("(its) => its.scrollWidth > its.clientWidth")
+    said = [its.text_content().strip() for its in (value, unit, error)]
+    assert values.get_attribute("data-tip") == " ".join(said)
+
+
+def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Painter) -> None:
+    """Nobody has seen the blue that the solve has left it."""
+    present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
+    dark = "(rgb) => painter.store.set(({ weights }) => ({ weights: [rgb, ...weights.slice(1)] }))"
+    painter.page.evaluate(dark, [0, 0, present[2] / 100])
+    painter.type("key, level", "-1")
+    assert painter.said("ask")[-1]["asked"]["lock"] == pytest.approx([x / 2 for x in present])
+    painter.page.evaluate(dark, [0, 0, 5 * present[2]])  # this one everybody has
+    painter.type("key, level", "-1")
+    red, green, blue = painter.said("ask")[-1]["asked"]["lock"]
+    assert (red, green) == (0, 0)
+    assert blue > present[2]
+
+
+def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) -> None:
+    painter.page.evaluate(
+        "() => painter.store.set(({ weights }) => ({ weights: [[1, 0.5, 0.25],"
+        " ...weights.slice(1)] }))"
+    )
+    painter.still()
+    painter.page.evaluate(
+        """async () => {
+          const slider = document.querySelector('[aria-label="key, stops from now"]');
+          for (const [value, kind] of [[-7.5, 'input'], [-2, 'input'], [-1, 'change']]) {
+            slider.value = value;
+            slider.dispatchEvent(new Event(kind, { bubbles: true }));
+            await new Promise((done) => setTimeout(done, 60));
+          }
+        }"""
+    )
+    red, green, blue = painter.said("ask")[-1]["asked"]["lock"]
+    assert [green / red, blue / red] == pytest.approx([0.5, 0.25])
+
+
+def test_a_light_is_held_at_a_white(painter: Painter) -> None:
+    painter.button("key", exact=True).click()
+    painter.button("Held", exact=True).click()
+    before = painter.said("ask")[-1]["asked"]["lock"]
+    kelvin = painter.page.locator(".held-colour").get_by_role("textbox", name="Kelvin")
+    kelvin.fill("2700")
+    kelvin.press("Enter")
+    lock = np.array(painter.said("ask")[-1]["asked"]["lock"])
+    luminance = [0.2126, 0.7152, 0.0722]
+    assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
+    white = painter.page.evaluate(
+        "async () => (await import('/ui/colours.js')).ofKelvin(2700)",
+    )
+    np.testing.assert_allclose(lock / lock[0], np.array(white) / white[0], rtol=1e-9)
+
+
+def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
+    solo, tag = painter.button("Solo: show pendant"), painter.page.locator(".tag.is-part")
+    before = solo.bounding_box()
+    solo.click()
+    assert painter.page.evaluate("() => window.engine.shown.gains") == [k == 2 for k in range(7)]
+    assert tag.inner_text().strip() == "Answer: only pendant"
+    assert solo.bounding_box() == before  # a second click takes it back
+    painter.button("Show all", exact=True).click()
+    painter.button("Mute: show the picture without key").click()
+    assert tag.inner_text().strip() == "Answer: without key"
+    painter.button("Show all lights").click()
+    painter.still()
+    assert painter.page.evaluate("() => window.engine.shown.gains") is None
+    assert not painter.calls("begin")
+    painter.button("Mute: show the picture without key").click()
+    assert painter.page.evaluate("() => window.engine.shown.gains") == [k != 0 for k in range(7)]
+    assert not painter.said("ask")
+    painter.page.locator(".light-thumb").nth(1).hover()
+    painter.still()
+    shown = painter.page.evaluate("() => window.engine.shown")
+    assert shown["right"] == "other"
+    assert [max(rgb) > 0 for rgb in shown["other"]] == [k == 1 for k in range(7)]
+
+
+@pytest.mark.parametrize("way", ["panels", "fold", "search"])
+def test_a_light_is_shown_alone_until_its_row_is_gone(painter: Painter, way: str) -> None:
+    painter.page.locator(".light-thumb").nth(1).hover()
+    painter.page.wait_for_function("() => engine.shown.right === 'other'")
+    if way == "panels":
+        painter.page.keyboard.press("p")
+    elif way == "fold":
+        painter.page.locator(".is-lights button").first.focus()
+        painter.page.keyboard.press("Enter")
+    else:
+        painter.page.evaluate("() => painter.store.set({ search: 'key' })")
+    painter.page.locator(".light").nth(1).wait_for(state="detached")
+    painter.page.wait_for_function("() => engine.shown.right === 'solution'")
+
+
+def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
+    painter = opened("lights=64")
+    rows = painter.page.locator(".light")
+    assert rows.count() == 64
+    painter.page.get_by_label("Search lights").fill("row b")
+    assert rows.count() == 8
+    painter.button("Row B", exact=False).click()
+    assert rows.count() == 0
+    painter.page.get_by_label("Search lights").fill("nothing such")
+    assert painter.page.get_by_text("No light is called so").is_visible()
+    painter.page.get_by_label("Search lights").fill("")
+    painter.choose("Sort by", "share")
+    names = [row.get_attribute("data-light") for row in rows.all()]
+    shares = painter.page.evaluate(
+        "() => Object.fromEntries(painter.store.value.lights.map((one, k) =>"
+        " [one.name, painter.store.value.lit[k].share]))"
+    )
+    alone = [shares[name] for name in names[:3]]
+    assert alone == sorted(alone, reverse=True)
+
+
+def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.type("At most", "1.5")
+    assert painter.said("set")[-1]["values"] == {"sparse": 2}
+    assert painter.page.get_by_role("textbox", name="At most").input_value() == "2"
+
+
+def test_a_finger_scrolls_lights_and_moves_none(opened: Any) -> None:
+    """Where it begins on a slider; sideways it moves it, and so does a tap."""
+    painter = opened("lights=12", viewport={"width": 1024, "height": 768}, has_touch=True)
+    slider = painter.page.get_by_role("slider", name="sconce, stops from now", exact=True)
+    finger = Finger(painter.page)
+
+    def place() -> tuple[float, float, float]:
+        """A third along the slider, in the middle of what is seen; and how long it is."""
+        slider.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
+        box = slider.bounding_box()
+        return box["x"] + box["width"] / 3, box["y"] + box["height"] / 2, box["width"]
+
+    def mark(x: float) -> float:
+        """How far from there the slider's mark is."""
+        at = "(one) => (one.value - one.min) / (one.max - one.min)"
+        return float(slider.bounding_box()["x"] + slider.evaluate(at) * place()[2] - x)
+
+    x, y, _ = place()
+    scrolled = "() => document.querySelector('.is-lights .fold-body').scrollTop"
+    before, value = painter.page.evaluate(scrolled), slider.input_value()
+    finger.goes(*((x, y - 12 * k) for k in range(8)), *[(x, y - 84)] * 8)
+    assert painter.page.evaluate(scrolled) > before + 40
+    painter.page.evaluate("() => document.activeElement.blur()")
+    assert painter.said("ask") == []
+    assert slider.input_value() == value
+    x, y, _ = place()
+    finger.goes(*((x + 6 * k, y + k) for k in range(8)))
+    asked = painter.said("ask")
+    assert {one["light"] for one in asked} == {4}
+    assert [one["done"] for one in asked][:: len(asked) - 1] == [False, True]
+    assert mark(x + 42) == pytest.approx(0, abs=10)  # half of the mark, which stays on the track
+    search = painter.page.get_by_role("searchbox", name="Search lights")
+    search.focus()
+    finger.goes((x, y))
+    assert slider.evaluate("(one) => one === document.activeElement")
+    assert [one["done"] for one in painter.said("ask")[len(asked) :]] == [True]
+    assert mark(x) == pytest.approx(0, abs=10)
+    slider.press("ArrowRight")  # keys are heard as before
+    assert len(painter.said("ask")) > len(asked) + 1
+    painter.page.mouse.click(x + 30, y)  # and so is a mouse
+    assert mark(x + 30) == pytest.approx(0, abs=10)

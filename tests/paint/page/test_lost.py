@@ -1,0 +1,222 @@
+"""What a painter's page says when something fails, is refused, or is elsewhere."""
+
+from typing import Any
+
+import pytest
+from interface import Painter
+
+
+def test_a_tab_that_comes_second_says_where_the_painter_is(opened: Any) -> None:
+    painter = opened("elsewhere", until=".lightpaint .banner")
+    said = painter.page.get_by_role("alert")
+    assert "the painter is open in another tab" in said.inner_text().lower()
+    assert painter.page.get_by_role("progressbar").count() == 0
+    assert painter.page.get_by_text("Opening the scene").count() == 0
+    box, view = said.bounding_box(), painter.page.locator(".view").bounding_box()
+    assert abs(box["x"] + box["width"] / 2 - view["x"] - view["width"] / 2) < 2
+    said.get_by_role("button", name="Take over").click()
+    painter.page.locator(".lightpaint .tag").first.wait_for()
+    assert painter.said("take_over")
+    assert said.count() == 0
+
+
+def test_what_fails_is_said_and_the_painter_lives(painter: Painter) -> None:
+    painter.page.evaluate("() => { window.host.fails = 'the disk is full'; }")
+    painter.button("Keep look").click()
+    painter.page.get_by_text("the disk is full").wait_for()
+    painter.button("Dismiss").click()
+    assert not painter.page.get_by_text("the disk is full").is_visible()
+    painter.button("Keep look").click()
+    assert len(painter.said("save_look")) == 2
+
+
+def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
+    painter.tell(kind="connection", state="lost")
+    assert painter.page.get_by_role("alert").get_by_text("connection is lost").is_visible()
+    painter.tell(kind="connection", state="open")
+    assert not painter.page.get_by_role("alert").is_visible()
+    painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+    painter.stroke()
+    assert not painter.calls("begin")  # who does not have it does not paint on it
+    painter.button("Take over").click()
+    assert painter.said("take_over")
+    assert not painter.page.get_by_role("alert").is_visible()
+
+
+#: Small pictures that are shown, and of those how many are there.
+THUMBS = (
+    "() => { const all = [...document.querySelectorAll('.lightpaint .thumb')];"
+    " return [all.length, all.filter((one) => one.width > 1).length]; }"
+)
+
+
+def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_again(
+    opened: Any,
+) -> None:
+    """In a notebook it asks for them over the same line by which it is told of its loss."""
+    painter = opened("model=taken&engine")
+    take_over = painter.button("Take over")
+    take_over.wait_for()
+    painter.page.wait_for_timeout(100)
+    assert painter.page.evaluate(THUMBS) == [7, 0]
+    assert painter.ui("toasts") == []
+    take_over.click()
+    painter.page.wait_for_function(f"() => ({THUMBS})()[1] === 7")
+    painter.page.wait_for_function(
+        "() => engine.work.isReady && !engine.work.loader.missing().length"
+    )
+    painter.stroke()
+    assert painter.said("paint")
+
+
+def refuse(painter: Painter) -> None:
+    """Have what is said next fail."""
+    painter.page.evaluate("() => { host.fails = 'That cannot be done.'; }")
+
+
+def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
+    """Nor does it go along with what is asked next."""
+    painter.page.get_by_role("button", name="key", exact=True).click()
+    painter.type("At least", "20")
+    before = {name: painter.ui(name) for name in ("asked", "ties", "settings", "weights")}
+    at_most = painter.page.get_by_role("textbox", name="At most")
+    refuse(painter)
+    painter.type("At most", "1e308")
+    painter.still()
+    assert at_most.input_value() == ""
+    painter.choose("Colour", "kelvin")
+    asked = {"limits": {"min": "20%"}, "kelvin": [2700, 6500]}
+    assert painter.said("ask")[-1]["asked"] == asked
+    refuse(painter)
+    painter.choose("Colour", "any")
+    painter.still()
+    assert painter.ui("asked") == {"key": asked}
+    before["asked"] = painter.ui("asked")
+    for act in (
+        lambda: painter.choose("On one dimmer with", "cove"),
+        lambda: painter.page.evaluate("() => void painter.session.setting('sparse', 99)"),
+        lambda: painter.page.evaluate("() => painter.session.hold(2, [9, 9, 9], true)"),
+    ):
+        refuse(painter)
+        act()
+        painter.still()
+        assert {name: painter.ui(name) for name in before} == before
+
+
+def test_what_is_refused_leaves_what_is_on_its_way(painter: Painter) -> None:
+    painter.page.evaluate(
+        """() => {
+          const { session } = painter;
+          host.fails = 'That cannot be done.';
+          session.ask(0, { limits: { max: '1e308%' } });
+          session.ask(1, { off: true });
+        }"""
+    )
+    painter.still()
+    assert painter.ui("asked") == {"window left": {"off": True}}
+
+
+def alert(painter: Painter) -> str:
+    """What has to be known now, or nothing."""
+    return " ".join(painter.page.get_by_role("alert").all_inner_texts())
+
+
+def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> None:
+    painter = opened("model")
+    painter.page.clock.install()
+    painter.page.evaluate("() => { model.isBusy = true; }")
+    painter.stroke()
+    painter.page.clock.fast_forward(9_000)
+    assert alert(painter) == ""
+    painter.page.clock.fast_forward(1_100)
+    assert "has not answered for 10 s" in alert(painter)
+    painter.page.evaluate("() => { model.isBusy = false; return model.work(); }")
+    assert painter.said("paint")[-1]["done"] is True
+    assert alert(painter) == ""
+    painter.page.clock.fast_forward(60_000)  # nothing is waited for
+    assert alert(painter) == ""
+    # Nor is what was lost on its way.
+    painter.page.evaluate(
+        """() => {
+          model.isBusy = true;
+          painter.session.host.fetch('thumb/0');
+          model.waiting.length = 0;
+          model.isBusy = false;
+          return painter.session.host.fetch('thumb/0').then(() => {});
+        }"""
+    )
+    painter.page.clock.fast_forward(60_000)
+    assert alert(painter) == ""
+
+
+@pytest.mark.parametrize("model", ["model", "model=taken"])
+def test_a_kernel_that_has_ended_is_said_to_have(opened: Any, model: str) -> None:
+    """Nothing is painted for nobody, and nobody is there to take it over from."""
+    painter = opened(model)
+    assert painter.page.get_by_role("button", name="Take over").count() == (model != "model")
+    painter.page.evaluate("() => model.trigger('comm_live_update')")
+    painter.still()
+    assert "The kernel has ended: run the cell again" in alert(painter)
+    assert painter.page.get_by_role("button", name="Take over").count() == 0
+    painter.stroke()
+    assert not painter.calls("begin")
+
+
+def under_way(painter: Painter) -> set[str]:
+    """What is shown to be: writing files, rendering, finding out why it is not closer."""
+    ui = painter.page.evaluate("() => painter.store.value")
+    flags = {"export": ui["isWriting"], "verify": ui["verifying"], "explain": ui["explaining"]}
+    return {name for name, is_so in flags.items() if is_so}
+
+
+def ask_for_all(painter: Painter) -> None:
+    """Ask for everything that takes long."""
+    painter.page.evaluate(
+        "() => { const { session, store } = painter; store.set({ isWriting: true });"
+        " session.send('export', { what: [] }); session.verify(); session.explain(); }"
+    )
+    painter.still()
+
+
+LOST = "Promise.reject(new Error('there is no connection to the painter'))"
+
+
+def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
+    painter.page.evaluate(f"() => {{ host.send = () => {LOST}; }}")
+    ask_for_all(painter)
+    assert under_way(painter) == set()
+    painter.button("Write files").click()
+    painter.button("Write", exact=True).click()
+    assert painter.button("Write", exact=True).is_enabled()
+    painter.page.keyboard.press("Escape")
+    painter.button("How true?").click()
+    painter.button("Out of reach").click()  # asks for what it shows, and once
+    painter.page.wait_for_function("() => painter.store.value.show.overlay === null")
+
+
+def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> None:
+    painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
+    ask_for_all(painter)
+    assert under_way(painter) == {"export", "verify", "explain"}
+    painter.tell(kind="say", text="The scene does not load.", tone="warn")
+    painter.tell(kind="failed", text="A stroke is too large.")
+    assert under_way(painter) == {"export", "verify", "explain"}
+    for what in ("verify", "explain", "export"):
+        assert what in under_way(painter)
+        painter.tell(kind="say", text="It does not render.", tone="warn", what=what)
+        assert what not in under_way(painter)
+
+
+def test_what_ended_while_the_connection_was_lost_is_not_waited_for(painter: Painter) -> None:
+    painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
+    ask_for_all(painter)
+    painter.page.evaluate("() => host.tell(host.state())")  # another round of samples is there
+    assert under_way(painter) == {"export", "verify", "explain"}
+    painter.tell(kind="connection", state="lost")
+    painter.page.evaluate("() => host.tell(host.state())")
+    assert under_way(painter) == set()
+    painter.tell(kind="progress", what="verification", done=5, total=16, unit="passes")
+    assert under_way(painter) == {"verify"}  # which still goes on
+    painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+    painter.page.evaluate("() => host.tell(host.state())")
+    assert under_way(painter) == set()
