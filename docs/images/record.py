@@ -151,12 +151,13 @@ def from_two_seats(hand: Hand) -> None:
 
 
 def _load(page: Page) -> None:
-    """Until clean pictures of all lights are there: nothing that is published has grain."""
+    """Until all is rendered, and clean: nothing that is published has grain."""
     page.wait_for_function(
         """() => {
           const { work } = document.getElementById('lightpaint').painter.engine;
           const there = [...work.loader.there.values()].filter((one) => one.includes(' clean/'));
-          return work.isReady && there.length === work.state.lights.length;
+          const isDone = !document.querySelector('.working');
+          return isDone && work.isReady && there.length === work.state.lights.length;
         }""",
         timeout=600_000,
     )
