@@ -108,7 +108,6 @@ def opened(browser: Any, site: Any) -> Iterator[Any]:
     ) -> Painter:
         context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **about})
         contexts.append(context)
-        context.set_default_timeout(5000)
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on(

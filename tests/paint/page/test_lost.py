@@ -70,7 +70,8 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
 
 
 def refuse(painter: Painter) -> None:
-    """Have what is said next fail."""
+    """Have what is said next fail, and not what is on its way."""
+    painter.still()
     painter.page.evaluate("() => { host.fails = 'That cannot be done.'; }")
 
 
@@ -123,13 +124,15 @@ def alert(painter: Painter) -> str:
 
 def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> None:
     painter = opened("model")
-    painter.page.clock.install()
+    painter.page.clock.install(time=0)
+    painter.page.clock.pause_at(60_000)  # else it goes on, as long as this test takes
     painter.page.evaluate("() => { model.isBusy = true; }")
     painter.stroke()
-    painter.page.clock.fast_forward(9_000)
+    painter.page.clock.run_for(9_000)
     assert alert(painter) == ""
-    painter.page.clock.fast_forward(1_100)
+    painter.page.clock.run_for(1_100)
     assert "has not answered for 10 s" in alert(painter)
+    painter.page.clock.resume()
     painter.page.evaluate("() => { model.isBusy = false; return model.work(); }")
     assert painter.said("paint")[-1]["done"] is True
     assert alert(painter) == ""
