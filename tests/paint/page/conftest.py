@@ -40,12 +40,16 @@ def site() -> Iterator[Site]:
     made = Site()
 
     class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"  # one connection for many files
+        wbufsize = -1  # head and content in one
+
         def do_GET(self) -> None:
             path = unquote(urlsplit(self.path).path)
             headers, content = served(made, path)
             self.send_response(200 if headers else 404)
             for name, value in headers.items():
                 self.send_header(name, value)
+            self.send_header("content-length", str(len(content)))
             self.end_headers()
             self.wfile.write(content)
 
