@@ -50,6 +50,7 @@ class Live:
         reduction = reduced_by(constraints, self._basis, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._pulls: _Pulls | None = None
+        self._is_kept_to = False  # by the answer before
         for view in self._views:
             view.see_through(fit.transform)
 
@@ -74,6 +75,10 @@ class Live:
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
             return untouched(self._views, self._reduction)
+        if not self._is_kept_to:
+            # What is not allowed may well be nearer to the painting.
+            start = _nearest(start, views, self._reduction)
+            self._is_kept_to = True
         pull, rest_weight = self._pull(views), self._rest_weight(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
@@ -136,5 +141,9 @@ def _power(views: Sequence[LiveView]) -> Doubles:
 
 def untouched(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
     """The weights (n, 3) nearest to the present ones, of what constraints leave."""
-    weights = views[0].basis.present_weights
+    return _nearest(views[0].basis.present_weights, views, reduction)
+
+
+def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:
+    """Of what constraints leave, (n, 3), by how bright the lights are."""
     return solve_reduced(to_present(_power(views), weights), reduction, weights).weights
