@@ -50,6 +50,11 @@ class LightConstraint:
     label: str = ""
     where: str = ""
 
+    @property
+    def is_held(self) -> bool:
+        """Whether it leaves nothing to solve for."""
+        return self.off or self.lock is not None
+
     @classmethod
     def of(cls, asked: Mapping[str, Any], *, where: str = "constraint") -> "LightConstraint":
         """From keys and values as they stand in a lights file.

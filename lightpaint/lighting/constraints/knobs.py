@@ -104,14 +104,17 @@ def tie_of(
     lights: Sequence[BasisLight],
     asked: Sequence[LightConstraint | None],
 ) -> Knob:
-    """One unknown for all members; at 1 they have their present luminances."""
+    """One unknown for all members; at 1 they have their present luminances.
+
+    A member that is held holds the dimmer: the unknown's limits meet.
+    """
     columns, lower, upper = [], 0.0, np.inf
     for k in members:
         light, one = lights[k], asked[k] or LightConstraint()
-        if one.off or one.lock is not None or (one.primaries and len(one.primaries) > 1):
+        if one.primaries and len(one.primaries) > 1:
             raise ConstraintError(
                 f"{one.where} asks for {one.label}, and {light.name!r} is on the dimmer of {names}"
-                ": a tied light can only have limits and a color; leave it out of the tie"
+                ": a tied light has one color; leave it out of the tie"
             )
         present = np.array(light.emission)
         if not present.any():
@@ -128,11 +131,15 @@ def tie_of(
         direction = present if color is None else np.array(color) * float(luminance(present))
         check_grey(one, light)
         least, most = dimmer_limits(one, direction, light)
+        if one.is_held:
+            emission = np.zeros(3) if one.lock is None else locked_at(light, one.lock, one.where)
+            least = most = float(luminance(emission) / luminance(present))
+            direction = emission / most if most > 0 else direction
         lower, upper = max(lower, least), min(upper, most)
         columns.append((k, direction))
     if lower > upper * (1 + ROUND_OFF):
         raise ConstraintError(
-            f"{tie.where}: the limits of {names} contradict each other on one dimmer: one light "
+            f"{tie.where}: what is asked of {names} cannot be had on one dimmer: one light "
             f"asks for at least {lower:.4g} times the present, another for at most {upper:.4g}"
         )
     return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))

@@ -217,8 +217,14 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
             names = ", ".join(lights[i].name for i in members)
             labels[k] = ", ".join(filter(None, [f"tied ({names})", labels[k]]))
             if k == members[0]:
-                knobs.append(tie_of(tie, members, names, lights, asked))
-        elif one is not None and (one.off or one.lock is not None):
+                knob = tie_of(tie, members, names, lights, asked)
+                if any(its.is_held for its in (asked[i] for i in members) if its is not None):
+                    [level] = knob.unknowns
+                    for i, rgb in level.columns:
+                        held[i] = level.lower * rgb
+                else:
+                    knobs.append(knob)
+        elif one is not None and one.is_held:
             held[k] = 0 if one.lock is None else locked_at(light, one.lock, one.where)
         elif one is None:
             knobs.append(Knob.of_any_colour(k, is_scalar=light.is_scalar))

@@ -17,6 +17,6 @@ def white_where_free(asked: Constraints, lights: Sequence[BasisLight]) -> Constr
         light.name
         for k, (light, one) in enumerate(zip(lights, of_each_light(asked, lights), strict=True))
         if not (light.is_fixed or light.is_scalar or k in tied)
-        and (one is None or not (one.off or one.lock is not None or one.primaries is not None))
+        and (one is None or not (one.is_held or one.primaries is not None))
     ]
     return asked.and_then(Constraints.of({name: {"kelvin": list(WHITES)} for name in free}))

@@ -427,7 +427,6 @@ def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None
         ({"tie": ["dark", "lamp_1"]}, "'dark' is off at present"),
         ({"tie": ["lamp_1"]}, "is one light: a tie has at least two"),
         ({"tie": [["lamp_1", "sky"], ["lamp_*"]]}, "'lamp_1' is in two ties"),
-        ({"tie": ["lamp_*"], "light": {"lamp_1": {"lock": True}}}, "is on the dimmer of"),
         ({"tie": ["lamp_*"], "light": {"lamp_1": {"kelvin": [2700, 5000]}}}, "is on the dimmer"),
         (
             {
@@ -437,7 +436,11 @@ def test_wishes_for_all_lights_that_mean_nothing(asked: Any, words: str) -> None
                     "lamp_2": {"limits": {"min": "50%"}},
                 },
             },
-            "limits of lamp_1, lamp_2 contradict each other",
+            "asked of lamp_1, lamp_2 cannot be had on one dimmer",
+        ),
+        (
+            {"tie": ["lamp_*"], "light": {"lamp_1": {"lock": True}, "lamp_2": {"off": True}}},
+            "asked of lamp_1, lamp_2 cannot be had on one dimmer",
         ),
         (
             {"light": {"lamp_1": {"limits": {"min": [9, 9, 9], "max": 3}}}},
@@ -485,6 +488,32 @@ def test_ties_of_lights_with_colours_and_limits(make_basis: Any) -> None:
     np.testing.assert_allclose(w[0] / (w[0] @ LUMINANCE), kelvin_to_rgb(3200))
     # The limit of one member is that of the dimmer.
     np.testing.assert_allclose(w[2] @ LUMINANCE, 0.05 * now[2])
+
+
+def test_who_holds_a_light_holds_its_dimmer(make_basis: Any) -> None:
+    """As if each of the lights on it had been held, at the same share of the present."""
+    basis, target = _problem(make_basis, 8)
+    now, tie = _present(basis), [["l0", "l1"]]
+    level = 0.3 * float(now[0] @ LUMINANCE)
+    warm = (level * kelvin_to_rgb(3200)).tolist()
+    for lock, first, share in (
+        ("30%", 0.3 * now[0], 0.3),
+        (level, 0.3 * now[0], 0.3),
+        (warm, np.array(warm), 0.3),  # its colour is its own
+        (True, now[0], 1.0),
+        ([0, 0, 0], 0 * now[0], 0.0),
+        (None, 0 * now[0], 0.0),
+    ):
+        asked = {"off": True} if lock is None else {"lock": lock}
+        w, _, _ = _solved(basis, target, tie=tie, light={"l0": asked})
+        each = {"l0": {"lock": first.tolist()}, "l1": {"lock": (share * now[1]).tolist()}}
+        expected, _, _ = _solved(basis, target, light=each)
+        np.testing.assert_allclose(w[0], first, rtol=1e-12)
+        np.testing.assert_allclose(w, expected, rtol=1e-9, atol=1e-9 * expected.max())
+    # Both at the same share are one wish.
+    both = {"l0": {"lock": "30%"}, "l1": {"lock": "30%"}}
+    w, _, _ = _solved(basis, target, tie=tie, light=both)
+    np.testing.assert_allclose(w[:2], 0.3 * now[:2], rtol=1e-12)
 
 
 def test_no_constraints_are_the_plain_problem(make_basis: Any) -> None:
