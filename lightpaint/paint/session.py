@@ -11,7 +11,6 @@ paintings.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy.typing as npt
@@ -171,7 +170,7 @@ class Session:
                 return [self._ask(message)]
             case protocol.Tie():
                 self._check_names(name for names in message.ties for name in names)
-                return [self._wish("tie", replace(self.wishes, ties=message.ties))]
+                return [self._wish("tie", self.wishes.of_ties(message.ties))]
             case protocol.Set():
                 wishes = self.wishes.of_answer(message.values)
                 return [self._wish(", ".join(TITLES[key] for key in message.values), wishes)]

@@ -13,6 +13,9 @@ from lightpaint.settings import Settings
 #: What may be asked of the answer: of its fit, and of all lights together.
 OF_FIT, OF_ALL = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
 
+#: What holds a light at a level.
+HOLDS = ("lock", "off")
+
 #: What people know them by: the titles that the page's settings have.
 TITLES = {
     "hold": "What you did not paint",
@@ -48,9 +51,20 @@ class Wishes:
         return {"lights": lights, "ties": [list(x) for x in self.ties], "values": dict(self.values)}
 
     def of_light(self, name: str, asked: Mapping[str, Any]) -> "Wishes":
-        """With this asked of one light, and nothing else of it."""
-        lights = {key: value for key, value in self.lights.items() if key != name}
-        return replace(self, lights=lights | ({name: dict(asked)} if asked else {}))
+        """With this asked of one light, and nothing else of it.
+
+        Who holds a light holds all on its dimmer, and what was held of these before no more.
+        """
+        tied = next((names for names in self.ties if name in names), ())
+        lights = {**self.lights, name: asked}
+        return replace(self, lights=_one_level(lights, (name, *tied)))
+
+    def of_ties(self, ties: Sequence[Sequence[str]]) -> "Wishes":
+        """With these on one dimmer each; of those that are held the first one holds it."""
+        lights = dict(self.lights)
+        for names in ties:
+            lights = _one_level(lights, names)
+        return replace(self, lights=lights, ties=tuple(map(tuple, ties)))
 
     def of_answer(self, values: Mapping[str, Any]) -> "Wishes":
         """With these values, None for what follows from the painting. Raises PaintError."""
@@ -92,3 +106,19 @@ class Wishes:
         if "hold" in asked and given.unpainted:
             asked["unpainted"] = 0.0
         return replace(given, **asked)
+
+
+def _one_level(
+    lights: Mapping[str, Mapping[str, Any]], names: Sequence[str]
+) -> dict[str, Mapping[str, Any]]:
+    """`lights`, of which of `names` only the first that is held still is."""
+    made, is_held = dict(lights), False
+    for name in dict.fromkeys(names):
+        asked = dict(made.get(name, {}))
+        if is_held:
+            asked = {key: value for key, value in asked.items() if key not in HOLDS}
+        # Not by `in`: 0 is a level, and equals False.
+        values = (asked.get(key) for key in HOLDS)
+        is_held = is_held or any(value is not None and value is not False for value in values)
+        made[name] = asked
+    return {name: asked for name, asked in made.items() if asked}

@@ -14,6 +14,7 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.basis.basis import BasisLight, Origin
 from lightpaint.cli.spelling import options_of
+from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
@@ -135,6 +136,28 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
     # In linear light the sums are those of the exact answer; a film of few pixels and two rounds
     # are as near as their averages.
     assert apart.max() < (1e-6 if space == "linear" else 2e-2) * size.max()
+
+
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_what_is_asked_is_kept_to_at_once(basis: lp.Basis, space: Any):
+    """Though what was before, which is not allowed any more, looks more like the painting."""
+    session = session_of(basis, space=space)
+    session.said(*paint(1, (0, 18, 0, 32), 0.9))
+    rng = np.random.default_rng(3)
+    for share in rng.uniform(0, 0.9, 8):
+        # A slider that moves, and two lights that the painting wants brighter.
+        before = session.weights[:, 1]
+        session.said(protocol.Ask(0, {"lock": [share] * 3}, done=False), {})
+        np.testing.assert_array_equal(session.weights[0], share)
+        session.said(protocol.Ask(1, {"limits": {"max": share * before[1]}}), {})
+        assert session.weights[1] @ LUMINANCE <= share * before[1] * (1 + 1e-12)
+        session.said(protocol.Ask(2, {"color": "3200K"}), {})
+        colour = session.weights[2] / (session.weights[2] @ LUMINANCE)
+        np.testing.assert_allclose(colour, kelvin_to_rgb(3200), rtol=1e-9)
+        session.said(protocol.Ask(2, {"off": True}), {})
+        assert not session.weights[2].any()
+        for light in (1, 2):
+            session.said(protocol.Ask(light, {}), {})
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
@@ -332,6 +355,31 @@ def test_a_slider_that_is_being_moved_is_in_nothing_else(
     for session in sessions:
         session.said(*paint(2, (4, 9, 3, 9), 0.5))
     assert slid.wishes == still.wishes
+
+
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: Any):
+    """One holds them at a time, and undo gives it back to the one before."""
+    session = session_of(basis, space=space)
+    zero, one = (np.array(light.emission) for light in basis.lights[:2])
+    session.said(*paint(1, (2, 9, 3, 12), 0.9))
+    ask, tie = protocol.Ask, protocol.Tie((("lamp 0", "lamp 1"),))
+    session.said(ask(1, {"lock": (3 * one).tolist()}), {})
+    session.said(ask(0, {"off": True}), {})
+    session.said(tie, {})  # of both the first stands
+    assert not session.weights[:2].any()
+    session.said(ask(0, {"lock": (2 * zero).tolist()}, done=False), {})
+    np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
+    session.said(ask(0, {"lock": (2 * zero).tolist()}), {})
+    session.said(ask(1, {"lock": (4 * one).tolist()}), {})
+    np.testing.assert_allclose(session.weights[:2], [4 * zero, 4 * one], rtol=1e-9)
+    assert list(session.wishes.lights) == ["lamp 1"]
+    session.said(protocol.Undo(), {})
+    np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
+    session.said(ask(0, {}), {})
+    assert session.wishes.lights == {}
+    share = session.weights[:2] / [zero, one]
+    np.testing.assert_allclose(share, share[0, 0], rtol=1e-9)  # they still go together
 
 
 def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):

@@ -216,6 +216,22 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert painter.said("tie")[-1]["ties"] == []
 
 
+def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
+    painter.page.evaluate("() => painter.session.tie('key', 'cove')")
+    painter.still()
+    key, cove = (
+        painter.page.get_by_role("group", name=name, exact=True) for name in ("key", "cove")
+    )
+    key.get_by_role("button", name="Hold key as it is").click()
+    free = cove.get_by_role("button", name="Let the solve have cove again")
+    free.wait_for()
+    assert cove.locator(".dimmer.is-held").count() == 1
+    free.click()
+    assert painter.said("ask")[-1]["asked"] == {}
+    assert painter.said("ask")[-1]["light"] == painter.said("ask")[0]["light"]  # key holds both
+    key.get_by_role("button", name="Hold key as it is").wait_for()
+
+
 def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: Painter) -> None:
     badge = painter.page.locator(".badge")
     held = "(asked) => host.tell({ kind: 'answer', exact: true, asked, arrays: {}, lights:"

@@ -49,7 +49,7 @@ export function Asking(props) {
     ${
       manner === 'held' &&
       html`<${Held} ...${props} />
-      ${!light.is_scalar && html`<${HeldColour} ...${props} />`}`
+      ${!light.is_scalar && !tied && html`<${HeldColour} ...${props} />`}`
     }
     ${
       manner === 'free' &&

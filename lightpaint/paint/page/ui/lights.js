@@ -4,6 +4,7 @@ import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { luminance } from './colours.js';
 import { Button, Select } from './controls.js';
+import { askedOf, tieOf } from './dimmers.js';
 import { counted, percent } from './format.js';
 import { Icon } from './icons.js';
 import { comparedAnswer, isUnseen } from './keeping.js';
@@ -69,9 +70,8 @@ export function ShowAll({ ui, hands }) {
 function row(ui, hands, k, isMany) {
   const light = ui.lights[k];
   const isOpen = ui.unfolded.includes(k);
-  const tied = ui.ties.find((tie) => tie.includes(light.name));
   return html`<${LightRow} key=${light.name} k=${k} light=${light} hands=${hands}
-    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${ui.asked[light.name]} tied=${tied}
+    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${askedOf(ui, k)} tied=${tieOf(ui, k)}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
@@ -154,7 +154,7 @@ const FEWEST = 3;
  * @param {Ui} ui @param {number} k @returns {string | null} */
 function groupOf(ui, k) {
   const { name, group } = ui.lights[k];
-  const tie = ui.ties.find((names) => names.includes(name));
+  const tie = tieOf(ui, k);
   const others = tie && (tie.length === 2 ? tie[1] : `${tie.length - 1} more`);
   if (tie) return `${tie[0]} and ${others}, on one dimmer`;
   return group ?? (ui.lights.length > MANY ? stemOf(name) : null);
@@ -162,8 +162,7 @@ function groupOf(ui, k) {
 
 /** @param {Ui} ui @param {number} k */
 function isStem(ui, k) {
-  const { name, group } = ui.lights[k];
-  return !group && !ui.ties.some((names) => names.includes(name));
+  return !ui.lights[k].group && !tieOf(ui, k);
 }
 
 /** `window` of `window_12`, `cyc` of `cyc left`. @param {string} name @returns {string | null} */

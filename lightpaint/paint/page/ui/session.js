@@ -1,5 +1,6 @@
 /** Talks with the session: what it says becomes state, what a person does becomes messages. */
 
+import { holderOf } from './dimmers.js';
 import {
   ENDED,
   IDLE,
@@ -222,9 +223,12 @@ export class Session {
     this.isMoving = false;
   }
 
-  /** Let the solve have a light again, with what was asked of it before. @param {number} light */
-  release(light) {
+  /** Let the solve have a light again, with what was asked of it before; of several on one dimmer,
+   * the one that holds it. @param {number} tied */
+  release(tied) {
     const { lights, asked } = this.store.value;
+    const light = holderOf(this.store.value, tied);
+    this.hands.delete(tied);
     this.hands.delete(light);
     const before = this.before.get(light) ?? withoutLevel(asked[lights[light].name] ?? {});
     this.before.delete(light);

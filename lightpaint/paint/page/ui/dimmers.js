@@ -1,0 +1,27 @@
+/** Lights on one dimmer: who holds one of them, or puts it out, does it to all. */
+
+/** @typedef {import("./model.js").Asked} Asked */
+/** @typedef {import("./model.js").Ui} Ui */
+
+/** Names of the lights on the dimmer of one, if there are others. @param {Ui} ui @param {number} light */
+export const tieOf = (ui, light) => ui.ties.find((tie) => tie.includes(ui.lights[light].name));
+
+/** The light by which this one is held: itself, if none on its dimmer is.
+ * @param {Ui} ui @param {number} light @returns {number} */
+export function holderOf(ui, light) {
+  const isHeld = (/** @type {string} */ name) =>
+    ui.asked[name]?.lock !== undefined || Boolean(ui.asked[name]?.off);
+  const { name } = ui.lights[light];
+  const holder = isHeld(name) ? name : tieOf(ui, light)?.find(isHeld);
+  return holder === undefined ? light : ui.lights.findIndex((one) => one.name === holder);
+}
+
+/** What is asked of a light, its level by whichever light of its dimmer.
+ * @param {Ui} ui @param {number} light @returns {Asked | undefined} */
+export function askedOf(ui, light) {
+  const own = ui.asked[ui.lights[light].name];
+  const holder = holderOf(ui, light);
+  if (holder === light) return own;
+  const { lock, off } = ui.asked[ui.lights[holder].name];
+  return { ...own, ...(lock === undefined ? {} : { lock }), ...(off ? { off } : {}) };
+}
