@@ -17,10 +17,15 @@ class Painter:
         return [one for one in self.page.evaluate("() => window.host.said") if one["kind"] == kind]
 
     def still(self) -> None:
-        """Wait until all is answered, and shown."""
+        """Wait until all is answered, and shown: what a change brings may come a frame after it."""
         self.page.evaluate(
-            "async () => { do { await new Promise((done) => setTimeout(done, 20)); }"
-            " while (window.host.busy); }"
+            """async () => {
+              const frame = () => new Promise((done) => requestAnimationFrame(done));
+              do {
+                for (let k = 0; k < 2; k += 1) await frame();
+                await new Promise((done) => setTimeout(done, 20));
+              } while (window.host.busy);
+            }"""
         )
 
     def calls(self, name: str) -> list[Any]:

@@ -455,7 +455,7 @@ def test_what_is_said_beside_the_pointer_lies_in_the_picture(painter: Painter, t
         for a, b in ((0.5, 0.5), (0.02, 0.02), (0.98, 0.02), (0.02, 0.98), (0.98, 0.98)):
             x, y = left + a * wide, top + b * high
             page.mouse.move(x, y)
-            page.evaluate("() => new Promise((done) => setTimeout(done, 50))")
+            painter.still()
             box = page.locator(".near").bounding_box()
             assert left - 1 <= box["x"] <= box["x"] + box["width"] <= left + wide + 1
             assert top - 1 <= box["y"] <= box["y"] + box["height"] <= top + high + 1

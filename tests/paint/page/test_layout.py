@@ -44,7 +44,7 @@ def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> No
     )
 
     def focused() -> str:
-        painter.page.wait_for_timeout(50)
+        painter.still()
         return str(painter.page.evaluate(find))
 
     skips = painter.page.locator(".skips button")
