@@ -98,8 +98,13 @@ class Mixer {
     edge.append(made('i'));
     stage.append(image, edge, made('span', 'mixer-tag', 'painting'));
     stage.append(made('span', 'mixer-tag is-right', 'mix'));
-    const wipe = range('Wipe: how much of the painting', 0, 100, 50);
-    const move = () => stage.style.setProperty('--p', `${wipe.value}%`);
+    // The mix is whole until somebody compares: a light may do something in one half alone.
+    const wipe = range('Wipe: how much of the painting', 0, 100, 0);
+    const move = () => {
+      stage.style.setProperty('--p', `${wipe.value}%`);
+      stage.classList.toggle('is-mix', Number(wipe.value) < 1);
+      stage.classList.toggle('is-painting', Number(wipe.value) > 99);
+    };
     wipe.addEventListener('input', move);
     drag(stage, (part) => {
       wipe.value = String(100 * part);

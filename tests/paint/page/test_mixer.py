@@ -240,9 +240,14 @@ def test_the_wipe(make_basis: Any, opened: Any) -> None:
     page = opened(report(lit(make_basis, 2)))
     stage = page.locator(".mixer-stage")
     box = stage.bounding_box()
+    # The mix is whole at first: in the painting no slider changes anything.
+    tag = page.locator(".mixer-tag", has_text="painting")
+    assert page.get_by_role("slider", name="Wipe: how much").input_value() == "0"
+    assert not tag.is_visible()
     stage.click(position={"x": 0.25 * box["width"], "y": 20})
     part = float(stage.evaluate("x => x.style.getPropertyValue('--p')").rstrip("%"))
     assert part == pytest.approx(25, abs=1)
+    assert tag.is_visible()
 
 
 def test_axe_finds_nothing_in_the_mixer(make_basis: Any, opened: Any, axe: str) -> None:
