@@ -18,6 +18,7 @@ from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
 from lightpaint.lighting.analysis.held_back import Held, held_back_by
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.analysis.on_object import object_with_most
+from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
@@ -140,7 +141,14 @@ def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     there, does_much = _lights_at(solution, place)
     if (objects := solution.basis.objects) is not None:
         seen = replace(seen, place=replace(place, object=_object(look, objects, missed, light)))
-    kept = {light.name for light in solution.lighting.lights if light.is_active}
+    # Not those that are only to be white, as all are.
+    asked = of_each_light(problem.constraints, solution.basis.lights)
+    tied = tied_lights(problem.constraints, solution.basis.lights)
+    kept = {
+        light.name
+        for k, light in enumerate(solution.lighting.lights)
+        if light.is_active and (asked[k] is not None or k in tied)
+    }
     kept_there = tuple(name for name in there if name in kept)
     seen = replace(seen, there=there, does_much=does_much, kept_there=kept_there)
     held, views = held_back_by(solution)

@@ -119,6 +119,8 @@ def test_lights_that_are_held_back_are_known(make_basis: Any):
     assert seen.kept_there == ("left",)
     assert {"left"} < set(seen.there)
     assert what_is_seen(solve(basis, target)).kept_there == ()
+    # That lamps are white is asked of none of them.
+    assert what_is_seen(solve(basis, target, colors="white")).kept_there == ()
 
 
 def test_a_small_wish_that_is_swallowed_is_not_close(make_basis: Any):
