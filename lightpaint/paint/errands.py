@@ -154,7 +154,8 @@ class Errands:
         self._place.put(of_view("verified", view), as_halves(picture))
         about = {"agrees": agrees, "text": said, "view": view}
         self._seen[view] = moment.version, about
-        self._place.tell(Message("verified", about))
+        is_old = self._place.version != moment.version
+        self._place.tell(Message("verified", about | {"is_old": is_old}))
 
     def _explain(self, asked: protocol.Explain) -> None:
         moment, _ = self._place.now()

@@ -663,3 +663,18 @@ def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
     assert heard[0].fields["done"] == studio.state().fields["progress"]["done"] == 1
     assert heard[-1].kind == "waiting"
     assert "ZeroDivisionError: of our own" in heard[-1].fields["text"]
+
+
+def test_a_render_that_comes_after_another_stroke_is_of_an_earlier_answer(
+    with_scenes: tuple[Heard, Renders],
+):
+    heard, renders = with_scenes
+    heard.paint(1, 0.8)
+    heard.exact()
+    heard.studio.said(protocol.Verify(), {})
+    heard.wait(lambda m: m.kind == "progress" and m.fields["what"] == "verify")
+    heard.paint(2, 0.3)
+    renders.is_enough.set()
+    assert heard.wait(lambda m: m.kind == "verified").fields["is_old"] is True
+    [said] = heard.studio.state().fields["verified"]
+    assert said["is_old"] is True

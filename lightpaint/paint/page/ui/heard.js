@@ -42,7 +42,7 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
     connection: 'open',
     closed: null,
     // What came of it meanwhile was not heard; of what still goes on more is said.
-    ...(isBack ? IDLE : {}),
+    ...(isBack ? { ...IDLE, explained: [] } : {}),
     basis:
       basis && !basis.done
         ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
@@ -56,12 +56,13 @@ export function stateOf(message, /** @type {import('./model.js').Ui} */ before) 
   };
 }
 
+/** @param {any} told @returns {NonNullable<Ui['verified']>} */
+const render = ({ is_old: isOld = false, ...about }) => ({ ...about, isOld });
+
 /** Renders that were made before the page began. @param {any[]} verified @param {number} view
  * @returns {Partial<Ui>} */
 function rendersOf(verified, view) {
-  const verifiedOf = Object.fromEntries(
-    verified.map((one) => [one.view, { ...one, isOld: one.is_old }]),
-  );
+  const verifiedOf = Object.fromEntries(verified.map((one) => [one.view, render(one)]));
   return { verifiedOf, verified: verifiedOf[view] ?? null };
 }
 
@@ -157,8 +158,9 @@ export function viewOf(ui, view) {
 /** A render of a view has come. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 export function verifiedOf(message, ui) {
   const { view = 0 } = message;
-  const made = { verifiedOf: { ...ui.verifiedOf, [view]: message }, verifying: null };
-  return view === ui.view ? { ...made, verified: message } : made;
+  const verified = render(message);
+  const made = { verifiedOf: { ...ui.verifiedOf, [view]: verified }, verifying: null };
+  return view === ui.view ? { ...made, verified } : made;
 }
 
 /** Why it is not closer, unless somebody has painted on. @param {any} message @param {Ui} ui

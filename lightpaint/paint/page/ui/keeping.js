@@ -10,8 +10,16 @@
  * of sums in another order. */
 const SAME = 1e-6;
 
-/** Keep painting and answer under a name that no other look has. @param {Hands} hands */
-export async function keepLook({ session, store }) {
+/** Keep painting and answer, as hands have left the lights, under a name that no other look has.
+ * @param {Hands} hands */
+export function keepLook(hands) {
+  const { session } = hands;
+  session.keeping = session.keeping.then(() => session.moving).then(() => keep(hands));
+  return session.keeping;
+}
+
+/** @param {Hands} hands */
+async function keep({ session, store }) {
   const reply = await session.send('save_look', { name: unused(store.value.looks) });
   if (reply?.kind === 'looks') mark(store, Math.max(...reply.looks.map(idOf)));
 }
@@ -28,8 +36,9 @@ export async function goOnFrom({ session, store }, look) {
  * @param {Ui} ui @returns {number | null}
  */
 export function currentLook({ looks, lastLook: last, version, history, weights }) {
-  if (last && last.version === version && looks.some(({ id }) => id === last.look))
-    return last.look;
+  // A page that has just been opened, or is back, knows of no version.
+  const isKnown = version >= 0 && last?.version === version;
+  if (last && isKnown && looks.some(({ id }) => id === last.look)) return last.look;
   // Where its lights are held, somebody has painted on, and they are the same.
   const isPaintedOn = (/** @type {number} */ id) =>
     id === last?.look && stepsOf(history) !== last.steps;
