@@ -130,6 +130,17 @@ def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mi
     assert counts.min() == 1
 
 
+def test_a_whole_stays_one_though_some_of_it_counts_less(page: Any):
+    all_ = "hand.askFor(canvas, { stops: -2, mired: 0, object: null });"
+    less = "{" + stroke("tool: 'weight', importance: 0.5", place(5, 5)) + "}"
+    erase = "{" + stroke("tool: 'eraser', size: 20", place(60, 40)) + "}"
+    accent = "{" + stroke("rgb: [1, 1, 1], size: 8", place(30, 30)) + "}"
+    image, importance = painted(page, all_ + less + erase + accent, light=0.5)
+    assert importance[5, 5] == 0.5
+    np.testing.assert_allclose(image[40, 60], 0.125, rtol=2e-3)  # halves
+    assert (importance[40, 60], importance[30, 30]) == (1, 10)
+
+
 def test_on_a_patchwork_the_eraser_brings_the_present_look_back(page: Any):
     """All is painted, but not alike: nothing lies below it."""
     objects = np.tile(np.arange(W) // 10, (H, 1))

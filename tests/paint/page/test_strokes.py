@@ -129,6 +129,19 @@ def test_what_another_page_has_not_let_through_is_given_up(told: Any):
     ]
 
 
+def test_a_stroke_that_was_given_up_is_not_lost(told: Any):
+    lost = told(
+        """
+        host.lost = null;
+        strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.drop();
+        await host.lose();
+        strokes.forget(true);
+        return host.lost;
+        """
+    )
+    assert lost is None
+
+
 def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(told: Any):
     said = told(
         """

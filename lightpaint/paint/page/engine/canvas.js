@@ -78,7 +78,7 @@ export class PaintCanvas {
   begin() {
     this.tiles = new Map();
     this.region = null;
-    this.isAll = this.importance.every((x) => x >= 1);
+    this.isAll = this.importance.every((x) => x > 0);
     this.lift = 1;
     this.covers(0);
   }

@@ -103,9 +103,9 @@ export class Painter extends Hearers {
 
   /** What to paint with, in the manner that is in the hand, for a pixel to have the light that a
    * picture has there: as light, what falls on it.
-   * @param {Kind} kind @param {number} x @param {number} y @returns {RGB} */
-  paintAt(kind, x, y) {
-    const light = this.lightAt(kind, x, y);
+   * @param {Kind} kind @param {number} x @param {number} y @param {RGB} [light] that light, where it
+   * is known: the GPU is waited for else @returns {RGB} */
+  paintAt(kind, x, y, light = this.lightAt(kind, x, y)) {
     const place = this.within(x, y);
     const { albedo, width } = this.work.canvas ?? {};
     if (this.hand.as === 'look' || !place || !albedo || !width) return light;

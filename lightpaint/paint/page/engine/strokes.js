@@ -77,7 +77,8 @@ export class Strokes {
   /** Another page has painted meanwhile, and what the session has not heard would lie over that;
    * or nobody is there who would hear it. */
   forget(isStale = false) {
-    const count = this.left.length + (this.live?.whole ? 1 : 0);
+    const count =
+      this.left.filter((one) => !('isDropped' in one)).length + (this.live?.whole ? 1 : 0);
     this.left = [];
     this.live = null;
     this.tell();
