@@ -77,6 +77,15 @@ class Ask:
 
 
 @dataclass(frozen=True)
+class AskAll:
+    """What is asked of several lights from now on, by name, as of `Ask`: one step. Answered by
+    `answer`.
+    """
+
+    asked: Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
 class Tie:
     """Which lights are on one dimmer: all such groups, of names. Answered by `answer`."""
 
@@ -191,6 +200,7 @@ Said = (
     | Undo
     | Redo
     | Ask
+    | AskAll
     | Tie
     | Set
     | SaveLook
@@ -213,6 +223,7 @@ KINDS: Mapping[str, type[Any]] = {
     "undo": Undo,
     "redo": Redo,
     "ask": Ask,
+    "ask_all": AskAll,
     "tie": Tie,
     "set": Set,
     "save_look": SaveLook,

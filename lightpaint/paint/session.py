@@ -16,7 +16,7 @@ from typing import Any
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -168,6 +168,8 @@ class Session:
                 return self._step(+1)
             case protocol.Ask():
                 return [self._ask(message)]
+            case protocol.AskAll():
+                return [self._ask_all(message)]
             case protocol.Tie():
                 self._check_names(name for names in message.ties for name in names)
                 return [self._wish("tie", self.wishes.of_ties(message.ties))]
@@ -329,8 +331,7 @@ class Session:
         if said.light >= len(self.basis.lights):
             raise PaintError(f"no light {said.light}: there are {len(self.basis.lights)}")
         light = self.basis.lights[said.light]
-        if light.is_fixed:
-            raise PaintError(f"{light.name} is kept as it is, and cannot be asked for anything")
+        self._check_free(light)
         asked = self.wishes.of_light(light.name, said.asked)
         if said.done:
             return self._wish(light.name, asked)
@@ -338,6 +339,18 @@ class Session:
         self.answering.move(asked)
         self._changed()
         return self.answer()
+
+    def _ask_all(self, said: protocol.AskAll) -> Message:
+        self._check_names(said.asked)
+        wishes = self.wishes
+        for name, asked in said.asked.items():
+            self._check_free(self.basis.lights[self.basis.names.index(name)])
+            wishes = wishes.of_light(name, asked)
+        return self._wish(", ".join(said.asked), wishes)
+
+    def _check_free(self, light: BasisLight) -> None:
+        if light.is_fixed:
+            raise PaintError(f"{light.name} is kept as it is, and cannot be asked for anything")
 
     def _wish(self, label: str, wishes: Wishes) -> Message:
         """Ask for something from now on: a step."""

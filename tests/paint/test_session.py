@@ -357,6 +357,20 @@ def test_a_slider_that_is_being_moved_is_in_nothing_else(
     assert slid.wishes == still.wishes
 
 
+def test_several_lights_are_asked_in_one_step(basis: lp.Basis):
+    session = session_of(basis)
+    for light in (0, 1):
+        session.said(protocol.Ask(light, {"lock": True}), {})
+    held = session.wishes
+    session.said(protocol.AskAll({"lamp 0": {}, "lamp 1": {"limits": {"max": "150%"}}}), {})
+    assert session.wishes.lights == {"lamp 1": {"limits": {"max": "150%"}}}
+    session.said(protocol.Undo(), {})
+    assert session.wishes == held
+    with pytest.raises(lp.LightpaintError, match="nobody"):
+        session.said(protocol.AskAll({"nobody": {}}), {})
+    assert session.wishes == held
+
+
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: Any):
     """One holds them at a time, and undo gives it back to the one before."""
