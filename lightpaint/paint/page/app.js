@@ -6,7 +6,7 @@ import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { counted } from './ui/format.js';
 import { hearWithin, press } from './ui/keys.js';
-import { LightsPanel, ShowAll } from './ui/lights.js';
+import { LightsPanel, OfAll } from './ui/lights.js';
 import { Looks } from './ui/looks.js';
 import { handBefore, keep, openBefore, sizeBefore } from './ui/memory.js';
 import { first } from './ui/model.js';
@@ -168,7 +168,7 @@ function Side({ ui, hands }) {
       'lights',
       'Lights',
       html`<${LightsPanel} ui=${ui} hands=${hands} />`,
-      html`<${ShowAll} ui=${ui} hands=${hands} />`,
+      html`<${OfAll} ui=${ui} hands=${hands} />`,
     )}
     ${fold('truth', 'How true?', html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
   </aside>`;

@@ -483,3 +483,74 @@ def test_what_is_advised_is_done_by_a_button(
     assert button.count() == 0
     painter.tell(**said, version=90, headline="Nearly there, 90 %.", help=None, settings={})
     assert button.count() == 0
+
+
+def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> None:
+    """Somebody has painted on while it was made."""
+    painter.button("How true?").click()
+    painter.button("Verify").click()
+    painter.stroke()
+    painter.tell(kind="verified", agrees=True, text="A render confirms it.", view=0, is_old=True)
+    assert "(of an earlier answer)" in painter.page.locator(".verified").inner_text()
+    painter.tell(kind="verified", agrees=True, text="A render confirms it.", view=0, is_old=False)
+    assert "earlier" not in painter.page.locator(".verified").inner_text()
+
+
+def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> None:
+    painter.page.keyboard.press("Control+s")
+    painter.button("How true?").click()
+    painter.button("Why not closer?").click()
+    painter.still()
+    assert painter.page.locator("[aria-current=true]").count() == 1
+    assert painter.ui("explained")
+    painter.tell(kind="closed", reason="taken", text="It is open on another page.")
+    painter.page.evaluate(
+        "() => { host.weights = host.weights.map((rgb) => rgb.map((x) => 3 * x));"
+        " host.step('brush'); }"
+    )
+    painter.button("Take over").click()
+    painter.still()
+    assert painter.page.locator("[aria-current=true]").count() == 0
+    assert painter.ui("explained") == []
+
+
+def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -> None:
+    """And what was typed before is in them."""
+    painter.page.evaluate("() => { void painter.session.hold(1, [1, 1, 1], true); }")
+    for _ in range(2):
+        painter.page.evaluate(
+            "() => window.dispatchEvent("
+            "new KeyboardEvent('keydown', { key: 's', ctrlKey: true, bubbles: true }))"
+        )
+    assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
+    kinds = [one["kind"] for one in painter.page.evaluate("() => host.said")]
+    assert kinds.index("ask") < kinds.index("save_look")
+
+
+def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.page.get_by_role("textbox", name="At most").focus()
+    painter.page.keyboard.type("3")
+    painter.page.keyboard.press("Escape")
+    painter.page.locator(".settings").wait_for(state="detached")
+    level = painter.page.get_by_role("textbox", name="key, level")
+    level.fill("-1")
+    level.press("Escape")
+    level.blur()
+    assert painter.said("set") == painter.said("ask") == []
+
+
+def test_where_a_page_may_not_copy_it_says_so(opened: Any) -> None:
+    painter = opened(init="Object.defineProperty(navigator, 'clipboard', { value: undefined })")
+    painter.button("Write files").click()
+    painter.button("Copy the folder's path").click()
+    painter.page.get_by_text("select the text instead").wait_for()
+
+
+def test_a_double_click_begins_no_render(painter: Painter) -> None:
+    """The panel comes to lie under its second click."""
+    painter.button("How true?").click()
+    painter.button("Verify").dispatch_event("click", {"detail": 2})
+    assert painter.said("verify") == []
+    painter.button("Verify").click()
+    assert painter.said("verify")

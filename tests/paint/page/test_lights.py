@@ -443,3 +443,98 @@ def test_a_finger_scrolls_lights_and_moves_none(opened: Any) -> None:
     assert len(painter.said("ask")) > len(asked) + 1
     painter.page.mouse.click(x + 30, y)  # and so is a mouse
     assert mark(x + 30) == pytest.approx(0, abs=10)
+
+
+def panel_of_key(painter: Painter) -> Any:
+    """What may be asked of the key light."""
+    painter.page.get_by_role("button", name="key", exact=True).click()
+    return painter.page.get_by_role("group", name="What the solve may do with key")
+
+
+def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> None:
+    panel = panel_of_key(painter)
+    panel.get_by_role("button", name="Held", exact=True).click()
+    painter.type("Held at", "")
+    painter.still()
+    level = panel.get_by_role("textbox", name="Held at", exact=True)
+    level.press("ArrowDown")
+    assert max(painter.said("ask")[-1]["asked"]["lock"]) == 0
+    level.press("ArrowUp")
+    lock, present = painter.said("ask")[-1]["asked"]["lock"], painter.ui("lights")[0]["present"]
+    assert lock == pytest.approx([x * 2**-7.9 for x in present], rel=1e-6)
+
+
+def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
+    panel = panel_of_key(painter)
+    panel.get_by_role("button", name="Held", exact=True).click()
+    painter.choose("Unit", "value")
+    painter.type("Held at", "0.00004")
+    lock = painter.said("ask")[-1]["asked"]["lock"]
+    assert 0.2126 * lock[0] + 0.7152 * lock[1] + 0.0722 * lock[2] == pytest.approx(4e-5, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("limits", "shown", "turned"),
+    [
+        ({"min": 0.05, "max": "150%"}, ("0.05", 1.5), ("share", 0.05, "150%")),
+        ({"max": [0.3, 0.3, 0.3]}, ("", 0.3), ("share", None, 0.3)),
+        ({"min": "20%", "max": "150%"}, ("20", 150), ("value", 0.2, 1.5)),
+    ],
+)
+def test_limits_of_a_lights_file_are_shown_in_one_unit(
+    painter: Painter, limits: Any, shown: Any, turned: Any
+) -> None:
+    painter.page.evaluate("(limits) => painter.session.ask(0, { limits })", limits)
+    painter.still()
+    panel = panel_of_key(painter)
+    red, green, blue = painter.ui("lights")[0]["present"]
+    now = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    is_share = panel.get_by_role("combobox", name="Unit").input_value() == "share"
+    assert is_share == all(isinstance(x, str) for x in limits.values())
+    fields = [panel.get_by_role("textbox", name=f"At {end}") for end in ("least", "most")]
+    assert fields[0].input_value() == shown[0]
+    most = shown[1] * (now if isinstance(limits["max"], str) and not is_share else 1)
+    assert float(fields[1].input_value()) == pytest.approx(most, rel=1e-3)
+    unit, *ends = turned
+    painter.choose("Unit", unit)
+    asked = painter.said("ask")[-1]["asked"]["limits"]
+    for key, end in zip(("min", "max"), ends, strict=True):
+        if isinstance(end, str):
+            assert float(asked[key].rstrip("%")) == pytest.approx(float(end.rstrip("%")), rel=1e-3)
+        elif end is None:
+            assert key not in asked
+        elif unit == "share":
+            assert float(asked[key].rstrip("%")) == pytest.approx(100 * end / now, rel=1e-3)
+        else:
+            assert asked[key] == pytest.approx(end * now, rel=1e-3)
+
+
+def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
+    """Each has again what was asked of it before; as after a look that holds all of them."""
+    painter.page.evaluate("() => painter.session.ask(0, { limits: { max: '150%' } })")
+    painter.still()
+    free = painter.page.get_by_role("button", name="Free all")
+    for name in ("key", "cove"):
+        assert free.count() == 0
+        painter.button(f"Hold {name} as it is").click()
+        painter.still()
+    steps = painter.ui("history")["count"]
+    free.click()
+    free.wait_for(state="detached")
+    [said] = painter.said("ask_all")
+    assert said["asked"] == {"key": {"limits": {"max": "150%"}}, "cove": {}}
+    assert painter.ui("history")["count"] == steps + 1
+    assert painter.page.locator(".dimmer.is-held").count() == 0
+
+
+def test_a_white_that_is_green_or_pink_is_said_to_be(painter: Painter) -> None:
+    def said(rgb: list[float]) -> str:
+        painter.page.evaluate("(rgb) => painter.session.hold(0, rgb, true)", rgb)
+        painter.still()
+        return str(painter.page.locator('[data-light="key"] .values').inner_text())
+
+    white = [1.0, 0.98, 0.95]
+    assert " K" in said(white)
+    assert "green" not in said(white)
+    assert "K green" in said([1.0, 1.12, 0.95])
+    assert "K pink" in said([1.0, 0.75, 0.95])

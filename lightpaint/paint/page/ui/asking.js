@@ -2,10 +2,10 @@
 
 import { html, useState } from '../vendor/preact.js';
 import { atFull, luminance, ofKelvin, toHex, toKelvin } from './colours.js';
-import { Button, Choice, Number_, Select } from './controls.js';
+import { Button, Choice, Number_, Select, useTyped } from './controls.js';
 import { number } from './format.js';
 import { KelvinSlider } from './kelvin.js';
-import { atLevel, isOnNow, nowOf, stopsOf } from './level.js';
+import { DARKEST, atLevel, isOnNow, nowOf, stopsOf } from './level.js';
 
 /** @typedef {import("./model.js").Asked} Asked */
 /** @typedef {import("./engine.js").RGB} RGB */
@@ -88,7 +88,8 @@ function Held({ k, light, hands, rgb }) {
   const units = [{ value: 'stops', label: 'st from now' }, ...unitsOf(light)];
   return html`<div class="ask-fields is-pair">
     <${Number_} label="Held at" value=${value} least=${least} most=${unit === 'stops' ? 20 : undefined}
-      digits=${unit === 'stops' ? 2 : 4} step=${step} empty=${unit === 'stops' ? 'off' : undefined}
+      figures=${unit === 'stops' ? undefined : FIGURES} step=${step} start=${DARKEST}
+      empty=${unit === 'stops' ? 'off' : undefined}
       change=${(/** @type {number | null} */ to) => hold(to === null ? 0 : of(to))} />
     ${
       isOnNow(light) &&
@@ -96,6 +97,9 @@ function Held({ k, light, hands, rgb }) {
     }
   </div>`;
 }
+
+/** Of levels that are shown and taken: lamps are anything from 1e-5 to 1e9 units. */
+const FIGURES = 6;
 
 /** What levels of a light are given in. @param {import("./model.js").Light} light */
 const unitsOf = (light) => [
@@ -122,20 +126,23 @@ function HeldColour({ k, hands, rgb }) {
 /** @param {import("./light.js").Props} props */
 function Limits({ k, light, hands, asked = {} }) {
   const limits = asked.limits ?? {};
-  const given = limits.max ?? limits.min;
+  const given = Object.values(limits);
   const canShare = isOnNow(light);
-  const [chosen, setUnit] = useState(typeof given === 'number' || !canShare ? 'value' : 'share');
-  const unit = given === undefined ? chosen : typeof given === 'number' ? 'value' : 'share';
+  const [chosen, setUnit] = useState(canShare ? 'share' : 'value');
+  // A lights file may have luminances, shares and colours: what is no share is shown as luminance.
+  const areShares = given.every((x) => typeof x === 'string');
+  const unit = given.length ? (areShares ? 'share' : 'value') : chosen;
+  const shown = (/** @type {any} */ level) => amount(level, light, unit);
   const set = (/** @type {"min" | "max"} */ key, /** @type {number | null} */ value) => {
     const made = {
       ...limits,
       [key]: value === null ? null : unit === 'share' ? `${value}%` : value,
     };
     const kept = Object.fromEntries(Object.entries(made).filter(([, x]) => x !== null));
-    const [least, most] = [amount(made.min), amount(made.max)];
-    const isPair = least !== null && most !== null && typeof made.min === typeof made.max;
-    if (isPair && least > most) {
-      const spoken = (/** @type {number} */ x) => (unit === 'share' ? `${x} %` : number(x, 6));
+    const [least, most] = [shown(made.min), shown(made.max)];
+    if (least !== null && most !== null && least > most) {
+      const spoken = (/** @type {number} */ x) =>
+        unit === 'share' ? `${x} %` : number(x, FIGURES);
       const [low, high] = [least, most].map(spoken);
       hands.session.toast(
         `At least ${low} is above At most ${high}: the limits stay as they were.`,
@@ -147,23 +154,18 @@ function Limits({ k, light, hands, asked = {} }) {
   };
   const into = (/** @type {string} */ to) => {
     setUnit(to);
-    if (given === undefined || to === unit) return;
-    const now = nowOf(light);
-    const turned = Object.fromEntries(
-      Object.entries(limits).map(([key, x]) => [
-        key,
-        to === 'share'
-          ? `${Number(((100 * amount(x)) / now).toPrecision(4))}%`
-          : Number(((amount(x) / 100) * now).toPrecision(4)),
-      ]),
-    );
-    hands.session.ask(k, { ...asked, limits: turned });
+    if (!given.length || to === unit) return;
+    const turned = Object.entries(limits).map(([key, x]) => {
+      const its = Number(amount(x, light, to).toPrecision(FIGURES));
+      return [key, to === 'share' ? `${its}%` : its];
+    });
+    hands.session.ask(k, { ...asked, limits: Object.fromEntries(turned) });
   };
   return html`<div class="ask-fields">
-    <${Number_} label="At least" value=${amount(limits.min)} least=${0} empty="–" step=${5}
-      change=${(/** @type {number | null} */ value) => set('min', value)} digits=${4} />
-    <${Number_} label="At most" value=${amount(limits.max)} least=${0} empty="–" step=${5}
-      change=${(/** @type {number | null} */ value) => set('max', value)} digits=${4} />
+    <${Number_} label="At least" value=${shown(limits.min)} least=${0} empty="–" step=${5}
+      change=${(/** @type {number | null} */ value) => set('min', value)} figures=${FIGURES} />
+    <${Number_} label="At most" value=${shown(limits.max)} least=${0} empty="–" step=${5}
+      change=${(/** @type {number | null} */ value) => set('max', value)} figures=${FIGURES} />
     ${
       canShare &&
       html`<${Select} label="Unit" value=${unit} choices=${unitsOf(light)} change=${into} />`
@@ -171,10 +173,16 @@ function Limits({ k, light, hands, asked = {} }) {
   </div>`;
 }
 
-/** @param {any} level @returns {any} a number, or null */
-function amount(level) {
+/** A limit, as of a lights file: a luminance, a share of the present as '40%', or a colour.
+ * @param {any} level @param {import("./model.js").Light} light @param {string} unit
+ * @returns {any} a number, in percent where `unit` is 'share'; null for none */
+function amount(level, light, unit) {
   if (level === undefined || level === null) return null;
-  return Array.isArray(level) ? luminance(level) : parseFloat(level);
+  const isShare = typeof level === 'string';
+  if (isShare && unit === 'share') return parseFloat(level);
+  const plain = Array.isArray(level) ? luminance(/** @type {RGB} */ (level)) : level;
+  const value = isShare ? (parseFloat(level) / 100) * nowOf(light) : plain;
+  return unit === 'share' ? (100 * value) / nowOf(light) : value;
 }
 
 /** What is asked of a light's colour. @param {Asked} asked */
@@ -270,15 +278,20 @@ function Ties({ light, hands, tied, others = [] }) {
 
 /** @param {{label: string, value: string, take: (text: string) => void}} props */
 function Words({ label, value, take }) {
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
+  const [typed, setTyped, now] = useTyped();
   const done = () => {
-    if (typed !== null && typed.trim() && typed !== value) take(typed.trim());
+    const text = now.current?.trim();
     setTyped(null);
+    if (text && text !== value) take(text);
+  };
+  const press = (/** @type {KeyboardEvent} */ { key }) => {
+    if (key === 'Enter') done();
+    if (key === 'Escape') setTyped(null);
   };
   return html`<label class="field words"><span class="name">${label}</span>
     <input type="text" value=${typed ?? value} spellcheck="false" autocomplete="off"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)} onBlur=${done}
-      onKeyDown=${(/** @type {any} */ event) => event.key === 'Enter' && done()} /></label>`;
+      onKeyDown=${press} /></label>`;
 }
 
 /** @param {RGB} rgb */

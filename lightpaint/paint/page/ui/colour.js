@@ -2,7 +2,7 @@
 
 import { html, useState } from '../vendor/preact.js';
 import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './colours.js';
-import { Choice, Slider } from './controls.js';
+import { Choice, Slider, useTyped } from './controls.js';
 import { signed } from './format.js';
 import { KelvinSlider, gradient, withinKelvin } from './kelvin.js';
 import { paintOf } from './model.js';
@@ -56,19 +56,22 @@ export function shownAs(ui, { engine }) {
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function Hex({ colour, set }) {
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
+  const [typed, setTyped, now] = useTyped();
   const take = (/** @type {string} */ text) => {
     const made = ofHex(text);
     setTyped(null);
     if (made) set(made);
   };
+  const press = (/** @type {any} */ { key, currentTarget }) => {
+    if (key === 'Enter') take(currentTarget.value);
+    if (key === 'Escape') setTyped(null);
+  };
   return html`<label class="field hex"><span class="only-read">Hex</span>
     <input type="text" value=${typed ?? toHex(colour)} spellcheck="false" autocomplete="off"
       maxlength="7"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
-      onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)}
-      onKeyDown=${(/** @type {any} */ event) =>
-        event.key === 'Enter' && take(event.currentTarget.value)} /></label>`;
+      onBlur=${() => now.current !== null && take(now.current)}
+      onKeyDown=${press} /></label>`;
 }
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */

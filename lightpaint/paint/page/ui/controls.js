@@ -5,6 +5,19 @@ import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { asTyped } from './format.js';
 import { Icon } from './icons.js';
 
+/** What is being typed in a field, null for nothing; and how it is now, for whoever hears of the
+ * field before it is drawn anew: what is given up by Escape is not taken when the field goes.
+ * @returns {[string | null, (text: string | null) => void, {current: string | null}]} */
+export function useTyped() {
+  const [typed, set] = useState(/** @type {string | null} */ (null));
+  const now = useRef(typed);
+  const setTyped = (/** @type {string | null} */ text) => {
+    now.current = text;
+    set(text);
+  };
+  return [typed, setTyped, now];
+}
+
 let counter = 0;
 
 /** @returns {string} an id that no other element of the page has */
@@ -76,19 +89,22 @@ export function Check({ label, on, change, tip, disabled }) {
 }
 
 /**
- * A number that is typed: taken on Enter or when it is left, stepped by the arrow keys.
+ * A number that is typed: taken on Enter or when it is left, given up by Escape, stepped by the
+ * arrow keys. digits: after the point; figures: of the number, instead. start: from where the keys
+ * go up where it is empty.
  * @param {{label: string, value: number | null, change: (value: number | null) => void,
- *   least?: number, most?: number, step?: number, digits?: number, unit?: string,
- *   hidden?: boolean, empty?: string, disabled?: boolean, tip?: string}} props
+ *   least?: number, most?: number, step?: number, digits?: number, figures?: number, unit?: string,
+ *   start?: number, hidden?: boolean, empty?: string, disabled?: boolean, tip?: string}} props
  */
 export function Number_(props) {
   const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
-  const { least = -Infinity, most = Infinity, tip } = props;
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
-  const shown = typed ?? (value === null ? '' : String(Number(value.toFixed(digits))));
+  const { least = -Infinity, most = Infinity, figures, start = 0, tip } = props;
+  const [typed, setTyped, now] = useTyped();
+  const round = (/** @type {number} */ x) =>
+    Number(figures ? x.toPrecision(figures) : x.toFixed(digits));
+  const shown = typed ?? (value === null ? '' : String(round(value)));
   // What is shown is what is taken.
-  const within = (/** @type {number} */ x) =>
-    Math.min(most, Math.max(least, Number(x.toFixed(digits))));
+  const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, round(x)));
   const take = (/** @type {string} */ text) => {
     setTyped(null);
     const plain = asTyped(text);
@@ -99,19 +115,20 @@ export function Number_(props) {
   const press = (/** @type {any} */ event) => {
     const way = { ArrowUp: 1, ArrowDown: -1 }[/** @type {string} */ (event.key)];
     if (event.key === 'Enter') take(event.currentTarget.value);
-    if (way) {
-      event.preventDefault();
-      setTyped(null);
-      const by = way * step * (event.shiftKey ? 10 : 1);
-      change(within((Number(shown) || 0) + by));
-    }
+    if (event.key === 'Escape') setTyped(null);
+    if (!way) return;
+    event.preventDefault();
+    setTyped(null);
+    if (!shown && way < 0) return; // less than nothing there is not
+    const from = shown ? Number(asTyped(shown)) || 0 : start;
+    change(within(from + way * step * (event.shiftKey ? 10 : 1)));
   };
   return html`<label class="field number" data-tip=${tip}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
       disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
-      onBlur=${(/** @type {any} */ event) => typed !== null && take(event.currentTarget.value)} />
+      onBlur=${() => now.current !== null && take(now.current)} />
     ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}
   </label>`;
 }

@@ -90,5 +90,6 @@ function pointedIn(engine, { kind, left, top, scale }, x, y) {
   const [px, py] = [(x - left) / scale, (y - top) / scale];
   const found = engine.pointed(px, py);
   if (!found) return null;
-  return { ...found, light: engine.lightAt(kind, px, py), paint: engine.paintAt(kind, px, py) };
+  const light = engine.lightAt(kind, px, py);
+  return { ...found, light, paint: engine.paintAt(kind, px, py, light) };
 }

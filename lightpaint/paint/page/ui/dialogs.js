@@ -67,7 +67,7 @@ function ExportDialog({ ui, hands, close }) {
       <span class="faint">${about}</span></div>`,
     )}
     <div class="row"><span class="faint folder">into ${folder}</span>
-      <${CopyButton} text=${folder} tip="Copy the folder's path" />
+      <${CopyButton} text=${folder} tip="Copy the folder's path" hands=${hands} />
       ${isBusy && ui.writing && html`<${Bar} progress=${ui.writing} label="Writing" />`}
       <${Button} label=${isBusy ? 'Writing …' : 'Write'} primary disabled=${isBusy || !what.length}
         act=${write} /></div>
@@ -80,7 +80,7 @@ function ExportDialog({ ui, hands, close }) {
       ${
         exported.command &&
         html`<h3>The same on the command line</h3>
-        <${Copied} text=${exported.command} />`
+        <${Copied} text=${exported.command} hands=${hands} />`
       }
     </div>`
     }
@@ -92,21 +92,26 @@ function within(file, folder) {
   return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
 }
 
-/** @param {{text: string}} props */
-function Copied({ text }) {
+/** @param {{text: string, hands: Hands}} props */
+function Copied({ text, hands }) {
   return html`<div class="command"><code tabindex="0">${text}</code>
-    <${CopyButton} text=${text} label="Copy" />
+    <${CopyButton} text=${text} label="Copy" hands=${hands} />
   </div>`;
 }
 
-/** Says by itself that it has copied. @param {{text: string, label?: string, tip?: string}} props */
-function CopyButton({ text, label, tip }) {
+/** Says by itself that it has copied.
+ * @param {{text: string, hands: Hands, label?: string, tip?: string}} props */
+function CopyButton({ text, hands, label, tip }) {
   const [isDone, setDone] = useState(false);
-  const copy = () =>
-    navigator.clipboard?.writeText(text).then(
-      () => setDone(true),
-      () => undefined,
-    );
+  const copy = async () => {
+    try {
+      await navigator.clipboard.writeText(text);
+      setDone(true);
+    } catch {
+      // Browsers let pages copy that come from this machine, or by https.
+      hands.session.toast('The browser does not let this page copy: select the text instead.');
+    }
+  };
   return html`<${Button} label=${label && (isDone ? 'Copied' : label)} tip=${isDone && tip ? 'Copied' : tip}
     icon=${isDone ? 'check' : 'copy'} act=${copy} />`;
 }

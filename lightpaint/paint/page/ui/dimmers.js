@@ -6,13 +6,18 @@
 /** Names of the lights on the dimmer of one, if there are others. @param {Ui} ui @param {number} light */
 export const tieOf = (ui, light) => ui.ties.find((tie) => tie.includes(ui.lights[light].name));
 
+/** @param {Ui} ui @param {string} name */
+const isHeld = ({ asked }, name) => asked[name]?.lock !== undefined || Boolean(asked[name]?.off);
+
+/** Lights that are held, or off, as somebody asks it of them. @param {Ui} ui */
+export const heldOf = (ui) =>
+  ui.lights.map((_, k) => k).filter((k) => isHeld(ui, ui.lights[k].name));
+
 /** The light by which this one is held: itself, if none on its dimmer is.
  * @param {Ui} ui @param {number} light @returns {number} */
 export function holderOf(ui, light) {
-  const isHeld = (/** @type {string} */ name) =>
-    ui.asked[name]?.lock !== undefined || Boolean(ui.asked[name]?.off);
   const { name } = ui.lights[light];
-  const holder = isHeld(name) ? name : tieOf(ui, light)?.find(isHeld);
+  const holder = isHeld(ui, name) ? name : tieOf(ui, light)?.find((one) => isHeld(ui, one));
   return holder === undefined ? light : ui.lights.findIndex((one) => one.name === holder);
 }
 

@@ -87,7 +87,7 @@
  * @property {(asked: {stops: number, mired: number, object: number | null}) => void} ask
  *   brighter and warmer by so much, in an object or, for null, in the whole picture
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
- * @property {(kind: Kind, x: number, y: number) => RGB} paintAt what to paint with, in the manner
+ * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner
  *   that is in the hand, to have that light there
  * @property {(x: number, y: number) => Omit<Pointed, 'light' | 'paint'> | null} pointed
  * @property {() => Objects | null} objects which object each pixel shows, once that is known

@@ -40,10 +40,19 @@ export function percent(share) {
 }
 
 /** No finer than an eye tells them apart. @param {number} kelvin @returns {string} */
-export const kelvinText = (kelvin) => {
+const kelvinText = (kelvin) => {
   const step = kelvin < 4000 ? 10 : kelvin < 8000 ? 50 : 500;
   return `${Math.round(kelvin / step) * step} K`;
 };
+
+/** How far from that line, in the same thousandths, a white is seen to be green or pink: what lamps
+ * are sold as white is nearer. */
+const TINTED = 6;
+
+/** A white by its kelvin, and its tint where it has one. @param {number} kelvin
+ * @param {number} green as of `toKelvin` */
+export const whiteText = (kelvin, green) =>
+  kelvinText(kelvin) + (Math.abs(green) < TINTED ? '' : green > 0 ? ' green' : ' pink');
 
 /** How far from a white's line, in thousandths of (u, v), light is called by its kelvin. */
 const WHITE = 20;
@@ -62,7 +71,7 @@ function spoken(rgb, level) {
   if (!(level > 0)) return '';
   const found = toKelvin(rgb);
   const isWhite = found && Math.abs(found.green) <= WHITE;
-  return `${signed(Math.log2(level))} st${isWhite ? ` · ${kelvinText(found.kelvin)}` : ''}`;
+  return `${signed(Math.log2(level))} st${isWhite ? ` · ${whiteText(found.kelvin, found.green)}` : ''}`;
 }
 
 /** @param {number} count @param {string} one @param {string} [many] @returns {string} */

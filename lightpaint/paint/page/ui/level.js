@@ -1,7 +1,8 @@
 /** How bright a light is, beside how it is now: in stops, in percent, as it is typed. */
 
-import { html, useState } from '../vendor/preact.js';
+import { html } from '../vendor/preact.js';
 import { luminance } from './colours.js';
+import { useTyped } from './controls.js';
 import { asTyped, stopsText } from './format.js';
 
 /** @typedef {import("./engine.js").RGB} RGB */
@@ -72,7 +73,7 @@ function refused(text, light) {
  *   say: (text: string) => void}} props
  */
 export function Level({ light, rgb, disabled, change, say }) {
-  const [typed, setTyped] = useState(/** @type {string | null} */ (null));
+  const [typed, setTyped, now] = useTyped();
   const stops = stopsOf(rgb, light);
   const take = (/** @type {string | null} */ text) => {
     setTyped(null);
@@ -84,6 +85,7 @@ export function Level({ light, rgb, disabled, change, say }) {
   const press = (/** @type {any} */ event) => {
     const way = { ArrowUp: 0.1, ArrowDown: -0.1 }[/** @type {string} */ (event.key)];
     if (event.key === 'Enter') take(typed);
+    if (event.key === 'Escape') setTyped(null);
     if (!way) return;
     event.preventDefault();
     if (stops === null && way < 0) return; // less than off there is not
@@ -95,5 +97,5 @@ export function Level({ light, rgb, disabled, change, say }) {
     value=${typed ?? (stops === null ? 'off' : stopsText(stops))} disabled=${disabled}
     onFocus=${(/** @type {any} */ event) => event.currentTarget.select()}
     onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
-    onBlur=${() => take(typed)} onKeyDown=${press} />`;
+    onBlur=${() => take(now.current)} onKeyDown=${press} />`;
 }

@@ -4,7 +4,7 @@ import { Component, html } from '../vendor/preact.js';
 import { atFull, luminance, toHex, toKelvin } from './colours.js';
 import { Asking } from './asking.js';
 import { Button, Slider } from './controls.js';
-import { kelvinText, number, percent, stopsText } from './format.js';
+import { number, percent, stopsText, whiteText } from './format.js';
 import { Icon } from './icons.js';
 import { BRIGHTEST, DARKEST, Level, atLevel, nowOf, stopsOf } from './level.js';
 import { Thumb } from './thumb.js';
@@ -100,8 +100,10 @@ export class LightRow extends Component {
   numbers() {
     const { light, rgb, lit, isLive } = this.props;
     const level = luminance(rgb);
-    const white = isLive || !lit ? toKelvin(rgb)?.kelvin : lit.kelvin;
-    const value = [white && kelvinText(white), number(level)].filter(Boolean).join(' · ');
+    const found = toKelvin(rgb);
+    const kelvin = isLive || !lit ? found?.kelvin : lit.kelvin;
+    const white = kelvin && whiteText(kelvin, found?.green ?? 0);
+    const value = [white, number(level)].filter(Boolean).join(' · ');
     const error = isLive ? '' : (lit?.error ?? '');
     const whole = [value, light.unit, error].filter(Boolean).join(' ');
     // Where there is no room for all, it is the unit that goes.

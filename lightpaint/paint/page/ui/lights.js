@@ -4,7 +4,7 @@ import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { luminance } from './colours.js';
 import { Button, Select } from './controls.js';
-import { askedOf, tieOf } from './dimmers.js';
+import { askedOf, heldOf, tieOf } from './dimmers.js';
 import { counted, percent } from './format.js';
 import { Icon } from './icons.js';
 import { comparedAnswer, isUnseen } from './keeping.js';
@@ -53,15 +53,20 @@ export function LightsPanel({ ui, hands }) {
 }
 
 /** Beside the title, where it moves no row: some lights are not shown; or of which of two looks
- * they are. @param {{ui: Ui, hands: Hands}} props */
-export function ShowAll({ ui, hands }) {
+ * they are; or several are held. @param {{ui: Ui, hands: Hands}} props */
+export function OfAll({ ui, hands }) {
   const isPart = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !isPart) {
     const whose = comparedAnswer(ui)?.name ?? 'the answer, not shown';
     return html`<span class="whose">of ${whose}</span>`;
   }
-  if (!isPart) return null;
-  return html`<${Button} label="Show all" class="show-all"
+  const held = heldOf(ui).length;
+  if (!isPart && held < 2) return null;
+  if (!isPart) {
+    return html`<${Button} label="Free all" class="of-all" act=${() => hands.session.releaseAll()}
+      tip=${`${held} lights are held. Let the solve have them again.`} />`;
+  }
+  return html`<${Button} label="Show all" class="of-all"
     tip="Some lights are not shown. The answer has them all."
     act=${() => hands.store.set({ solo: [], mute: [] })} />`;
 }

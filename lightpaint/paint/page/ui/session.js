@@ -1,6 +1,6 @@
 /** Talks with the session: what it says becomes state, what a person does becomes messages. */
 
-import { holderOf } from './dimmers.js';
+import { heldOf, holderOf } from './dimmers.js';
 import {
   ENDED,
   IDLE,
@@ -47,7 +47,10 @@ export class Session {
     this.done = new WeakSet();
     /** Lights that a hand moves, and where to. @type {Map<number, {rgb: RGB, done: boolean}>} */
     this.hands = new Map();
-    this.isMoving = false;
+    /** Until what hands have done is answered, and until looks are kept that are to be.
+     * @type {Promise<void> | null} */
+    this.moving = null;
+    this.keeping = Promise.resolve();
     /** What was asked of a light before a hand moved it. @type {Map<number, Asked>} */
     this.before = new Map();
     /** What is asked of lights by messages on their way. @type {Map<number, Asked>} */
@@ -203,12 +206,10 @@ export class Session {
     }
     this.hands.set(light, { rgb: emission, done });
     this.store.set({ weights: weights.map((rgb, k) => (k === light ? emission : rgb)) });
-    void this.move();
+    this.moving ??= this.move();
   }
 
   async move() {
-    if (this.isMoving) return;
-    this.isMoving = true;
     /** @type {Map<number, object>} */
     const sent = new Map();
     const waiting = () => [...this.hands].find(([light, hand]) => sent.get(light) !== hand);
@@ -220,7 +221,7 @@ export class Session {
       if (hand.done && this.hands.get(light) === hand) this.hands.delete(light);
       if (reply?.kind === 'failed') this.goBack();
     }
-    this.isMoving = false;
+    this.moving = null;
   }
 
   /** Let the solve have a light again, with what was asked of it before; of several on one dimmer,
@@ -233,6 +234,21 @@ export class Session {
     const before = this.before.get(light) ?? withoutLevel(asked[lights[light].name] ?? {});
     this.before.delete(light);
     return this.ask(light, before);
+  }
+
+  /** Let the solve have all lights again, each with what was asked of it before: one step. */
+  releaseAll() {
+    const { lights, asked } = this.store.value;
+    const held = heldOf(this.store.value);
+    const released = held.map((k) => [
+      lights[k].name,
+      this.before.get(k) ?? withoutLevel(asked[lights[k].name]),
+    ]);
+    for (const k of held) {
+      this.hands.delete(k);
+      this.before.delete(k);
+    }
+    return this.change('ask_all', { asked: Object.fromEntries(released) });
   }
 
   /** @param {number} light @param {boolean} off */

@@ -109,7 +109,9 @@ export function Legend({ ui, hands, panes }) {
 function Verify({ ui, hands }) {
   const { session } = hands;
   if (!ui.verifying) {
-    return html`<${Button} label="Verify" icon="camera" act=${() => session.verify()}
+    // Not by the second click of two on "How true?", under which it comes to lie.
+    const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
+    return html`<${Button} label="Verify" icon="camera" act=${begin}
       tip="Render the scene with this lighting, and compare" />`;
   }
   return html`<${Button} label="Stop the render" icon="close" act=${() => session.verify(false)} />

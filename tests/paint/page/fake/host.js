@@ -15,7 +15,16 @@ function halves(floats) {
 
 export class FakeHost {
   constructor(room, { isFirst, isElsewhere }) {
-    Object.assign(this, { room, isFirst, isElsewhere, said: [], hearers: {}, looks: [], ids: 0, stroke: 0 });
+    Object.assign(this, {
+      room,
+      isFirst,
+      isElsewhere,
+      said: [],
+      hearers: {},
+      looks: [],
+      ids: 0,
+      stroke: 0,
+    });
     this.weights = room.lights.map(({ present }) => [...present]);
     this.asked = {};
     this.ties = [];
@@ -226,6 +235,11 @@ export class FakeHost {
     if (done) this.step('ask');
     return this.answer(done);
   }
+  ask_all({ asked }) {
+    this.asked = { ...this.asked, ...asked };
+    this.step('ask');
+    return this.answer();
+  }
   tie({ ties }) {
     this.ties = ties;
     return this.answer();
@@ -281,7 +295,9 @@ export class FakeHost {
     return {
       kind: 'exported',
       files: files.map((one) => `/shows/gallery-evening/${one}`),
-      command: files.includes('target') ? 'lightpaint solve gallery.xml gallery-evening/target.exr' : '',
+      command: files.includes('target')
+        ? 'lightpaint solve gallery.xml gallery-evening/target.exr'
+        : '',
       is_unpainted: files.length < what.length,
     };
   }
