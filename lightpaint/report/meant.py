@@ -16,7 +16,7 @@ def how_it_was_meant(solution: Solution) -> tuple[str, ...]:
     elif fit.hold:
         used.append(f"what you did not paint is held ({fit.hold:g})")
     if fit.colors == "gentle":
-        used.append("lamps keep their colour (gentle)")
+        used.append("lamps are drawn to their own colour (gentle)")
     elif fit.colors == "white":
         used.append("lamps are white")
     if certificate.noise_removed:

@@ -13,7 +13,7 @@ from lightpaint.screen import some_names
 
 #: What is asked beside the painting, as what holds the lights back.
 HOLDING: dict[Held, str] = {
-    "hold": "what you did not paint is held as it is",
+    "hold": "what you did not paint is held near how it is now",
     "colors": "lamps are not free in their colour",
     "constraints": "some lights are locked, limited or left out",
 }

@@ -132,8 +132,8 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
         ((), "The painting is taken at its word: linear light, nothing held, any colour."),
         (
             ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
-            "Fitted as the eye sees it (srgb); what you did not paint is held (0.5); lamps keep "
-            "their colour (gentle); --literal for none of this.",
+            "Fitted as the eye sees it (srgb); what you did not paint is held (0.5); lamps are "
+            "drawn to their own colour (gentle); --literal for none of this.",
         ),
         (("--colors", "white"), "Lamps are white; --literal for none of this."),
         (
@@ -150,7 +150,8 @@ def test_a_picture_of_eight_bits_says_what_it_was_fitted_in(folder: Path):
     (folder / "p.png").write_bytes(png_bytes(np.full((16, 20, 3), 120, np.uint8)))
     said = succeed(folder, "solve", "b.basis.exr", "p.png", "-o", "out")
     [line] = [x for x in said.splitlines() if "--literal" in x]
-    assert line.startswith("Fitted as the eye sees it (srgb); lamps keep their colour (gentle)")
+    said = "Fitted as the eye sees it (srgb); lamps are drawn to their own colour (gentle)"
+    assert line.startswith(said)
 
 
 def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis: Any):

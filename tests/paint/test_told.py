@@ -22,7 +22,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             18.0,
             {"held": ("hold",)},
             "A first step, 10 %: brighter light on the floor is missing; what you did not paint is "
-            "held as it is. Paint what may change too, or let it go.",
+            "held near how it is now. Paint what may change too, or let it go.",
         ),
         (
             10.0,
@@ -46,7 +46,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             23.0,
             {"held": ("hold",)},
             "No closer than it is now: brighter light on the floor is missing; what you did not "
-            "paint is held as it is. Paint what may change too, or let it go.",
+            "paint is held near how it is now. Paint what may change too, or let it go.",
         ),
         (
             14.0,

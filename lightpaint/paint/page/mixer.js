@@ -144,6 +144,7 @@ class Mixer {
   /** @param {'answer' | 'present'} look */
   reset(look) {
     this.look = look;
+    if (this.said) this.said.textContent = ''; // of what it was before
     for (const row of this.rows) row.reset(look);
     this.draw();
   }

@@ -225,7 +225,7 @@ export function AnswerLine({ ui, hands }) {
  * @param {{ui: Ui}} props */
 export function Here({ ui }) {
   if (!ui.pointed) {
-    const text = hintOf(ui.tool);
+    const text = ui.ready ? hintOf(ui.tool) : ''; // there is nothing to drag on yet
     return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
   }
   const { object, shares, light } = ui.pointed;
