@@ -30,8 +30,8 @@ CLOSER, CLOSER_SHARE = 1.0, 0.2
 def held_back_by(solution: Solution) -> tuple[tuple[Held, ...], tuple[str, ...]]:
     """What keeps the lights notably farther from the painting than they could come.
 
-    Of one view. Each that lets go of half of it alone; all where it takes all. And where other
-    views do, which of them, in the same way.
+    Of one view. Each that lets go of half of it alone; all where it takes several, first the one
+    beside which the others bring least. And where other views do, which of them, in the same way.
     """
     few = _Few.of(solution)
     if not few.asked:
@@ -46,7 +46,8 @@ def held_back_by(solution: Solution) -> tuple[tuple[Held, ...], tuple[str, ...]]
         return (), ()
     held = few.asked
     if len(held) > 1:
-        held = tuple(one for one in held if without(one) > gained / 2) or held
+        alone = tuple(one for one in held if without(one) > gained / 2)
+        held = alone or tuple(sorted(held, key=lambda kept: without(*set(held) - {kept})))
     if "views" not in held:
         return held, ()
     its = few.others

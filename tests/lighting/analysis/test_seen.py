@@ -111,6 +111,17 @@ def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: 
     assert seen.held == held
 
 
+def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
+    """Where all lights are locked it is of no use to let go of what was not painted."""
+    basis = _left_and_right(make_basis, spill=0.5)
+    target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
+    locked = Constraints.of({"*": {"lock": True}})
+    assert what_is_seen(solve(basis, target, hold=50.0)).held == ("hold",)
+    both = what_is_seen(solve(basis, target, hold=50.0, constraints=locked)).held
+    assert both[0] == "constraints"
+    assert "hold" in both
+
+
 def test_lights_that_are_held_back_are_known(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
     target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
