@@ -13,7 +13,7 @@ from lightpaint.screen import some_names
 
 #: What is asked beside the painting, as what holds the lights back.
 HOLDING: dict[Held, str] = {
-    "hold": "what you did not paint is held near how it is now",
+    "hold": "what is not painted is held near how it is",
     "colors": "lamps are not free in their colour",
     "constraints": "some lights are locked, limited or left out",
 }

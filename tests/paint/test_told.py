@@ -21,8 +21,8 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             18.0,
             {"held": ("hold",)},
-            "A first step, 10 %: brighter light on the floor is missing; what you did not paint is "
-            "held near how it is now. Paint what may change too, or let it go.",
+            "A first step, 10 %: brighter light on the floor is missing; what is not painted is "
+            "held near how it is. Paint what may change too, or let it go.",
         ),
         (
             10.0,
@@ -45,8 +45,8 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             23.0,
             {"held": ("hold",)},
-            "No closer than it is now: brighter light on the floor is missing; what you did not "
-            "paint is held near how it is now. Paint what may change too, or let it go.",
+            "No closer than it is now: brighter light on the floor is missing; what is not "
+            "painted is held near how it is. Paint what may change too, or let it go.",
         ),
         (
             14.0,

@@ -62,7 +62,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         (
             _seen(2.8, 3.0, held=("hold",)),
             "What else is asked keeps the lights from this: in the middle it is painted brighter "
-            "than they make it; what you did not paint is held near how it is now.",
+            "than they make it; what is not painted is held near how it is.",
         ),
         (
             _seen(5.0, held=("colors", "constraints")),
