@@ -15,6 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.batch.journal import Line
 from lightpaint.batch.mixers import in_script, mixers_html, transforms_of
+from lightpaint.batch.names import FILES
 from lightpaint.batch.planes import drop_planes, planes_name
 from lightpaint.batch.planned import Plan
 from lightpaint.batch.summary import (
@@ -34,9 +35,6 @@ from lightpaint.images.png import png_bytes
 from lightpaint.report.comparison import fitted
 from lightpaint.screen import visible
 from lightpaint.version import __version__
-
-#: What a batch writes beside its looks.
-FILES = ("index.html", "contact.png", "summary.csv", "summary.json")
 
 #: Pictures of the sheet, at most, and in a row; width of each, gap, and height of the words.
 MOST, COLUMNS, WIDTH, GAP, BELOW = 120, 6, 240, 14, 22

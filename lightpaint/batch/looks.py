@@ -7,6 +7,7 @@ from typing import Any
 from lightpaint.batch.checks import SHOWN, check_handover, check_sequence, check_wanted
 from lightpaint.batch.entries import Entry, looks_of
 from lightpaint.batch.manifest import Manifest
+from lightpaint.batch.names import is_reserved, name_clashes
 from lightpaint.batch.sequence import at_frame
 from lightpaint.screen import some_names
 
@@ -16,13 +17,29 @@ def entries_of(manifest: Manifest) -> tuple[Entry, ...]:
     found = looks_of(manifest)
     for where, sequence in manifest.sequences:
         found += _of_sequence(manifest, found, where, sequence)
-    names = [entry.name for entry in found]
-    for name in dict.fromkeys(x for x in names if names.count(x) > 1):
-        wheres = some_names(dict.fromkeys(x.where for x in found if x.name == name), " and ")
-        manifest.mistakes.add(
-            wheres, f"more than one look would be called {name!r}: say name = ... in one of them"
-        )
+    _check_names(manifest, found)
     return tuple(found)
+
+
+def _check_names(manifest: Manifest, looks: Sequence[Entry]) -> None:
+    """Add to the mistakes each look whose folder another look, or the batch itself, would use."""
+    for look in looks:
+        if is_reserved(look.name):
+            manifest.mistakes.add(
+                look.where,
+                f"a look cannot be called {look.name!r}, where the batch has files of its own: "
+                "say name = ...",
+            )
+    for same in name_clashes(look.name for look in looks):
+        wheres = some_names(dict.fromkeys(x.where for x in looks if x.name in same), " and ")
+        names = " and ".join(map(repr, same))
+        said = f"more than one look would be called {names}: say name = ... in one of them"
+        if len(same) > 1:
+            said = (
+                f"{names} would be one folder on disks that do not tell case: say name = ... "
+                "in one of them"
+            )
+        manifest.mistakes.add(wheres, said)
 
 
 def _of_sequence(

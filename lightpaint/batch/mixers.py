@@ -6,7 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.planes import FOLDER, SUFFIX, read_planes
+from lightpaint.batch.names import THUMBNAILS
+from lightpaint.batch.planes import SUFFIX, read_planes
 from lightpaint.batch.summary import Row
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
@@ -28,7 +29,7 @@ def mixers_html(folder: Path, rows: Sequence[Row], bases: Mapping[str, str]) -> 
             found.setdefault(bases[row.folder], []).append(row)
     made: dict[str, str] = {}
     for name, its in found.items():
-        told = read_planes(folder / FOLDER / f"{name}{SUFFIX}")
+        told = read_planes(folder / THUMBNAILS / f"{name}{SUFFIX}")
         if len(made) < MOST_MIXERS and told:
             with suppress(LightpaintError, KeyError):
                 made[name] = _mixer(folder, name, told, its)

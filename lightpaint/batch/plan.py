@@ -63,7 +63,8 @@ def plan(
         raise BatchError(*read.mistakes.found)
     names = frozenset(look.entry.name for look in looks)
     planner.held.only(())
-    return Plan(read.path, folder, looks, planner.costs, names, planner.held)
+    held, remarks = planner.held, planner.journal.remarks
+    return Plan(read.path, folder, looks, planner.costs, names, held, remarks)
 
 
 class _Planner:
@@ -81,7 +82,7 @@ class _Planner:
         self._mistakes: Mistakes = manifest.mistakes
         self._force, self._command = force, command
         self._folders = {entry.name: folder / entry.name for entry in entries}
-        self.held, self._journal = Held(), Journal(folder)
+        self.held, self.journal = Held(), Journal(folder)
         self._prints = Fingerprints(manifest.folder)
         self._failed: set[str] = set()
         self.costs: dict[str, Cost] = {}
@@ -122,7 +123,7 @@ class _Planner:
         is_whole = is_possible and is_as_written(folder)
         steps = []
         for task, its in zip(tasks, made_of, strict=True):
-            line = self._journal.lines.get((task.look, task.kind))
+            line = self.journal.lines.get((task.look, task.kind))
             is_done = line is not None and (line.state, line.made_of) == ("done", its)
             # What was rendered of an earlier answer went with it.
             is_whole = is_whole and is_done

@@ -14,6 +14,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.held import Held
+from lightpaint.batch.names import THUMBNAILS
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import fields_of
 from lightpaint.errors import LightpaintError
@@ -23,8 +24,8 @@ from lightpaint.report.mixer import planes_for_page, told_light
 from lightpaint.sources import content
 from lightpaint.version import __version__
 
-#: Where they are, and what their names end in.
-FOLDER, SUFFIX = "thumbnails", ".planes.json"
+#: What their names end in.
+SUFFIX = ".planes.json"
 
 #: Longest that is read, in bytes.
 MAX_BYTES = 2**27
@@ -42,7 +43,7 @@ def planes_name(folder: Path, key: str) -> str:
 
 def keep_planes(folder: Path, key: str, basis: Basis) -> None:
     """Write what a gallery in `folder` needs of a basis, unless it is there."""
-    path = folder / FOLDER / f"{planes_name(folder, key)}{SUFFIX}"
+    path = folder / THUMBNAILS / f"{planes_name(folder, key)}{SUFFIX}"
     identity = _identity(basis)
     if read_planes(path).get("identity") == identity:
         return
@@ -83,7 +84,7 @@ def read_planes(path: Path) -> dict[str, Any]:
 
 def drop_planes(folder: Path, kept: Collection[str]) -> None:
     """Delete those of bases that no look has any more. kept: names."""
-    for path in (folder / FOLDER).glob(f"*{SUFFIX}"):
+    for path in (folder / THUMBNAILS).glob(f"*{SUFFIX}"):
         if path.name.removesuffix(SUFFIX) not in kept:
             path.unlink(missing_ok=True)
 

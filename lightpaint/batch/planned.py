@@ -57,7 +57,8 @@ class Cost:
 class Plan:
     """All looks of a manifest. costs: of each basis, by its key. chosen: names of those to do.
 
-    held: scenes as they were loaded to be looked at, so that they are not loaded twice.
+    held: scenes as they were loaded to be looked at, so that they are not loaded twice. remarks: on
+    the batch as a whole, worth knowing.
     """
 
     manifest: Path
@@ -66,6 +67,7 @@ class Plan:
     costs: Mapping[str, Cost]
     chosen: frozenset[str]
     held: Held = field(default_factory=Held, repr=False, compare=False)
+    remarks: tuple[str, ...] = ()
 
     @property
     def chosen_looks(self) -> tuple[PlannedLook, ...]:

@@ -20,11 +20,11 @@ from lightpaint.batch.estimate import look_s
 from lightpaint.batch.gallery import write_gallery
 from lightpaint.batch.how import How, Outcome
 from lightpaint.batch.journal import Journal, Line
+from lightpaint.batch.names import THUMBNAILS
 from lightpaint.batch.planes import keep_all_planes
 from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases, waves
 from lightpaint.batch.processes import Processes
 from lightpaint.batch.spread import rendered_by
-from lightpaint.batch.summary import THUMBNAILS
 from lightpaint.batch.sums import solved_by_sums
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of, final_render, is_full

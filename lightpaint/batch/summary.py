@@ -14,6 +14,7 @@ from PIL import Image
 
 from lightpaint.arrays import RGB
 from lightpaint.batch.journal import Line
+from lightpaint.batch.names import THUMBNAILS
 from lightpaint.batch.planned import Plan, PlannedLook
 from lightpaint.batch.task import EXPORT, Kind
 from lightpaint.colour.display import choose_exposure, to_8_bit
@@ -31,8 +32,8 @@ from lightpaint.version import __version__
 
 FORMAT = "lightpaint-batch 1"
 
-#: Pixels of a small picture from left to right, at most; quality of its JPEG; and where it is kept.
-WIDEST, QUALITY, THUMBNAILS = 320, 82, "thumbnails"
+#: Pixels of a small picture from left to right, at most; and quality of its JPEG.
+WIDEST, QUALITY = 320, 82
 
 #: Columns of summary.csv before those of the lights.
 COLUMNS = (

@@ -9,9 +9,10 @@ from typing import Any
 from lightpaint.batch.errands import Done
 from lightpaint.batch.estimate import estimate
 from lightpaint.batch.first import write_first
-from lightpaint.batch.gallery import FILES, spoken_counts
+from lightpaint.batch.gallery import spoken_counts
 from lightpaint.batch.how import How
 from lightpaint.batch.how import Outcome as BatchOutcome
+from lightpaint.batch.names import FILES
 from lightpaint.batch.openjd import LOOK, write_openjd
 from lightpaint.batch.plan import plan
 from lightpaint.batch.planned import Plan, PlannedLook
@@ -58,7 +59,8 @@ def batch(
         return _dry(planned)
     if form is not None:
         return _exported(planned, Path(paths[1]), force=force)
-    remarks = list(dict.fromkeys(x for look in planned.chosen_looks for x in look.remarks))
+    of_looks = (x for look in planned.chosen_looks for x in look.remarks)
+    remarks = list(dict.fromkeys((*planned.remarks, *of_looks)))
     for remark in remarks[:LISTED]:
         terminal.say(remark)
     if len(remarks) > LISTED:

@@ -7,8 +7,9 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.batch.entries import Entry
-from lightpaint.batch.gallery import FILES, check_gallery, spoken_counts
+from lightpaint.batch.gallery import check_gallery, spoken_counts
 from lightpaint.batch.made import leave_shifted, shifted_folders, sibling_folder, siblings
+from lightpaint.batch.names import FILES, is_reserved
 from lightpaint.batch.solved import entry_of, write_gallery_of
 from lightpaint.batch.work import is_full
 from lightpaint.cli import terminal
@@ -118,10 +119,15 @@ def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
 def _together(output: Path | None, folders: Sequence[Path], *, force: bool) -> Path | None:
     """Where the gallery of all looks goes: beside their folders.
 
-    None where none was named and somebody else's page lies there.
+    None where none was named and somebody else's page, or a look, lies there.
     """
     place = folders[0].parent if folders else output or Path()
     try:
+        if taken := next((x.name for x in folders if is_reserved(x.name)), ""):
+            raise OutputError(
+                f"{taken} is where the gallery of several looks has files of its own: give the "
+                "painting another name"
+            )
         check_gallery(place, force=force)
     except OutputError:
         if output is not None:

@@ -21,8 +21,9 @@ from lightpaint.batch import engine as engines
 from lightpaint.batch import run as run_module
 from lightpaint.batch import work
 from lightpaint.batch.errands import Done
-from lightpaint.batch.gallery import FILES, contact_sheet, gallery_page
+from lightpaint.batch.gallery import contact_sheet, gallery_page
 from lightpaint.batch.how import How
+from lightpaint.batch.names import FILES, is_reserved
 from lightpaint.batch.plan import plan
 from lightpaint.batch.processes import Processes
 from lightpaint.batch.run import run_batch
@@ -59,6 +60,9 @@ def test_every_look_is_what_solve_makes_of_it(
     manifest, found = undisturbed
     assert {name.split("/")[0] for name in found if "/" in name} == {*NAMES, "thumbnails"}
     assert {*FILES, "journal.jsonl"} == {name for name in found if "/" not in name}
+    # No look can lie where any of it goes.
+    assert all(is_reserved(name) for name in {x.split("/")[0] for x in found} - {*NAMES})
+    assert not any(map(is_reserved, NAMES))
     write_batch(tmp_path)
     succeed(tmp_path, "solve", "b.basis.exr", "p0.exr")
     ours, its = (
@@ -115,6 +119,25 @@ def test_a_project_that_was_moved_is_done_still(here: Path) -> None:
     moved = here.parent / f"{here.name}-moved"
     here.rename(moved)
     assert do(moved).done == []
+
+
+def test_a_damaged_journal_is_said_and_its_look_done_again(here: Path) -> None:
+    command = ("batch", "looks.toml", "-o", "out")
+    run(here, *command)
+    before = contents(here / "out")
+    rows = before["journal.jsonl"].split(b"\n")
+    [which] = (k for k, row in enumerate(rows) if b'"third"' in row)
+    rows[which] = rows[which].replace(b"done", b"d\xffne")
+    (here / "out" / "journal.jsonl").write_bytes(b"\n".join(rows))
+    done = run(here, *command)
+    assert done.returncode == 0, done.stderr
+    assert (
+        "journal.jsonl has a line that cannot be read: its step will be done again" in done.stderr
+    )
+    assert "third: answer done" in done.stderr
+    assert "p0: answer done" not in done.stderr
+    assert contents(here / "out") == before
+    assert "journal" not in run(here, *command).stderr
 
 
 def test_only_some(here: Path) -> None:

@@ -1,11 +1,13 @@
 """The journal of a batch: whatever a kill leaves of it, whole lines count and no others."""
 
+import tempfile
 from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.batch.journal import JOURNAL, Journal, Line
+from lightpaint.batch.journal import Journal, Line
+from lightpaint.batch.names import JOURNAL
 
 LINES = [
     Line("evening", "answer", "done", "a" * 64),
@@ -54,8 +56,6 @@ def test_settled_it_does_not_tell_how_it_came_about(tmp_path: Path) -> None:
 
 @given(st.binary(max_size=300))
 def test_what_somebody_else_wrote_is_passed_over(junk: bytes) -> None:
-    import tempfile
-
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / JOURNAL
         text = junk.decode("utf-8", "replace")
@@ -64,3 +64,39 @@ def test_what_somebody_else_wrote_is_passed_over(junk: bytes) -> None:
         assert not journal.lines
         journal.add(LINES[0])
         assert [*Journal(Path(folder)).lines.values()] == LINES[:1]
+
+
+@given(st.integers(0, 10_000), st.integers(1, 255))
+def test_a_damaged_byte_costs_no_more_than_the_lines_it_touches(place: int, flip: int) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        whole = written(folder)
+        data, place = bytearray(whole), place % len(whole)
+        data[place] ^= flip
+        (folder / JOURNAL).write_bytes(data)
+        hit = {data[:place].count(b"\n")}
+        if whole[place] == ord("\n"):  # the line behind it is joined
+            hit.add(max(hit) + 1)
+        journal = Journal(folder)
+        for key, line in {(x.look, x.kind): x for k, x in enumerate(LINES) if k not in hit}.items():
+            # What was hit may still be a line, of what nobody did.
+            assert journal.lines[key] == line or journal.lines[key] not in LINES
+        journal.add(LINES[1])
+        assert Journal(folder).lines["Ærø · 夜", "answer"] == LINES[1]
+        journal.settle([(x.look, x.kind) for x in LINES])
+        assert not Journal(folder).remarks
+
+
+def test_damage_is_said_and_half_a_line_of_a_kill_is_not(tmp_path: Path) -> None:
+    data = written(tmp_path)
+    first = data.index(b"\n")
+    (tmp_path / JOURNAL).write_bytes(data[: first // 2] + b"\xff" + data[first // 2 + 1 :])
+    [remark] = Journal(tmp_path).remarks
+    its = tmp_path / JOURNAL
+    assert remark == f"{its} has a line that cannot be read: its step will be done again"
+    (tmp_path / JOURNAL).write_bytes(data[:-20])
+    journal = Journal(tmp_path)
+    assert not journal.remarks
+    journal.add(LINES[0])
+    # Another kill, in the middle of the run that went on.
+    assert not Journal(tmp_path).remarks

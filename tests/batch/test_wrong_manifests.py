@@ -125,6 +125,21 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "an unknown paint": (FIRST + 'paint = "oil"\n', ("paint is 'oil'", "'light'")),
     "a name with a slash": (HEAD + LOOK + 'name = "a/b"\n', ("'a/b' is no name for a folder",)),
     "a name twice": (FIRST + LOOK + 'name = "one"\n', ("look 'one'", "more than one look")),
+    "a name of the batch's own page": (
+        HEAD + LOOK + 'name = "index.html"\n',
+        ("look 'index.html'", "cannot be called 'index.html'"),
+    ),
+    "a name of the journal": (HEAD + LOOK + 'name = "Journal.JSONL"\n', ("files of its own",)),
+    "a name of a summary": (HEAD + LOOK + 'name = "summary.csv"\n', ("files of its own",)),
+    "a name of the small pictures": (
+        HEAD + LOOK + 'name = "thumbnails"\n',
+        ("look 'thumbnails'", "files of its own"),
+    ),
+    "a hidden name": (HEAD + LOOK + 'name = ".cache"\n', ("files of its own",)),
+    "a name that differs in case": (
+        FIRST + LOOK + 'name = "One"\n',
+        ("look 'one' and look 'One'", "'one' and 'One' would be one folder", "case"),
+    ),
     "a variation's name twice": (
         FIRST + 'variations = ["warmer"]\n' + LOOK + 'name = "one-warmer"\n',
         ("look 'one' and look 'one-warmer'", "more than one look"),

@@ -1,0 +1,40 @@
+"""Names in the folder of a batch: those of looks, and those that the batch needs for itself."""
+
+import unicodedata
+from collections.abc import Iterable
+
+#: What a batch writes beside its looks, and may find there of an earlier run.
+FILES = ("index.html", "contact.png", "summary.csv", "summary.json")
+
+#: What is done, in the folder of a batch; and of a part of it, in what such a name begins with.
+JOURNAL, JOURNAL_PART = "journal.jsonl", "journal-"
+
+#: The folder of small pictures.
+THUMBNAILS = "thumbnails"
+
+
+def folded(name: str) -> str:
+    """Return what two names have in common that some disks take for one: Mac's and Windows'."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def is_reserved(name: str) -> bool:
+    """Return whether a look of that name would lie where the batch writes files of its own.
+
+    Hidden names are the batch's, too: a file that is being written, and the cache of a farm.
+    """
+    name = folded(name)
+    if name.startswith(JOURNAL_PART) and name.endswith(".jsonl"):
+        return True
+    return name.startswith(".") or name in (*FILES, JOURNAL, THUMBNAILS)
+
+
+def name_clashes(names: Iterable[str]) -> list[list[str]]:
+    """Return the names that some disks take for one, together, each once; [] where there are none.
+
+    A name that stands twice clashes with itself, and is a list of one.
+    """
+    alike: dict[str, list[str]] = {}
+    for name in names:
+        alike.setdefault(folded(name), []).append(name)
+    return [list(dict.fromkeys(same)) for same in alike.values() if len(same) > 1]
