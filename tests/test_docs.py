@@ -2,6 +2,7 @@
 
 import ast
 import re
+from argparse import ArgumentParser
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,13 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
+from lightpaint.batch.cluster import LEAST_S, PATIENCE
 from lightpaint.cli.parser import command_parser
+from lightpaint.lighting.constraints.whites import WHITES
+from lightpaint.lighting.fit import HOLD
+from lightpaint.paint.server import PORT
+from lightpaint.scene.alike import FEW
+from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import load_scene
 
 ROOT = Path(__file__).parent.parent
@@ -88,14 +95,67 @@ def test_keys_of_the_painter_are_those_of_its_page():
     assert table.splitlines() == rows
 
 
-def _options() -> set[str]:
+def _parsers() -> list[ArgumentParser]:
+    """Those of all sub-commands."""
     [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
+    return list(commands.choices.values())
+
+
+def _options() -> set[str]:
     return {
         option
-        for parser in commands.choices.values()
+        for parser in _parsers()
         for action in parser._actions
         for option in action.option_strings
     }
+
+
+#: Of options whose help has a number that is not that of the parser itself: what the code has.
+DEFAULTS = {
+    "--hold": f"{HOLD:g} where it was painted over the current look, else 0",
+    "--port": f"{PORT}, or any if that is taken",
+    "--exposure": "0",
+    "--space": "8 and 16 bits",
+    "--task-limit": f"{PATIENCE:g} times what it is expected to take, at least {LEAST_S:g}",
+}
+
+
+def test_numbers_that_the_help_gives_as_defaults_are_those_of_the_code():
+    """Help is shown without loading what the numbers come from, so it has them a second time."""
+    said = {
+        (action.option_strings[-1], default)
+        for parser in _parsers()
+        for action in parser._actions
+        for default in re.findall(r"\(default: (.*\d.*)\)", action.help or "")
+    }
+    assert {option for option, _ in said} == set(DEFAULTS)
+    assert [(x, text) for x, text in sorted(said) if DEFAULTS[x] not in text] == []
+
+
+def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
+    texts = " ".join(
+        " ".join((action.help or "").split()) for parser in _parsers() for action in parser._actions
+    )
+    preview, final = PRESETS["preview"], PRESETS["final"]
+    pixels = round(preview.pixels or 0, -4)
+    for said in (
+        f"preview: {preview.spp} samples per pixel on some {pixels:,} pixels",
+        f"final: {final.spp} on the whole film",
+        f"white: {WHITES[0]} to {WHITES[1]} K",
+        f"more than {FEW} are alike",
+    ):
+        assert said in texts
+
+
+def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
+    page = (ROOT / "lightpaint/paint/page/ui/settings.js").read_text()
+    solving, method = ((ROOT / "docs" / name).read_text() for name in ("solving.md", "method.md"))
+    assert f"const HOLD = {HOLD:g};" in page
+    assert f"`--hold {HOLD:g}`" in solving
+    assert f"It is {HOLD:g} by default where something was painted over" in method
+    for text in (page, solving):
+        assert f"{WHITES[0]} to {WHITES[1]} K" in text
+    assert f"`--kelvin '*={WHITES[0]}:{WHITES[1]}'`" in method
 
 
 def test_the_corridor_is_quoted_as_it_stands():

@@ -75,7 +75,7 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
         type=arguments.number(may_be_zero=True),
         metavar="H",
         help="weight of all that is not painted, against the current look, beside that of all that "
-        "is; 0 lets it go (default: 1 where it was painted over the current look, else 0)",
+        "is; 0 lets it go (default: 3 where it was painted over the current look, else 0)",
     )
     parser.add_argument(
         "--colors",

@@ -48,8 +48,8 @@ const MEANS = {
   },
 };
 
-/** Strengths to begin with. */
-const HOLD = 1;
+/** Strengths to begin with; the first is what is automatic, where something is held. */
+const HOLD = 3;
 const PREFER_CURRENT = 0.01;
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -73,7 +73,7 @@ export function SettingsPanel({ ui, hands }) {
       ${
         manner === 'hold' &&
         html`<${Number_} label="How firmly" value=${hold} least=${0.01} most=${100} step=${0.1}
-        unit="×" tip="1: it counts as much as all that is painted; 2: twice as much"
+        unit="×" tip="1: it counts as much as all that is painted; 3, as usual: three times as much"
         change=${set('hold')} />`
       }
     </${Row}>
@@ -156,6 +156,7 @@ function said(isAuto, text = '') {
 /** What becomes of what is not painted. @param {number | null | undefined} hold */
 function ofUnpainted(hold) {
   if (hold === undefined || hold === null) return '';
-  const much = hold === 1 ? '' : `, ${number(hold)} times as firmly as usual`;
-  return hold ? `it stays near how it looks now${much}` : 'it may become anything';
+  if (!hold) return 'it may become anything';
+  const much = hold === 1 ? 'as much' : `${number(hold)} times as much`;
+  return `it stays near how it looks now, and counts ${much} as all that is painted`;
 }

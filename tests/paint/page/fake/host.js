@@ -126,7 +126,7 @@ export class FakeHost {
       asked: this.asked,
       ties: this.ties,
       settings: this.settings,
-      meant: { space: 'display', hold: 1, colors: 'gentle' },
+      meant: { space: 'display', hold: 3, colors: 'gentle' },
       history: {
         undo: this.steps.map(({ label }) => label),
         redo: this.undone.map(({ label }) => label),
