@@ -331,7 +331,7 @@ def test_asking_in_numbers(painter: Painter) -> None:
     painter.page.keyboard.press("a")
     assert lights.bounding_box() == before  # who drags needs no numbers: nothing moves
     painter.button("In numbers", exact=True).click()
-    painter.choose("Where", "3")
+    painter.choose("Where", "red ball")
     painter.type("Brighter", "-1.5")
     painter.type("Warmer", "40")
     painter.button("Ask for it").click()
@@ -440,14 +440,11 @@ def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
 
 
 @pytest.mark.parametrize("tool", ["ask", "pick"])
-def test_what_is_said_beside_the_pointer_lies_in_the_picture(painter: Painter, tool: str) -> None:
+def test_what_is_said_beside_the_brush_lies_in_the_picture(painter: Painter, tool: str) -> None:
     """Above it, or beside it where there is no room; never under the hand."""
     page = painter.page
     page.keyboard.press(tool[0] if tool == "ask" else "i")
     stage = page.locator(".stage").bounding_box()
-    x, y = painter.place()
-    page.mouse.move(x, y)
-    page.mouse.down()
     for k in (0, 1):
         pane = page.evaluate("(k) => engine.panes()[k]", k)
         left, top = stage["x"] + pane["left"], stage["y"] + pane["top"]
@@ -455,15 +452,100 @@ def test_what_is_said_beside_the_pointer_lies_in_the_picture(painter: Painter, t
         for a, b in ((0.5, 0.5), (0.02, 0.02), (0.98, 0.02), (0.02, 0.98), (0.98, 0.98)):
             x, y = left + a * wide, top + b * high
             page.mouse.move(x, y)
+            if tool == "ask":
+                page.mouse.down()
+                page.mouse.move(x + 20, y + 30)
             painter.still()
             box = page.locator(".near").bounding_box()
+            page.mouse.up()
             assert left - 1 <= box["x"] <= box["x"] + box["width"] <= left + wide + 1
             assert top - 1 <= box["y"] <= box["y"] + box["height"] <= top + high + 1
             across = max(box["x"] - x, x - box["x"] - box["width"], 0)
             down = max(box["y"] - y, y - box["y"] - box["height"], 0)
             assert 8 < max(across, down) < 40
             assert box["y"] + box["height"] <= y or across
+
+
+def test_what_a_drag_asks_about_stays_where_it_began(painter: Painter) -> None:
+    """Ring, readout, and what is said of the place; they are at the pointer before and after."""
+    page = painter.page
+    page.keyboard.press("a")
+    seen = """() => [...document.querySelectorAll('.ring')].map((one) => one.style.transform)
+        .concat(document.querySelector('#lp-status').textContent)"""
+    page.mouse.move(*painter.place())
+    painter.still()
+    before = page.evaluate(seen)
+    page.mouse.down()
+    painter.still()
+    readout = page.locator(".asking").bounding_box()
+    for further in (0.1, 0.7, 1.2):  # on the other picture, too
+        page.mouse.move(*painter.place(further))
+        painter.still()
+        assert page.evaluate(seen) == before
+        box = page.locator(".asking").bounding_box()
+        middle = (box["x"] + box["width"] / 2, box["y"])
+        assert middle == pytest.approx((readout["x"] + readout["width"] / 2, readout["y"]), abs=1)
     page.mouse.up()
+    painter.still()
+    assert page.evaluate(seen) != before
+    page.mouse.move(*painter.place())
+    page.mouse.down()
+    page.mouse.move(*painter.place(0.3))
+    page.keyboard.press("Escape")
+    page.mouse.move(*painter.place(0.4))  # it asks no more
+    painter.still()
+    after = page.evaluate(seen)
+    page.mouse.move(*painter.place())
+    painter.still()
+    assert after != page.evaluate(seen) == before
+
+
+def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Painter) -> None:
+    """In another view the same object is meant, though its number is another."""
+    page = painter.page
+    page.keyboard.press("a")
+    painter.button("In numbers", exact=True).click()
+    painter.choose("Where", "red ball")
+    painter.type("Brighter", "-1.5")
+    painter.type("Warmer", "40")
+    painter.button("How the painting is answered").click()
+    page.keyboard.press("Escape")
+    page.keyboard.press("p")
+    page.keyboard.press("p")
+    ask = painter.button("Ask for it")
+    ask.click()
+    assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
+    page.evaluate(
+        """() => window.painter.store.set(({ state, views }) => ({
+          state: { ...state, objects: ['red ball', 'floor'] } }))"""
+    )
+    ask.click()
+    assert painter.calls("ask")[-1][1]["object"] == 0
+    page.evaluate(
+        """() => window.painter.store.set(({ state }) => ({
+          state: { ...state, objects: ['floor'] } }))"""
+    )
+    painter.still()
+    assert ask.is_disabled()
+    where = page.get_by_role("combobox", name="Where")
+    assert where.evaluate("(one) => one.selectedOptions[0].text") == "red ball: not in this view"
+
+
+def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
+    page = painter.page
+    page.keyboard.press("a")
+    painter.button("In numbers", exact=True).click()
+    ask = painter.button("Ask for it")
+    for where in (page.get_by_role("combobox", name="Where"), ask):
+        where.focus()
+        page.keyboard.press("e")
+        assert painter.ui("tool") == "ask"
+    ask.press("Enter")
+    assert ask.evaluate("(one) => one === document.activeElement")
+    ask.click()  # who clicks goes back to the pictures
+    painter.still()
+    page.keyboard.press("e")
+    assert painter.ui("tool") == "eraser"
 
 
 #: Outlines as they are drawn, beside what they are to be: (wrong pixels, white ones).
@@ -533,7 +615,8 @@ def test_the_object_that_would_be_filled_has_an_outline(opened: Any, engine: str
     page.mouse.down()
     page.mouse.move(*painter.place(0.3))
     page.locator(".asking").wait_for()
-    assert not outline.is_visible()  # it would hide what comes of it
+    assert outline.is_visible()
+    assert page.evaluate(OUTLINE, wall)[0] == 0  # that of where the drag began
     page.mouse.up()
     page.keyboard.press("b")
     page.mouse.move(*painter.place())

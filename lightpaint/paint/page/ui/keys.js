@@ -205,6 +205,13 @@ export function isTyping(event) {
   return ['TEXTAREA', 'SELECT'].includes(tagName) || element.isContentEditable;
 }
 
+/** Whether a key is pressed among numbers that are being put in: on a button between them, too, it
+ * is none of the pictures'. @param {KeyboardEvent} event */
+function isAmongNumbers(event) {
+  const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
+  return event.key.length === 1 && !isMod(event) && Boolean(element.closest?.('[data-numbers]'));
+}
+
 /** Have what is typed in a field taken, before something is done with it.
  * @param {KeyboardEvent} event in that field */
 function commit(event) {
@@ -221,7 +228,7 @@ export function press(event, hands) {
   const isAlt = event.altKey && !event.getModifierState('AltGraph');
   if (event.defaultPrevented || isAlt) return;
   const name = named(event);
-  const isIn = isTyping(event);
+  const isIn = isTyping(event) || isAmongNumbers(event);
   // A page is no file that anybody keeps, and nothing of it but fields has text to be marked.
   if (name === 'mod+s' || (name === 'mod+a' && !isIn)) event.preventDefault();
   if (hands.store.value.dialog) return;

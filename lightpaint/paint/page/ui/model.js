@@ -81,6 +81,8 @@ import { ofKelvin } from './colours.js';
  * @property {import("./tools.js").Paint[]} recent
  * @property {"white" | "hsv" | "rgb"} mixer
  * @property {{stops: number, mired: number} | null} asking by a drag
+ * @property {{stops: number, mired: number, object: string | null}} inNumbers what is asked for in
+ *   numbers, of an object or, for null, of the whole picture
  * @property {Show} show
  * @property {number[]} solo lights
  * @property {number[]} mute
@@ -176,6 +178,7 @@ export function first() {
     recent: [],
     mixer: 'white',
     asking: null,
+    inNumbers: { stops: 0.5, mired: 0, object: null },
     show: SHOW,
     solo: [],
     mute: [],

@@ -23,7 +23,7 @@ export function Near({ ui, engine, rings }) {
     <i style=${{ background: toHex(exposed) }}></i>${paintText(exposed) || 'no light'}</div>`;
 }
 
-/** Above the pointer, where no hand lies; where there is no room, beside it. It stays within the
+/** Above the brush, where no hand lies; where there is no room, beside it. It stays within the
  * picture. @param {HTMLElement} element @param {HTMLElement} rings @param {Engine} engine
  * @param {Ui} ui */
 function place(element, rings, engine, ui) {

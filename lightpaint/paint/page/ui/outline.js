@@ -1,4 +1,4 @@
-/** The outline of the object that a click would fill, or a drag would ask about. */
+/** The outline of the object that a click would fill, or a drag asks about. */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 
@@ -13,9 +13,9 @@ const [WITHIN, AROUND] = [
   [0, 0, 0, 180],
 ];
 
-/** Number of the object that a press would be about; null for none. @param {Ui} ui */
-function objectOf({ tool, about, asking, pointed }) {
-  if (!pointed || asking) return null;
+/** Number of the object that a press would be about, or is; null for none. @param {Ui} ui */
+function objectOf({ tool, about, pointed }) {
+  if (!pointed) return null;
   if (tool === 'fill') return pointed.index;
   return tool === 'ask' && about === 'object' && pointed.index >= 0 ? pointed.index : null;
 }
@@ -31,7 +31,8 @@ export function Outline({ ui, engine, panes }) {
   useLayoutEffect(() => {
     if (ref.current && object !== null) draw(ref.current, engine.objects(), object, panes);
   }, [object, ui.view, places.join()]);
-  return html`<canvas class="outline" ref=${ref} hidden=${object === null}
+  // Fainter while a drag asks, so that what comes of it is seen.
+  return html`<canvas class=${ui.asking ? 'outline is-asking' : 'outline'} ref=${ref} hidden=${object === null}
     aria-hidden="true"></canvas>`;
 }
 

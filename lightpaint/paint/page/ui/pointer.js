@@ -29,6 +29,8 @@ export class Pointer {
     /** @type {Point | null} */
     this.last = null;
     this.isSpace = false;
+    /** Whether a drag asks: what is shown of the place it asks about stays there. */
+    this.isAsking = false;
   }
 
   /** @param {PointerEvent} event @returns {{x: number, y: number}} in CSS pixels of the pictures */
@@ -91,6 +93,8 @@ export class Pointer {
     this.way = 0;
     this.engine.begin(point);
     this.last = point;
+    this.isAsking = tool === 'ask';
+    if (this.isAsking) this.store.set({ asking: { stops: 0, mired: 0 } });
   }
 
   /** @param {PointerEvent} event */
@@ -99,7 +103,8 @@ export class Pointer {
     const before = this.fingers.get(event.pointerId);
     if (this.doing === 'pinch') this.spread(event.pointerId, place);
     if (before) this.fingers.set(event.pointerId, place);
-    this.moved(place.x, place.y);
+    this.isAsking &&= this.store.value.asking !== null; // until it is given up
+    if (!this.isAsking) this.moved(place.x, place.y);
     if (this.doing === 'pan' && before) {
       this.pan(place.x - before.x, place.y - before.y);
     } else if (this.doing === 'stroke' && before) {
@@ -121,6 +126,8 @@ export class Pointer {
       this.doing = null;
       this.pane = null;
       this.store.set({ asking: null });
+      if (this.isAsking) this.moved(...xy(this.place(event)));
+      this.isAsking = false;
     }
   }
 
@@ -164,6 +171,8 @@ export class Pointer {
       else this.engine.end();
     }
     this.pane = null;
+    this.isAsking = false;
+    this.store.set({ asking: null });
     this.doing = 'pinch';
   }
 
@@ -203,6 +212,9 @@ export class Pointer {
   /** @type {import("./engine.js").Pane | null} */
   pane = null;
 }
+
+/** @param {{x: number, y: number}} place @returns {[number, number]} */
+const xy = ({ x, y }) => [x, y];
 
 /** Whether nobody hears what is painted here. @param {import("./model.js").Ui} ui */
 const isElsewhere = ({ closed, connection }) => closed !== null || connection === 'stale';

@@ -126,7 +126,7 @@ export function Stage({ ui, hands }) {
   const panes = ui.ready ? engine.panes() : [];
   const fit = panes.length ? panes[0].scale / ui.show.zoom : null;
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
-  return html`<div class=${`stage is-${ui.tool}`} ref=${frame} tabindex="0" role="application"
+  return html`<div class=${`stage is-${ui.tool} ${ui.asking ? 'is-asking' : ''}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line." aria-describedby="lp-status">
     ${ui.ready && html`<${Outline} ui=${ui} engine=${engine} panes=${panes} />`}
     <div class="rings" ref=${rings} hidden aria-hidden="true">

@@ -1,10 +1,10 @@
 /** The tools at the side, and above the pictures what the one in the hand can be set to. */
 
 import { inView } from '../engine/protocol.js';
-import { html, useState } from '../vendor/preact.js';
+import { html } from '../vendor/preact.js';
 import { toHex } from './colours.js';
 import { shownAs } from './colour.js';
-import { Button, Choice, Number_, Select, Slider } from './controls.js';
+import { Button, Choice, Number_, Select, Slider, comeInto } from './controls.js';
 import { signed } from './format.js';
 import { choose, flowOf, LEAST_SIZE, MOST_SIZE, setFlow, swap, TOOLS } from './tools.js';
 
@@ -116,30 +116,40 @@ export function ToolOptions({ ui, hands }) {
   </div>`;
 }
 
+/** As a choice: names of objects are not empty. */
+const WHOLE = '';
+
 /** The ask of a drag in numbers, for one object or for the whole picture. Also a panel's content.
  * @param {{ui: Ui, hands: Hands}} props */
 export function Ask({ ui, hands }) {
-  const [stops, setStops] = useState(0.5);
-  const [mired, setMired] = useState(0);
-  const [object, setObject] = useState('all');
+  const { store, engine } = hands;
+  const { stops, mired, object } = ui.inNumbers;
   const objects = /** @type {string[]} */ (ui.state?.objects ?? []);
+  // By its name: another view numbers its objects in another way, and may not show this one.
+  const isMissing = object !== null && !objects.includes(object);
   const choices = [
-    { value: 'all', label: 'Whole picture' },
-    ...objects
-      .map((name, k) => ({ value: String(k), label: name }))
-      .sort((a, b) => a.label.localeCompare(b.label)),
+    { value: WHOLE, label: 'Whole picture' },
+    ...(isMissing ? [{ value: object, label: `${object}: not in this view` }] : []),
+    ...[...objects]
+      .sort((a, b) => a.localeCompare(b))
+      .map((name) => ({ value: name, label: name })),
   ];
-  const ask = () => {
-    hands.store.set({ hint: false });
-    hands.engine.ask({ stops, mired, object: object === 'all' ? null : Number(object) });
+  const set = (/** @type {Partial<Ui['inNumbers']>} */ changed) =>
+    store.set((now) => ({ inNumbers: { ...now.inNumbers, ...changed } }));
+  const ask = (/** @type {MouseEvent} */ event) => {
+    store.set({ hint: false });
+    engine.ask({ stops, mired, object: object === null ? null : objects.indexOf(object) });
+    // Who has clicked looks at the pictures next, and has their keys again.
+    if (event.detail) comeInto(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
-  return html`<div class="ask">
-    <${Select} label="Where" value=${object} choices=${choices} change=${setObject} />
+  return html`<div class="ask" data-numbers>
+    <${Select} label="Where" value=${object ?? WHOLE} choices=${choices}
+      change=${(/** @type {string} */ to) => set({ object: to === WHOLE ? null : to })} />
     <${Number_} label="Brighter" value=${stops} least=${-8} most=${8} step=${0.1} unit="st"
-      change=${setStops} />
+      change=${(/** @type {number} */ to) => set({ stops: to })} />
     <${Number_} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
-      unit="mired" change=${setMired} />
-    <${Button} label="Ask for it" disabled=${!stops && !mired} act=${ask}
+      unit="mired" change=${(/** @type {number} */ to) => set({ mired: to })} />
+    <${Button} label="Ask for it" disabled=${isMissing || (!stops && !mired)} act=${ask}
       tip="As one stroke, which undo takes back" />
   </div>`;
 }
