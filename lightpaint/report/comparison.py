@@ -17,7 +17,6 @@ from lightpaint.report.looks import Looks
 from lightpaint.report.pictures import (
     Residual,
     diverging,
-    painted,
     residual_of,
     residual_picture,
     spoken_view,
@@ -28,6 +27,8 @@ from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.
 NARROWEST = 240
+#: Share from which on all is said to be painted, as it is written.
+ALL_OF_IT = 0.9995
 #: Pillow's own font has little beyond Latin-1: no minus, no Greek.
 SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
 
@@ -69,12 +70,12 @@ def comparison_image(
     target = target.fitted_to(basis.size, resize=False)
     looks = looks or Looks.raw(basis, predicted, verified)
     transform = looks.through(transform_of(target, predicted, verified))
-    share = float(painted(target, solution).mean())
+    is_part = target.painted_share < ALL_OF_IT
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [
         Tile(
             f"target: {target.name}",
-            f"{_percent(share)} painted{', the rest hatched' if share < 0.995 else ''}",
+            f"{target.spoken_share} painted{', the rest hatched' if is_part else ''}",
             target_picture(target, solution, looks.current, transform=transform),
         ),
         Tile(
@@ -170,7 +171,3 @@ def fitted(words: str, font: Any, width: int) -> str:
 def _in_short(seen: Seen) -> str:
     how = "close" if seen.is_close else "out of reach" if seen.is_far else "part of the way"
     return f"{how}: mean dE {seen.delta_e:.1f} where painted (noise explains {seen.noise:.1f})"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.1f} %"

@@ -111,6 +111,7 @@ def _basis(basis: Basis) -> dict[str, Any]:
 def _painting(target: Target, solution: Solution) -> dict[str, Any]:
     importance = solution.importance
     return {
+        "share": target.painted_share,
         "importance_mean": float(importance.mean()),
         "importance_max": float(importance.max()),
         "not_finite": target.not_finite,

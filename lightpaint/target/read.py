@@ -14,7 +14,7 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.target.own import painted_of
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
-from lightpaint.target.target import Target
+from lightpaint.target.target import Target, share_of, spoken_share
 from lightpaint.target.template import (
     CLEAN,
     LIGHT,
@@ -126,6 +126,7 @@ def read_target(
             *([] if mask is None else [Path(mask)]),
             *([] if reading.folder is None else template_files(reading.folder)),
         ),
+        full_size_share=None if importance is None else share_of(importance),
     )
 
 
@@ -190,7 +191,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     if template is None or not is_opaque:
         return picture.alpha, []
     importance = painted_where(path, picture, template)
-    share = float((importance > 0).mean())
+    share = share_of(importance)
     if share == 0:
         folder = Path(reading.painted_on).parent
         if path.resolve() in [(folder / name).resolve() for name in (LIGHT, SHOWN, CLEAN)]:
@@ -199,7 +200,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
             f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
             "find=False if all of it counts"
         )
-    note = f"{100 * share:.3g} % painted: what differs from {reading.painted_on}"
+    note = f"{spoken_share(share)} painted: what differs from {reading.painted_on}"
     if share > NEARLY_ALL and (said := _of_all(picture, template)):
         note += f"; {said}"
     return importance, [note]

@@ -37,6 +37,8 @@ class Target(Shown):
         through_view: Whether its values are those of a display, and not light.
         over_look: Whether it was painted over the current look, which what it leaves is to keep.
         files: That it was read from: the painting first, then mask and template.
+        full_size_share: `painted_share` of the painting as it was read; None where nothing was
+            taken out of it or averaged since.
 
     Examples:
         >>> image = np.full((16, 16, 3), 0.5)
@@ -60,6 +62,7 @@ class Target(Shown):
     through_view: bool = False
     over_look: bool = False
     files: tuple[Path, ...] = ()
+    full_size_share: float | None = None
 
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
@@ -138,6 +141,20 @@ class Target(Shown):
         """(height, width) in pixels."""
         return self.image.shape[0], self.image.shape[1]
 
+    @property
+    def painted_share(self) -> float:
+        """The share of its pixels in which anything was painted, however faintly, 0 to 1.
+
+        Of the painting as it was read: a mean over pixels of which one was painted is painted too,
+        so that a smaller picture would seem to hold more of it.
+        """
+        return share_of(self.importance) if self.full_size_share is None else self.full_size_share
+
+    @property
+    def spoken_share(self) -> str:
+        """`63.7 %`: `painted_share`, in the words that every place has for it."""
+        return spoken_share(self.painted_share)
+
     def resized(self, size: tuple[int, int]) -> "Target":
         """Resampled to `size` (height, width), in linear light, weighted by importance."""
         if size == self.size:
@@ -145,8 +162,13 @@ class Target(Shown):
         weighted = np.dstack([self.image * self.importance[..., None], self.importance])
         *rgb, importance = np.moveaxis(resampled(weighted, size), -1, 0)
         image = np.dstack(rgb) / np.where(importance > 0, importance, 1)[..., None]
-        at_least = self._at_least(lambda planes: resampled(planes, size))
-        return replace(self, image=image, importance=importance, at_least=at_least)
+        return replace(
+            self,
+            image=image,
+            importance=importance,
+            at_least=self._at_least(lambda planes: resampled(planes, size)),
+            full_size_share=self.painted_share,
+        )
 
     def reduced(self, factor: int) -> "Target":
         """One pixel for each block of factor x factor: their mean, weighted by importance.
@@ -159,9 +181,12 @@ class Target(Shown):
         importance = block_mean(self.importance, factor)
         weighted = block_mean(self.image * self.importance[..., None].astype(np.float64), factor)
         image = weighted / np.where(importance > 0, importance, 1)[..., None]
-        at_least = self._at_least(lambda planes: block_mean(planes, factor))
         return replace(
-            self, image=image.astype(np.float32), importance=importance, at_least=at_least
+            self,
+            image=image.astype(np.float32),
+            importance=importance,
+            at_least=self._at_least(lambda planes: block_mean(planes, factor)),
+            full_size_share=self.painted_share,
         )
 
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
@@ -212,6 +237,16 @@ class Target(Shown):
                 f"{width}x{height}: crop it to that shape, since resize=True does not stretch"
             )
         return self.resized(size)
+
+
+def share_of(importance: Floats) -> float:
+    """The share of the pixels (h, w) in which anything was painted, 0 to 1."""
+    return float((importance > 0).mean())
+
+
+def spoken_share(share: float) -> str:
+    """`63.7 %`: a share of the pixels, to three digits."""
+    return f"{100 * share:.3g} %"
 
 
 def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

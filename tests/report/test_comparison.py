@@ -1,6 +1,7 @@
 """comparison.png and the pictures in it: what is shown where, and at which exposure."""
 
 import io
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ from lightpaint.images.png import png_bytes
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
+from lightpaint.report import comparison
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
+from lightpaint.report.numbers import report_numbers
 from lightpaint.report.pictures import (
     DIVERGING,
     coverage,
@@ -30,6 +33,7 @@ from lightpaint.report.pictures import (
     target_picture,
     unpainted_look,
 )
+from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)
@@ -314,3 +318,33 @@ def test_a_residual_is_averaged_until_its_noise_does_not_show(make_basis: Any):
 )
 def test_round_up(value: float, expected: float):
     assert round_up(value) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1, 3])
+def test_how_much_is_painted_is_one_number(
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, factor: int
+):
+    """A soft brush, as the terminal, the sheet and report.json have it, on a film of any size."""
+    rng, size = np.random.default_rng(3), (24 * factor, 48 * factor)
+    y, x = np.mgrid[: size[0], : size[1]] / factor
+    alpha = np.clip(1.2 - np.hypot(y - 12, x - 24) / 14, 0, 1)
+    rgba = np.dstack([rng.random((*size, 3)), alpha])
+    Image.fromarray(to_8_bit(rgba)).save(tmp_path / "soft.png")
+    full = read_target(tmp_path / "soft.png")
+    share = float((full.importance > 0).mean())
+    assert share > full.importance.mean() + 0.1  # else every definition would give it
+    basis = make_basis(2, (24, 48))
+    target = full.fitted_to(basis.size, resize=False)
+    solution = solve(basis, target)
+    predicted = combine(basis, solution.lighting)
+    told = {"basis": basis, "target": target, "solution": solution}
+    captions: list[str] = []
+    draw = comparison._caption
+    monkeypatch.setattr(
+        comparison, "_caption", lambda *about: (captions.append(about[1].detail), draw(*about))[1]
+    )
+    comparison_image(**told, predicted=predicted.image, verified=None)
+    assert captions[0] == f"{100 * share:.3g} % painted, the rest hatched"
+    numbers = json.loads(report_numbers(**told, predicted=predicted, verification=None))
+    assert numbers["painting"]["share"] == pytest.approx(share, abs=1e-12)
+    assert full.spoken_share == target.spoken_share == f"{100 * share:.3g} %"
