@@ -28,6 +28,7 @@ from lightpaint.scene.integrator import (
     replace_integrator,
 )
 from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.plugins import UnknownPluginError, check_plugins
 
 #: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
 MAX_SAID = 2000
@@ -67,6 +68,8 @@ class ParsedScene:
             raise SceneError(f"{path} is not a scene: its root element must be <scene>")
         self.files = tuple(Path(str(f)) for f in self.state.files)
         self.instead, self.replaced = self._replace_integrator(instead)
+        with mitsuba_errors(path, self.instead):
+            check_plugins(self.state, self.resolver)
         kinds = mi.ObjectType
         self.emitter_nodes = self._nodes_of(kinds.Emitter)
         self.sensor_nodes = self.children_of(0, kinds.Sensor)
@@ -305,7 +308,8 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
         if "integrator plugin" in text:
             hint = f"; that is the integrator that was asked for, {instead}"
             hint = hint if instead else '; integrator="path" renders it with another'
-        raise SceneError(f"Mitsuba refuses {path}: {text}{hint}") from error
+        lead = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
+        raise SceneError(f"{lead}{path}: {text}{hint}") from error
 
 
 def _without_places(said: str, path: Path) -> str:

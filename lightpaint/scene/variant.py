@@ -9,6 +9,7 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.scene.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
+from lightpaint.scene.plugins import loaded_plugins
 from lightpaint.signals import interruptible_between_pieces
 
 FAST_VARIANT = "llvm_ad_rgb"
@@ -90,6 +91,7 @@ def _begun(wanted: str | None) -> Backend:
     else:
         backend = _set(mi, wanted, llvm)
     mi.set_log_level(mi.LogLevel.Error)
+    loaded_plugins()  # before any scene says where files are
     return backend
 
 

@@ -30,7 +30,7 @@ SUCCESSORS = {
     **dict.fromkeys(("sky", "sun"), "sunsky"),
     **dict.fromkeys(("phong", "ward"), "roughplastic"),
 }
-_REFUSED = re.compile(r'unexpected <(\w+)> element|Plugin "(\w+)" not found')
+_REFUSED = re.compile(r"unexpected <(\w+)> element|has no \w+ plugin '(\w+)'")
 
 
 @contextmanager
@@ -45,7 +45,7 @@ def words_for_old_scenes(path: Path) -> Iterator[None]:
 
 
 def _of_age(path: Path, sign: str, said: str) -> SceneError:
-    reason = said.removeprefix(f"Mitsuba refuses {path}: ")
+    reason = said.removeprefix("Mitsuba refuses ").removeprefix(f"{path}: ")
     found = _REFUSED.search(reason)
     successor = SUCCESSORS.get(found[1] or found[2]) if found else None
     hint = "write what Mitsuba 3 has instead"
