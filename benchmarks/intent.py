@@ -25,10 +25,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, label
 
 import lightpaint as lp
+from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.difference import delta_e
-from lightpaint.colour.display import choose_exposure
 from lightpaint.images.denoise import denoised
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -153,7 +153,7 @@ def painted(
     if style != "full":
         mask = gaussian_filter(region(strong, style).astype(float), soft)
         mask[mask < 0.02] = 0
-    transform = lp.ViewTransform("srgb", choose_exposure(current))
+    transform = lp.ViewTransform("srgb", meter_exposure(current, basis))
     codes = np.round(255 * transform.encode(image)) / 255
     target = lp.Target(
         style,

@@ -6,11 +6,12 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import is_of, render_basis
-from lightpaint.colour.display import choose_exposure
+from lightpaint.basis.render.separate import emitters_seen
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
@@ -88,7 +89,7 @@ def render_template(
     surfaces = render_surfaces(scene, seed=seed, progress=progress)
     template = Template(
         look,
-        transform or ViewTransform("srgb", choose_exposure(clean)),
+        transform or ViewTransform("srgb", _exposure(scene, basis, clean)),
         scene=scene.path.name,
         content=scene.content,
         sensor=scene.sensor_names[scene.sensor],
@@ -123,9 +124,10 @@ def render_look(
     """Only the look to paint on, as EXR at `path`; returns the PNG beside it, which is denoised."""
     listen = listener(progress)
     settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
-    look, features = _look(scene, _basis_of(scene, settings, listen), settings, listen)
+    basis = _basis_of(scene, settings, listen)
+    look, features = _look(scene, basis, settings, listen)
     clean = denoised(look, features, quality="high")
-    shown = transform or ViewTransform("srgb", choose_exposure(clean))
+    shown = transform or ViewTransform("srgb", _exposure(scene, basis, clean))
     return write_look(path, look, shown, clean=clean, texts=how_denoised(features, raw=path.name))
 
 
@@ -216,6 +218,13 @@ def _look(
     return image, render_features(scene, seed=settings.seed)
 
 
+def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
+    """Stops at which to show the scene as it is."""
+    if basis is not None:
+        return meter_exposure(look, basis)
+    return choose_exposure(look, emitters_seen(scene))
+
+
 def _thumbnails(
     scene: Scene, basis: Basis | None, settings: Settings, progress: Progress
 ) -> dict[str, Floats]:
@@ -278,6 +287,6 @@ def relight_look(
             features = render_features(relit, seed=seed)
             clean = denoised(image.image, features, quality="high")
             texts = how_denoised(features, raw="relit.exr")
-            stops = choose_exposure(clean)
+            stops = choose_exposure(clean, emitters_seen(relit))
             write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
         settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")

@@ -174,7 +174,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
         larger = render_features(look.relit)
     weights, predicted = look.solution.weights, look.predicted.image
     looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
-    transform = transform_of(look.target, predicted, verified)
+    transform = transform_of(look.target, look.basis, predicted)
     missed = residual_of(look.solution, predicted, transform=transform)
 
     def comparison() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import BasisError
 from lightpaint.expected import BRIGHTEST, is_amount
 from lightpaint.images.denoise import Features
@@ -234,6 +235,18 @@ class Basis(Shown):
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""
         return mix(self.images, weights)
+
+
+def meter_exposure(image: Floats, *bases: Basis) -> float:
+    """Return the exposure in stops at which to show a picture that bases make.
+
+    image: (h, w, 3) linear; of several bases, their pictures as rows of pixels, (1, p, 3). Light
+    groups do not say where an emitter is seen.
+    """
+    if not all(basis.knows_noise for basis in bases):
+        return choose_exposure(image)
+    seen = [basis.emitters_seen.ravel() for basis in bases]
+    return choose_exposure(image, np.concatenate(seen).reshape(image.shape[:2]))
 
 
 def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:

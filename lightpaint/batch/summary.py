@@ -17,7 +17,8 @@ from lightpaint.batch.journal import Line
 from lightpaint.batch.names import THUMBNAILS
 from lightpaint.batch.planned import Plan, PlannedLook
 from lightpaint.batch.task import EXPORT, Kind
-from lightpaint.colour.display import choose_exposure, to_8_bit
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing

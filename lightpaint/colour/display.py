@@ -7,22 +7,10 @@ For a million pixels of float32 encoding takes 28 ms and decoding 15; colour-sci
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats, largest
+from lightpaint.arrays import Floats
 
 #: Beyond this many stops an exposure is a slip of the pen.
 MAX_STOPS = 64.0
-
-
-def choose_exposure(image: Floats) -> float:
-    """Exposure in stops at which to show a linear image.
-
-    0 for a picture that is meant to be seen as it is; only one so dark or bright that it
-    would show nothing is brought back, its 99th percentile to white.
-    """
-    bright = float(np.percentile(largest(image), 99))
-    if bright <= 0 or 0.125 <= bright <= 8:
-        return 0.0
-    return float(np.clip(np.round(-np.log2(bright), 1), -MAX_STOPS, MAX_STOPS))
 
 
 def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:

@@ -13,7 +13,8 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
+from lightpaint.colour.display import encode_display, to_8_bit
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.icc import Profile, gamma_profile, srgb_profile
 from lightpaint.colour.primaries import is_rec709, primaries_in
 from lightpaint.errors import ImageError, OutputError

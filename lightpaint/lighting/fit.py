@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, TypeVar
 
-from lightpaint.colour.display import choose_exposure
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.expected import SWITCH, Check, a, check_fields, number, one_of

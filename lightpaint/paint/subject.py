@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.known import Known
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -149,7 +148,7 @@ def transform_of(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTra
     """What is painted through: as asked, else sRGB at an exposure that shows something of all."""
     looks = [basis.present_look for basis in bases]
     whole = looks[0] if len(looks) == 1 else np.concatenate([x.reshape(1, -1, 3) for x in looks], 1)
-    return subjects[0].choice.over(ViewTransform("srgb", choose_exposure(whole)))
+    return subjects[0].choice.over(ViewTransform("srgb", meter_exposure(whole, *bases)))
 
 
 def sensor_of(scene: Scene | Known) -> str:

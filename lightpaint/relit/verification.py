@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.difference import delta_e
-from lightpaint.colour.display import choose_exposure
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
@@ -42,7 +42,7 @@ class Verification(Shown):
             errors (see `_pattern`): noise is not alike, an error in some place is.
         rmse: Of the pixels, in radiance.
         noise_rmse: What noise alone would give.
-        delta_e_mean: CIEDE2000 at the exposure of the report, mean.
+        delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
         delta_e_95: The same, 95th percentile.
 
     Examples:

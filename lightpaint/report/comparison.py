@@ -69,7 +69,7 @@ def comparison_image(
     """
     target = target.fitted_to(basis.size, resize=False)
     looks = looks or Looks.raw(basis, predicted, verified)
-    transform = looks.through(transform_of(target, predicted, verified))
+    transform = looks.through(transform_of(target, basis, predicted))
     is_part = target.painted_share < ALL_OF_IT
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [

@@ -15,7 +15,8 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.colour.display import choose_exposure, to_8_bit
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import covered, enlarged
@@ -29,7 +30,7 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.comparison import SURROUND, TEXT, fitted
 from lightpaint.report.figures import THUMBNAIL, data_uri, thumbnail
 from lightpaint.report.lights_table import change, hex_color
-from lightpaint.report.pictures import coverage, unpainted_look
+from lightpaint.report.pictures import coverage, transform_of, unpainted_look
 from lightpaint.report.sentences import UNTOLD_HERE
 from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
@@ -136,7 +137,7 @@ def look_html(
     if verification is not None:
         images.append(covered(verification.verified.image, predicted.size))
         names.append("verified")
-    transform = target.transform or _transform(images[-1])
+    transform = transform_of(target, solution.basis, predicted.image)
     said = verdict(solution, predicted, verification, seen=seen)
     return (
         _picture(", ".join(names), images, transform, paintings=1)

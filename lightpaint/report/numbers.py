@@ -63,8 +63,7 @@ def report_numbers(
     missed: Residual | None = None,
 ) -> str:
     """JSON of the numbers of `report_page`, whose arguments these are."""
-    verified = None if verification is None else verification.verified.image
-    transform = transform_of(target, predicted.image, verified)
+    transform = transform_of(target, basis, predicted.image)
     residual = missed or residual_of(solution, predicted.image, transform=transform)
     told = {
         "format": FORMAT,

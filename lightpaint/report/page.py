@@ -78,7 +78,7 @@ def report_page(
     verified = None if verification is None else verification.verified.image
     raw = Looks.raw(basis, predicted.image, verified)
     looks = looks or raw
-    transform = looks.through(transform_of(target, predicted.image, verified))
+    transform = looks.through(transform_of(target, basis, predicted.image))
     current = looks.current
     template = resources.files("lightpaint.report").joinpath("page.html.in")
     # Pictures take the time, and none waits for another.

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import mix
+from lightpaint.basis.basis import Basis, meter_exposure, mix
 from lightpaint.colour.color import luminance
-from lightpaint.colour.display import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import box_mean
 from lightpaint.lighting.solution import Solution
@@ -38,15 +37,13 @@ FINEST_SCALE = 0.01
 RADII, FAINT = (0, 1, 2, 3, 4, 6, 8), 0.1
 
 
-def transform_of(target: Target, predicted: Floats, verified: Floats | None) -> ViewTransform:
+def transform_of(target: Target, basis: Basis, predicted: Floats) -> ViewTransform:
     """The one transform for all pictures of a result: that of the painting, if it was seen through
     one.
 
-    Else sRGB at the exposure that suits its best render.
+    Else sRGB at an exposure metered on the prediction, whose emitters in view the basis knows.
     """
-    return target.transform or ViewTransform(
-        "srgb", choose_exposure(predicted if verified is None else verified)
-    )
+    return target.transform or ViewTransform("srgb", meter_exposure(predicted, basis))
 
 
 def brighter_than_white(image: Floats, transform: ViewTransform) -> float:

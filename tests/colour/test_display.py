@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
+from lightpaint.colour.display import encode_display, to_8_bit
 from lightpaint.images.png import png_bytes, write_png
 
 
@@ -77,19 +77,3 @@ def test_png_with_alpha(tmp_path: Path):
 
 def test_rounding_to_8_bit():
     np.testing.assert_array_equal(to_8_bit(np.array([0, 0.4 / 255, 0.6 / 255, 1])), [0, 0, 1, 255])
-
-
-@pytest.mark.parametrize("bright", [0.125, 0.3, 1.0, 8.0])
-def test_an_ordinary_picture_is_shown_as_it_is(bright: float):
-    assert choose_exposure(np.full((4, 4, 3), bright)) == 0
-
-
-@pytest.mark.parametrize("bright", [1e-6, 0.1, 9.0, 1e6])
-def test_a_picture_that_would_show_nothing_is_brought_back(bright: float):
-    image = np.full((4, 4, 3), bright)
-    # To white, within the tenth of a stop to which the exposure is rounded.
-    assert np.log2(bright * 2 ** choose_exposure(image)) == pytest.approx(0, abs=0.0501)
-
-
-def test_black_has_no_exposure():
-    assert choose_exposure(np.zeros((4, 4, 3))) == 0

@@ -11,7 +11,8 @@ import pytest
 from PIL import Image, ImageDraw
 
 from lightpaint.colour.color import luminance
-from lightpaint.colour.display import choose_exposure, encode_display, to_8_bit
+from lightpaint.colour.display import encode_display, to_8_bit
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes

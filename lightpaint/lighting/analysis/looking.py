@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.difference import ciede2000, lab
-from lightpaint.colour.display import choose_exposure, decode_display
+from lightpaint.colour.display import decode_display
+from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.painting import brighter_will_do, painted_light
 from lightpaint.lighting.problem import Problem
