@@ -21,7 +21,7 @@ Step = Literal["solve", "predict", "verify", "report", "render", "export", "ligh
 #: What can be wanted of a lighting that is there already.
 GIVEN: tuple[Step, ...] = ("predict", "render", "export")
 
-#: What a sequence is even in: stops of each channel, or lightness and hue as people see them.
+#: What a sequence is even in: stops of brightness, or lightness; colours as people see them.
 Space = Literal["log", "oklab"]
 
 #: Frames of one sequence, at most.

@@ -9,6 +9,8 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.batch.keys import Space
 from lightpaint.batch.variations import with_emission
+from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
+from lightpaint.colour.hue import WHITE_DUV
 from lightpaint.errors import LightingError
 from lightpaint.lighting.lighting import Lighting
 
@@ -64,14 +66,46 @@ def between(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting
 
 
 def _in_stops(one: Doubles, other: Doubles, share: float) -> Doubles:
-    """Each channel by the same stops in each frame; what is off is that DARK stops below."""
+    """Brightness by the same stops in each frame, and the colour evenly as people see it.
+
+    Channel by channel instead, a lamp would pass colours that are in neither end: from red to blue,
+    green. What is off, or DARK stops below the other end, begins there, in the other's colour.
+    """
     if share in (0.0, 1.0):
         return other if share else one
-    floor_ = np.maximum(one, other) * 2.0**-DARK
-    ends = np.maximum(one, floor_), np.maximum(other, floor_)
-    # Of what is off at both ends there is no logarithm.
-    ratio = np.divide(ends[1], ends[0], out=np.ones(3), where=ends[0] > 0)
-    return np.asarray(ends[0] * ratio**share)
+    bright = [float(luminance(rgb)) for rgb in (one, other)]
+    least = max(bright) * 2.0**-DARK
+    if least == 0:
+        return np.zeros(3)
+    hues = [rgb / y for rgb, y in zip((one, other), bright, strict=True) if y > least]
+    y = max(bright[0], least) ** (1 - share) * max(bright[1], least) ** share
+    if len(hues) == 1 or np.ptp(one) == np.ptp(other) == 0:
+        return np.asarray(y * hues[0])
+    return np.asarray(y * _hue_between(hues[0], hues[1], share))
+
+
+def _hue_between(one: Doubles, other: Doubles, share: float) -> Doubles:
+    """Return the colour, (3,) of luminance 1, so far on the way between two of luminance 1.
+
+    Whites stay white: they go along the black bodies, evenly in mireds and Duv, where a straight
+    way from 2000 to 9000 K would be pink in the middle, at a Duv of -0.010. Other colours go
+    straight in Oklab at equal lightness, which does not depend on how bright they are.
+    """
+    whites = [cct_and_duv(rgb) for rgb in (one, other)]
+    if all(white is not None and abs(white[1]) <= WHITE_DUV for white in whites):
+        (kelvin, duv), (kelvin_, duv_) = whites  # type: ignore[misc]
+        mired = (1 - share) * 1e6 / kelvin + share * 1e6 / kelvin_
+        return kelvin_to_rgb(1e6 / mired, (1 - share) * duv + share * duv_)
+    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
+    lab = (1 - share) * ends[0] / ends[0][0] + share * ends[1] / ends[1][0]
+    # Between two colours a lamp can have lies now and then one that it cannot.
+    linear = np.maximum(_of_lab(lab), 0.0)
+    return np.asarray(linear / luminance(linear))
+
+
+def _of_lab(lab: Doubles) -> Doubles:
+    """Return linear Rec.709, (3,), of Oklab."""
+    return np.asarray(np.linalg.solve(TO_CONES, np.linalg.solve(TO_LAB, lab) ** 3))
 
 
 def _in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
@@ -82,6 +116,4 @@ def _in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
         return np.full(3, light)
     ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
     lab = (1 - share) * ends[0] + share * ends[1]
-    linear = np.linalg.solve(TO_CONES, np.linalg.solve(TO_LAB, lab) ** 3)
-    # Between two colours a lamp can have lies now and then one that it cannot.
-    return np.maximum(linear, 0.0)
+    return np.maximum(_of_lab(lab), 0.0)

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from batches import small_basis
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from lightpaint.batch.sequence import DARK, at_frame, between
 from lightpaint.batch.variations import SHIFTED, SOLVED, VARIATIONS, shifted, varied
-from lightpaint.colour.color import luminance
+from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
@@ -40,14 +40,44 @@ def test_the_ends_are_the_lightings_themselves(one: Any, other: Any, space: Any)
 
 
 @given(WEIGHTS, WEIGHTS, SHARE)
-def test_in_stops_it_is_the_geometric_mean(one: Any, other: Any, share: float) -> None:
+def test_in_stops_brightness_is_the_geometric_mean(one: Any, other: Any, share: float) -> None:
     ends = [lighting(one), lighting(other)]
     # Within DARK stops of each other, beyond which the darker one is cut off.
-    logs = np.log2(emissions(ends[0])), np.log2(emissions(ends[1]))
+    logs = np.log2(luminance(emissions(ends[0]))), np.log2(luminance(emissions(ends[1])))
     near = np.abs(logs[0] - logs[1]) < DARK - 0.01
-    found = np.log2(emissions(between(ends, share, space="log")))
+    found = np.log2(luminance(emissions(between(ends, share, space="log"))))
     expected = (1 - share) * logs[0] + share * logs[1]
-    np.testing.assert_allclose(found[near], expected[near], atol=PRECISION)
+    np.testing.assert_allclose(found[near], expected[near], atol=1e-6)  # Duv of round trips
+
+
+def test_red_to_blue_lamps_pass_no_green_and_whites_stay_white() -> None:
+    red, blue = (3.0, 0.9, 0.0), (0.0, 0.9, 4.0)
+    whites = [np.array(kelvin_to_rgb(kelvin)) for kelvin in (2200, 9000)]
+    ends = [lighting([red, whites[0], red]), lighting([blue, 5 * whites[1], (0, 0, 0)])]
+    for share in np.linspace(0.05, 0.95, 10):
+        mixed, white, off = emissions(between(ends, share, space="log"))
+        # Channel by channel the first one is (0.3, 0.9, 0.1) somewhere on its way.
+        assert mixed[1] < 0.9 * mixed.max()
+        kelvin, duv = cct_and_duv(white)  # type: ignore[misc]
+        assert abs(duv) < 1e-4
+        assert 1e6 / kelvin == pytest.approx((1 - share) * 1e6 / 2200 + share * 1e6 / 9000, 1e-4)
+        # A lamp that goes off keeps its colour to the end.
+        np.testing.assert_allclose(off / off[0], np.array(red) / red[0], atol=PRECISION)
+
+
+@given(WEIGHTS, st.floats(1e-3, 1e3), SHARE)
+def test_the_colour_on_the_way_does_not_depend_on_brightness(
+    one: Any, gain: float, share: float
+) -> None:
+    ends = [np.array(one), np.array(one)[::-1]]
+    assume(np.ptp(np.log2(luminance(ends[0]))) < DARK - abs(np.log2(gain)) - 0.01)
+    hues = []
+    for factor in (1.0, gain):
+        found = emissions(
+            between([lighting(ends[0]), lighting(factor * ends[1])], share, space="log")
+        )
+        hues.append(found / luminance(found)[:, None])
+    np.testing.assert_allclose(*hues, atol=1e-6)
 
 
 @given(WEIGHTS, st.floats(0.05, 0.95), st.sampled_from(["log", "oklab"]))
