@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.batch.checks import (
+    BASES,
     SHOWN,
     WANTED,
     check_files,
@@ -18,7 +19,7 @@ from lightpaint.batch.checks import (
     settings_of,
 )
 from lightpaint.batch.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
-from lightpaint.batch.manifest import Manifest
+from lightpaint.batch.manifest import Manifest, Table
 from lightpaint.batch.variations import SHIFTED
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import LightpaintError
@@ -66,11 +67,27 @@ class Entry:
         return self.want == ("lights",)
 
 
-def looks_of(manifest: Manifest) -> list[Entry]:
-    """All looks that tables ask for, in their order; what is wrong is added to the mistakes."""
-    sources = _Sources(manifest)
-    tables = manifest.looks
-    return [x for where, look in tables for x in _of_look(manifest, sources, where, look)]
+@dataclass(frozen=True)
+class Looks:
+    """All looks that tables ask for.
+
+    whole: those that can be planned, in their order. rest: of each table with mistakes, what can be
+    looked at all the same: its scenes, constraints and settings, without a painting.
+    """
+
+    whole: list[Entry] = field(default_factory=list)
+    rest: list[tuple[Table, Entry]] = field(default_factory=list)
+
+
+def looks_of(manifest: Manifest) -> Looks:
+    """Return all looks that tables ask for; what is wrong is added to the mistakes."""
+    sources, looks = _Sources(manifest), Looks()
+    for table in manifest.looks:
+        made, entry = _of_look(manifest, sources, table)
+        looks.whole.extend(made)
+        if entry is not None:
+            looks.rest.append((table, entry))
+    return looks
 
 
 class _Sources:
@@ -110,46 +127,58 @@ class _Sources:
 
 
 def _of_look(
-    manifest: Manifest, sources: _Sources, where: str, look: Mapping[str, Any]
-) -> list[Entry]:
-    """The looks that one table asks for."""
-    mistakes = manifest.mistakes
+    manifest: Manifest, sources: _Sources, table: Table
+) -> tuple[list[Entry], Entry | None]:
+    """Return the looks that one table asks for; or, of one with mistakes, what of it is clear."""
+    mistakes, where, look = manifest.mistakes, table.where, table.said
     before = len(mistakes.found)
-    check_together(mistakes, where, look)
-    if len(mistakes.found) == before:
-        check_files(manifest, where, look)
-    settings = settings_of(mistakes, where, look)
-    constraints = constraints_of(manifest, where, look)
-    final = mistakes.final(look.get("render", {}), where)
-    handover = mistakes.handover(look.get("export", {}), where, manifest.folder)
-    if len(mistakes.found) == before:
-        check_wanted(mistakes, where, look)
-    if len(mistakes.found) > before:
-        return []
-    basis = sources.basis(look)
-    is_given = "lighting" in look or "lightings" in look
+    check_together(mistakes, table)
+    check_files(manifest, table)
+    check_wanted(mistakes, table)
+    is_given = table.has("lighting", "lightings")
     entry = Entry(
-        "",
+        look.get("name", ""),
         where,
-        basis=basis,
-        constraints=constraints,
-        settings=settings,
+        constraints=constraints_of(manifest, where, look),
+        settings=settings_of(mistakes, where, look),
         want=tuple(look.get("want", SHOWN if is_given else WANTED)),
-        final=final,
-        handover=handover,
+        final=mistakes.final(look.get("render", {}), where),
+        handover=mistakes.handover(look.get("export", {}), where, manifest.folder),
     )
+    made: list[Entry] = []
     try:
-        made = list(_of_subject(manifest, sources, entry, look))
-        made += [_varied(x, word) for word in look.get("variations", ()) for x in made]
+        _painting(manifest, look, "")
+        if len(mistakes.found) == before and not table.unclear:
+            entry = replace(entry, basis=sources.basis(look))
+            made = list(_of_subject(manifest, sources, entry, look))
+            made += [_varied(x, word) for word in look.get("variations", ()) for x in made]
     except LightpaintError as error:
         mistakes.add(where, str(error))
-        return []
-    if made and "export" in entry.want:
-        check_handover(mistakes, where, handover, made[0])
-    for one in made:
-        if not is_name(one.name):
-            mistakes.add(where, f"{one.name!r} is no name for a folder: say name = ...")
-    return made
+    shown = made[0] if made else _what_is_clear(manifest, sources, table, entry)
+    if "export" in entry.want and (shown.scenes or shown.basis):
+        check_handover(mistakes, where, entry.handover, shown)
+    for name in {one.name for one in made} or {entry.name} - {""}:
+        if not is_name(name):
+            mistakes.add(where, f"{name!r} is no name for a folder: say name = ...")
+    if len(mistakes.found) == before and not table.unclear:
+        return made, None
+    return [], shown
+
+
+def _what_is_clear(manifest: Manifest, sources: _Sources, table: Table, entry: Entry) -> Entry:
+    """Return the scenes and the basis of a table with mistakes, as far as they follow from it."""
+    look, base = table.said, manifest.folder
+    # Another sensor, or none, is as good to look at the lights of a scene.
+    if table.unclear & (set(SOURCE) - {"sensor", "sensors"}):
+        return entry
+    if "scene" in look and (base / look["scene"]).is_file():
+        sensors = [*look.get("views", ()), *look.get("sensors", ())]
+        sensors += [look["sensor"]] if "sensor" in look else []
+        return replace(entry, scenes=tuple(sources.scene(look, x) for x in sensors or [None]))
+    named = [look[key] for key in BASES if key in look]
+    if len(named) == 1 and (base / named[0]).exists():
+        return replace(entry, basis=sources.basis(look))
+    return entry
 
 
 def _of_subject(

@@ -1,7 +1,7 @@
 """What a manifest may say: its keys, and what is expected of each."""
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -173,7 +173,9 @@ class Mistakes:
         right = set()
         for key, value in given.items():
             if key not in known:
-                self.add(where, f"unknown key {key!r}{_near(key, known)}")
+                near = near_key(key, known)
+                hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(known)}"
+                self.add(where, f"unknown key {key!r}{hint}")
                 continue
             fits, words = known[key]
             if fits(value):
@@ -181,6 +183,13 @@ class Mistakes:
             else:
                 self.add(where, f"{key} is {one_line(repr(value), limit=120)}: expected {words}")
         return right
+
+    def unclear(
+        self, given: Mapping[str, Any], known: Mapping[str, Check], right: Collection[str]
+    ) -> frozenset[str]:
+        """Return the keys that were meant where `given` is wrong. right: as of `keys`."""
+        wrong = [key for key in given if key not in right]
+        return frozenset(key if key in known else near_key(key, known) for key in wrong) - {""}
 
     def settings(self, given: Mapping[str, Any], where: str) -> dict[str, Any]:
         """Those of a table that mean something, by name."""
@@ -216,7 +225,6 @@ class Mistakes:
         return replace(made, stage=str(base / made.stage) if made.stage else "")
 
 
-def _near(key: str, known: Iterable[str]) -> str:
-    """What may have been meant."""
-    near = difflib.get_close_matches(key, list(known), 1)
-    return f": did you mean {near[0]!r}?" if near else f"; known are {', '.join(known)}"
+def near_key(key: str, known: Iterable[str]) -> str:
+    """Return the key that may have been meant by a misspelt one; "" where none is near."""
+    return next(iter(difflib.get_close_matches(key, list(known), 1)), "")

@@ -5,20 +5,22 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.batch.checks import SHOWN, check_handover, check_sequence, check_wanted
-from lightpaint.batch.entries import Entry, looks_of
-from lightpaint.batch.manifest import Manifest
+from lightpaint.batch.entries import Entry, Looks, looks_of
+from lightpaint.batch.keys import Mistakes
+from lightpaint.batch.manifest import Manifest, Table
 from lightpaint.batch.names import is_reserved, name_clashes
 from lightpaint.batch.sequence import at_frame
 from lightpaint.screen import some_names
 
 
-def entries_of(manifest: Manifest) -> tuple[Entry, ...]:
-    """All looks in the order of the manifest; what is wrong is added to its mistakes."""
-    found = looks_of(manifest)
-    for where, sequence in manifest.sequences:
-        found += _of_sequence(manifest, found, where, sequence)
-    _check_names(manifest, found)
-    return tuple(found)
+def entries_of(manifest: Manifest) -> Looks:
+    """Return all looks in the order of the manifest; what is wrong is added to its mistakes."""
+    looks = looks_of(manifest)
+    for table in manifest.sequences:
+        looks.whole.extend(_of_sequence(manifest, looks, table))
+    named = [entry for _, entry in looks.rest if entry.name]
+    _check_names(manifest, [*looks.whole, *named])
+    return looks
 
 
 def _check_names(manifest: Manifest, looks: Sequence[Entry]) -> None:
@@ -42,31 +44,22 @@ def _check_names(manifest: Manifest, looks: Sequence[Entry]) -> None:
         manifest.mistakes.add(wheres, said)
 
 
-def _of_sequence(
-    manifest: Manifest, looks: Sequence[Entry], where: str, said: Mapping[str, Any]
-) -> list[Entry]:
-    """A look for each frame."""
-    mistakes, by_name = manifest.mistakes, {look.name: look for look in looks}
-    before, through = len(mistakes.found), said.get("through", ())
-    check_sequence(mistakes, where, said)
-    if len(mistakes.found) > before:
-        return []
-    if unknown := [name for name in through if name not in by_name]:
-        if not mistakes.found:  # else it may be a look that has mistakes of its own
-            mistakes.add(where, f"through: no look is called {unknown[0]!r}")
-        return []
-    ends = [by_name[name] for name in through]
-    path = said.get("sensors")
-    if any(_place(end, path) != _place(ends[0], path) for end in ends):
-        mistakes.add(where, "through: its looks are of different scenes, sensors or bases")
-    elif path and not ends[0].scenes:
-        mistakes.add(where, "sensors: its looks are of no scene, which other sensors could see")
-    elif not path and any(end.by_sensor for end in ends):
-        mistakes.add(where, "through: a look of several views has no one picture: take single ones")
-    check_wanted(mistakes, where, said)
+def _of_sequence(manifest: Manifest, looks: Looks, table: Table) -> list[Entry]:
+    """Return a look for each frame; none of a sequence with mistakes."""
+    mistakes, where, said = manifest.mistakes, table.where, table.said
+    by_name = {look.name: look for look in looks.whole}
+    before = len(mistakes.found)
+    check_sequence(mistakes, table)
+    check_wanted(mistakes, table)
     final = mistakes.final(said.get("render", {}), where)
     handover = mistakes.handover(said.get("export", {}), where, manifest.folder)
-    if len(mistakes.found) > before:
+    ends = [by_name[name] for name in said.get("through", ()) if name in by_name]
+    for name in (name for name in said.get("through", ()) if name not in by_name):
+        if not any(_may_make(name, entry) for _, entry in looks.rest):
+            mistakes.add(where, f"through: no look is called {name!r}")
+    if ends:
+        _check_ends(mistakes, where, ends, said)
+    if len(mistakes.found) > before or table.unclear or len(ends) < len(said["through"]):
         return []
     want = tuple(said.get("want", SHOWN))
     how: dict[str, Any] = {"want": want, "final": final, "handover": handover}
@@ -76,6 +69,26 @@ def _of_sequence(
     if "export" in want:
         check_handover(mistakes, where, handover, made[0])
     return made
+
+
+def _check_ends(
+    mistakes: Mistakes, where: str, ends: Sequence[Entry], said: Mapping[str, Any]
+) -> None:
+    """Add why there is nothing between the looks that a sequence goes through."""
+    path = said.get("sensors")
+    if any(_place(end, path) != _place(ends[0], path) for end in ends):
+        mistakes.add(where, "through: its looks are of different scenes, sensors or bases")
+    elif path and not ends[0].scenes:
+        mistakes.add(where, "sensors: its looks are of no scene, which other sensors could see")
+    elif not path and any(end.by_sensor for end in ends):
+        mistakes.add(where, "through: a look of several views has no one picture: take single ones")
+
+
+def _may_make(name: str, entry: Entry) -> bool:
+    """Return whether a table might make a look of that name without its mistakes."""
+    if not entry.name:
+        return True
+    return name == entry.name or name.startswith(f"{entry.name}-")
 
 
 def _frames(said: Mapping[str, Any], ends: Sequence[Entry]) -> Iterator[Entry]:

@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,15 +28,32 @@ PLACES = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
 
 
 @dataclass(frozen=True)
+class Table:
+    """A table of a manifest. where: what errors call it. said: its keys, with values that will do.
+
+    unclear: keys that somebody gave as well, wrongly or misspelt. Nothing is known of their values,
+    but that they lack would be untrue.
+    """
+
+    where: str
+    said: Mapping[str, Any]
+    unclear: frozenset[str] = frozenset()
+
+    def has(self, *keys: str) -> bool:
+        """Return whether any of these keys was given, whatever its value."""
+        return any(key in self.said or key in self.unclear for key in keys)
+
+
+@dataclass(frozen=True)
 class Manifest:
-    """What stands there. looks: with the defaults in them; and what errors call each.
+    """What stands there. looks: with the defaults in them.
 
     path: of the file, relative to whose folder all its paths are.
     """
 
     path: Path
-    looks: tuple[tuple[str, Mapping[str, Any]], ...]
-    sequences: tuple[tuple[str, Mapping[str, Any]], ...]
+    looks: tuple[Table, ...]
+    sequences: tuple[Table, ...]
     mistakes: Mistakes
 
     @property
@@ -60,49 +77,60 @@ def read_manifest(path: str | Path) -> Manifest:
         raise BatchError(f"{path} is not TOML: {one_line(str(error))}") from None
     mistakes = Mistakes(str(path))
     right = mistakes.keys(data, TABLES, "")
-    defaults = data["defaults"] if "defaults" in right else {}
-    known = mistakes.keys(defaults, DEFAULTS, "defaults")
-    defaults = {key: value for key, value in defaults.items() if key in known}
-    # Of what defaults with mistakes lead to nothing is said.
-    is_clear = not mistakes.found
+    unclear = mistakes.unclear(data, TABLES, right)
+    if "defaults" in unclear:  # which may have had any of its keys
+        defaults = Table("defaults", {}, frozenset(DEFAULTS))
+    else:
+        defaults = _table(data.get("defaults", {}), DEFAULTS, "defaults", mistakes)
+        if "settings" in defaults.said:  # said once, and not of each look that they are merged into
+            known = mistakes.settings(defaults.said["settings"], "defaults")
+            defaults = replace(defaults, said={**defaults.said, "settings": known})
     looks = _tables(data["look"] if "look" in right else [], LOOK, "look", mistakes)
-    merged = tuple((where, _merged(defaults, look)) for where, look in looks)
     given = data["sequence"] if "sequence" in right else []
     sequences = _tables(given, SEQUENCE, "sequence", mistakes)
-    if not data.get("look") and is_clear:
+    if not data.get("look") and "look" not in unclear:
         mistakes.add("", "it has no look: begin one with [[look]]")
-    return Manifest(path, merged if is_clear else (), sequences if is_clear else (), mistakes)
+    return Manifest(path, tuple(_merged(defaults, x) for x in looks), tuple(sequences), mistakes)
+
+
+def _table(
+    given: Mapping[str, Any], known: Mapping[str, Check], where: str, mistakes: Mistakes
+) -> Table:
+    """Return what a table says; what is wrong is added to the mistakes."""
+    right = mistakes.keys(given, known, where)
+    said = {key: value for key, value in given.items() if key in right}
+    return Table(where, said, mistakes.unclear(given, known, right))
 
 
 def _tables(
     given: list[Any], known: Mapping[str, Check], what: str, mistakes: Mistakes
-) -> tuple[tuple[str, Mapping[str, Any]], ...]:
-    """What errors call each table, and its keys that are as expected."""
+) -> list[Table]:
+    """Return all tables of one kind."""
     tables = []
     for k, table in enumerate(given, start=1):
         where = f"{what} {k}"
         if not isinstance(table, dict):
             mistakes.add(where, f"{one_line(repr(table))} is no table: write [[{what}]]")
             continue
-        if isinstance(called := _called(table), str):
+        if called := _called(table):
             where = f"{what} {called!r}"
-        right = mistakes.keys(table, known, where)
-        if len(right) == len(table):  # of a table with mistakes nothing more is asked
-            tables.append((where, {key: table[key] for key in table}))
-    return tuple(tables)
+        tables.append(_table(table, known, where, mistakes))
+    return tables
 
 
-def _called(table: Mapping[str, Any]) -> Any:
-    """What a person knows a look by."""
-    return next((table[key] for key in ("name", "painting", "lighting") if key in table), None)
+def _called(table: Mapping[str, Any]) -> str:
+    """Return what a person knows a look by, as it stands in the manifest; "" where nothing does."""
+    named = (table.get(key) for key in ("name", "painting", "lighting"))
+    return next((name for name in named if isinstance(name, str) and name), "")
 
 
-def _merged(defaults: Mapping[str, Any], look: Mapping[str, Any]) -> dict[str, Any]:
-    """`look` over the defaults; of tables of values each key by itself."""
-    said = dict(defaults)
+def _merged(defaults: Table, table: Table) -> Table:
+    """Return a look over the defaults; of tables of values each key by itself."""
+    said, look, unclear = dict(defaults.said), table.said, defaults.unclear
     for keys in PLACES:
-        if any(key in look for key in keys):
+        if table.has(*keys):
             said = {key: value for key, value in said.items() if key not in keys}
+            unclear = unclear - set(keys)
     for key, value in look.items():
         if key in JOINED and isinstance(said.get(key), dict):
             value = {**said[key], **value}
@@ -110,7 +138,8 @@ def _merged(defaults: Mapping[str, Any], look: Mapping[str, Any]) -> dict[str, A
             value = [said[key], value]
         said[key] = value
     _leave_idle(said, look)
-    return {**said, **_listed(said)}
+    left = {key for key in unclear if key not in look or key in (*JOINED, "constraints")}
+    return Table(table.where, {**said, **_listed(said)}, table.unclear | left)
 
 
 def _leave_idle(said: dict[str, Any], look: Mapping[str, Any]) -> None:

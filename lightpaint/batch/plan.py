@@ -18,6 +18,7 @@ from lightpaint.batch.keys import Mistakes
 from lightpaint.batch.looks import entries_of
 from lightpaint.batch.made import adjusted, made_folder
 from lightpaint.batch.manifest import Manifest, read_manifest
+from lightpaint.batch.mistaken import look_over
 from lightpaint.batch.planned import Cost, Plan, PlannedLook, Step
 from lightpaint.batch.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.variations import varied
@@ -52,13 +53,14 @@ def plan(
         OutputError: If `folder` cannot be written.
     """
     read, folder = read_manifest(manifest), Path(folder)
-    entries = entries_of(read)
-    if read.mistakes.found:
-        raise BatchError(*read.mistakes.found)
-    check_writable(folder)
-    check_gallery(folder, force=force)
-    planner = _Planner(read, folder, entries, force=force, command=command)
-    looks = tuple(planner.planned(entry) for entry in entries)
+    found = entries_of(read)
+    if not read.mistakes.found:
+        check_writable(folder)
+        check_gallery(folder, force=force)
+    planner = _Planner(read, folder, found.whole, force=force, command=command)
+    looks = tuple(planner.planned(entry) for entry in found.whole)
+    for _, entry in found.rest:
+        planner.look_over(entry)
     if read.mistakes.found:
         raise BatchError(*read.mistakes.found)
     names = frozenset(look.entry.name for look in looks)
@@ -101,12 +103,17 @@ class _Planner:
         except LightpaintError as error:
             self._mistakes.add(entry.where, str(error))
             failure = str(error)
+            self.look_over(entry)
         if not failure and (gone := self._failed & set(entry.of)):
             failure = f"it is made of {some_names(sorted(gone))}, which failed"
         if failure:
             self._failed.add(entry.name)
         steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
+
+    def look_over(self, entry: Entry) -> None:
+        """Add all mistakes of a look that cannot be planned, of which one would hide the others."""
+        look_over(entry, self.held, self._mistakes)
 
     def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
         """The answer, and its render and what other programs get, if that is wanted."""

@@ -8,6 +8,7 @@ import pytest
 from batches import contents
 from command import refused, run, succeed
 from light_groups import interleaved, pictures
+from renderer import write_room
 
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
@@ -110,7 +111,7 @@ def test_what_other_programs_get_is_made_again_alone(here: Path) -> None:
 
 
 def test_forms_that_a_look_has_nothing_for_are_told_before(here: Path) -> None:
-    (here / "room.xml").write_text("<scene/>", encoding="utf-8")
+    write_room(here)
     groups, want = 'light_groups = "groups.exr"\n', 'want = ["export"]\n'
     for more, said in (
         ('light_groups = "gone.exr"\n', "light_groups: no such file or folder: gone.exr"),

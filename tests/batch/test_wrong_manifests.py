@@ -1,10 +1,12 @@
 """Each mistake in a manifest is one clear line that names look and key; nothing is rendered."""
 
+import json
 from pathlib import Path
 
 import pytest
 from batches import write_batch
 from command import refused, run
+from renderer import write_room
 
 HEAD = '[defaults]\nbasis = "b.basis.exr"\nwant = ["predict"]\n'
 LOOK = '[[look]]\npainting = "p0.exr"\n'
@@ -22,15 +24,15 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "defaults that are no table": ("defaults = 1\n" + LOOK, ("defaults is 1",)),
     "an unknown default": ('[defaults]\nscen = "a"\n' + LOOK, ("defaults", "mean 'scene'")),
     "a painting by default": (
-        '[defaults]\npainting = "p0.exr"\n' + LOOK,
+        HEAD + 'painting = "p0.exr"\n' + LOOK,
         ("defaults", "unknown key 'painting'"),
     ),
     "an unknown key": (FIRST + "masc = 'a'\n", ("look 'one'", "'masc'", "mean 'mask'")),
     "a painting that is a number": (HEAD + "[[look]]\npainting = 3\n", ("painting is 3",)),
-    "an empty name": (HEAD + LOOK + 'name = ""\n', ("look ''", "name is ''")),
+    "an empty name": (HEAD + LOOK + 'name = ""\n', ("look 'p0.exr'", "name is ''")),
     "nothing to show": (HEAD + '[[look]]\nname = "a"\n', ("look 'a'", "nothing to show")),
     "painting and lighting": (
-        FIRST + 'lighting = "l.json"\n',
+        FIRST + 'lighting = "looks.toml"\n',
         ("look 'one'", "painting and lighting at once"),
     ),
     "neither scene nor basis": (LOOK, ("look 'p0.exr'", "no scene and no basis")),
@@ -74,11 +76,6 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "a render without a scene": (FIRST + 'want = ["render"]\n', ("'render'", "needs the scene")),
     "a verification without a scene": (FIRST + 'want = ["verify"]\n', ("needs the scene",)),
     "render that is not wanted": (FIRST + "[look.render]\nspp = 4\n", ("does not have 'render'",)),
-    "an unknown key of render": (
-        FIRST + "[look.render]\nsamples = 4\n",
-        ("look 'one', render", "'samples'"),
-    ),
-    "one sample": (FIRST + "[look.render]\nspp = 1\n", ("spp is 1", "whole number >= 2")),
     "an unknown setting": (
         FIRST + "[look.settings]\nholds = 1\n",
         ("look 'one', settings", "mean 'hold'"),
@@ -164,14 +161,6 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
         SEQUENCE + 'through = ["one", "two"]\nframes = 4\nspace = "rgb"\n',
         ("space is 'rgb'", "'oklab'"),
     ),
-    "a path of one sensor": (
-        SEQUENCE + 'through = ["one"]\nsensors = ["a"]\n',
-        ("sequence 'seq'", "sensors has one"),
-    ),
-    "a path of other frames": (
-        SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\nframes = 3\n',
-        ("sequence 'seq'", "3 frames of 2 sensors"),
-    ),
     "a path through a basis": (
         SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\n',
         ("sequence 'seq'", "of no scene"),
@@ -179,6 +168,62 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "a sequence that is solved": (
         SEQUENCE + 'through = ["one", "two"]\nframes = 4\nwant = ["solve"]\n',
         ("want is ['solve']",),
+    ),
+}
+
+
+#: Manifests with several mistakes, and what each line says, in any order: these and no others.
+SEVERAL: dict[str, tuple[str, list[str]]] = {
+    "misspelt keys hide no wrong values": (
+        FIRST + 'masc = "m.png"\nexposure = "+1"\nseting = 1\npaint = "oil"\n',
+        ["'masc': did you mean 'mask'", "exposure is '+1'", "'settings'", "paint is 'oil'"],
+    ),
+    "nor lights that there are not, light by light": (
+        FIRST
+        + 'masc = "m.png"\n[look.constraints]\nspars = 3\nsparse = -1\n'
+        + "[look.constraints.light.sun]\noff = true\n"
+        + '[look.constraints.light."lamp 1"]\nofff = true\nkelvin = -5\n'
+        + '[look.constraints.light.moon]\ncolor = "3200K"\n',
+        [
+            *("'masc'", "'spars': did you mean 'sparse'", "sparse is -1", "no light 'sun'"),
+            *("'offf'", "temperature of -5 K", "no light 'moon'"),
+        ],
+    ),
+    "a wrong light hides no other": (
+        FIRST + "[look.constraints.light]\nsun = { off = true }\nmoon = { off = true }\n",
+        ["no light 'sun'", "no light 'moon'"],
+    ),
+    "a missing file hides none, and no name": (
+        HEAD + '[[look]]\npainting = "gone.exr"\nmask = "m.png"\nname = "a/b"\nview = "acres"\n',
+        ["painting: no such file", "mask: no such file", "'a/b' is no name", "acres"],
+    ),
+    "defaults with a mistake hide no look's, and are told once": (
+        HEAD + "exposre = 1\n[defaults.settings]\nholds = 1\n"
+        '[[look]]\npainting = "p0.exr"\npaint = "oil"\n' + LOOK + 'name = "summary.csv"\n',
+        ["'exposre'", "defaults, settings: unknown key 'holds'", "paint is 'oil'", "summary.csv"],
+    ),
+    "what a misspelt key stands for is not missing": (
+        '[defaults]\nbasiss = "b.basis.exr"\n[[look]]\npaintng = "p0.exr"\n'
+        '[[sequence]]\nname = "s"\nthrogh = ["a", "b"]\nframes = 2\n',
+        ["mean 'basis'", "mean 'painting'", "mean 'through'"],
+    ),
+    "a sequence through a look with mistakes, and through nobody": (
+        FIRST
+        + 'masc = 1\n[[look]]\nname = "two"\npainting = "p1.exr"\n'
+        + '[[sequence]]\nname = "s"\nthrough = ["one", "two", "x"]\nframes = 1\nspace = "rgb"\n',
+        ["'masc'", "no look is called 'x'", "frames is 1", "space is 'rgb'"],
+    ),
+    "a render that is not wanted, of unknown words": (
+        FIRST + "[look.render]\nsamples = 4\nspp = 1\n",
+        ["does not have 'render'", "unknown key 'samples'", "spp is 1"],
+    ),
+    "a path of one sensor through a basis": (
+        SEQUENCE + 'through = ["one"]\nsensors = ["a"]\n',
+        ["sensors has one", "of no scene"],
+    ),
+    "a path of other frames through a basis": (
+        SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\nframes = 3\n',
+        ["3 frames of 2 sensors", "of no scene"],
     ),
 }
 
@@ -202,6 +247,40 @@ def test_it_is_one_line_and_nothing_is_done(here: Path, name: str) -> None:
     assert line.startswith("lightpaint batch: looks.toml")
     for words in said:
         assert words in line
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+def test_several_mistakes_are_told_at_once_and_no_others(here: Path, name: str) -> None:
+    text, said = SEVERAL[name]
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    done = run(here, "batch", "looks.toml", "-o", "out")
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    for words in said:
+        assert any(words in line for line in lines), done.stderr
+    assert len(lines) == len(said), done.stderr
+    assert not (here / "out").exists()
+
+
+def test_a_wrong_sensor_is_told_beside_other_mistakes(tmp_path: Path) -> None:
+    room, batch = write_room(tmp_path), tmp_path / "sensors"
+    batch.mkdir()
+    (batch / "p.exr").write_bytes(b"")
+    (batch / "looks.toml").write_text(
+        f"[defaults]\nscene = {json.dumps(str(room))}\n"
+        '[[look]]\nname = "a"\npainting = "p.exr"\nsensors = ["east", "west"]\nmasc = 1\n'
+        "[look.constraints.light.comet]\noff = true\n"
+        '[[look]]\nname = "b"\npainting = "gone.exr"\nsensor = "north"\n'
+        'constraints.light.moon.off = true\nsettings.resolution = "0x4"\n'
+    )
+    lines = run(batch, "batch", "looks.toml", "-o", "out").stderr.splitlines()
+    expected = (
+        *("look 'a': unknown key 'masc'", "east", "west", "no light 'comet'"),
+        *("look 'b': painting: no such file", "north", "no light 'moon'", "reduced to 0x4"),
+    )
+    for words in expected:
+        assert any(words in line for line in lines), lines
+    assert len(lines) == len(expected), lines
 
 
 def test_all_mistakes_are_told_at_once(here: Path) -> None:
