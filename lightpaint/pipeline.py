@@ -5,6 +5,7 @@ from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache_folder import folder
 from lightpaint.basis.clean import MOST, clean_planes
 from lightpaint.basis.render.obtain import Render, obtain_basis
 from lightpaint.basis.render.render import render_basis, samples_for
@@ -117,7 +118,7 @@ def obtain(
     )
     if settings.use_cache and not cache.is_kept(basis):
         listen.say(
-            f"the basis could not be kept in {cache.folder()}, so the next run renders it again: "
+            f"the basis could not be kept in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
     elif settings.use_cache and is_rendered:

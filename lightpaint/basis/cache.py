@@ -2,13 +2,10 @@
 
 One file per scene content, sensor, size and seed; more samples are added to it when asked for.
 Beside it lies, under its name with another ending, what was made of it or is known of its scene.
-The folder is the user's cache folder, or what LIGHTPAINT_CACHE names, and may be deleted at any
-time.
+The folder (`cache_folder.py`) may be deleted at any time.
 """
 
 import hashlib
-import os
-import re
 import shutil
 import time
 from collections.abc import Iterable
@@ -17,18 +14,21 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from platformdirs import user_cache_path
-
 from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.cache_folder import (
+    BASIS_NAME,
+    COMPANION_NAME,
+    LEFTOVER_NAME,
+    SUFFIX,
+    claim,
+    folder,
+    is_own,
+)
 from lightpaint.basis.file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 
 #: Bytes above which the bases that were not used for longest are deleted.
 LARGEST = 8 * 2**30
-SUFFIX = ".basis.exr"
-#: Endings of what is put beside: pictures made of a basis, what is known of its scene.
-CLEAN, KNOWN = ".clean.npz", ".known.json"
-_COMPANION = re.compile(r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json)")
 #: Seconds after which an unfinished file belongs to nobody.
 LEFTOVER_S = 3600.0
 #: And after which what was made of a basis that is not kept here is made again if need be.
@@ -50,24 +50,16 @@ class Entry:
     lights: int | None = None
 
 
-def folder() -> Path:
-    """Where bases are kept."""
-    named = os.environ.get("LIGHTPAINT_CACHE")
-    return Path(named) if named else user_cache_path("lightpaint") / "bases"
-
-
 def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Basis | None:
-    """The basis kept for that, or None. A damaged one is deleted and not spoken of."""
+    """The basis kept for that, or None: also of a damaged one, whose place the next one takes."""
     path = _path(scene_identity, sensor, seed, size)
-    if not path.is_file():
+    if not is_own(path):
         return None
     try:
         basis = read_basis(path)
         if path != _path_of(basis):
             raise BasisError(f"{path} is the basis of something else")
     except LightpaintError:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
         return None
     with suppress(OSError):  # a cache that can only be read
         path.touch()
@@ -77,7 +69,7 @@ def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> 
 def spp_of(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
     """Samples per pixel of the basis kept for that; 0 if there is none."""
     path = _path(scene_identity, sensor, seed, size)
-    kept = _entry(path).origin if path.is_file() else None
+    kept = _entry(path).origin if is_own(path) else None
     return 0 if kept is None else kept.spp
 
 
@@ -105,8 +97,9 @@ def keep(basis: Basis) -> bool:
 
     Returns whether that worked: a full disk is no reason to lose a render.
     """
-    path = _path_of(basis)
     try:
+        path = _path_of(basis)
+        claim()
         write_basis(path, basis)
         _prune(path)
     except (OutputError, OSError):
@@ -117,7 +110,7 @@ def keep(basis: Basis) -> bool:
 def kept_at(basis: Basis) -> Path | None:
     """The file in which just `basis` is kept; None where it is not, or has more samples there."""
     path = _path_of(basis)
-    return path if path.is_file() and _entry(path).origin == basis.origin else None
+    return path if is_own(path) and _entry(path).origin == basis.origin else None
 
 
 def place_beside(basis: Basis, ending: str) -> Path:
@@ -149,24 +142,22 @@ def sweep(unused_s: float = 0.0) -> int:
 
 def _companions() -> list[tuple[Path, str]]:
     """What was put beside bases, and the name that each basis has before its ending."""
-    found = ((path, _COMPANION.fullmatch(path.name)) for path in folder().glob("*"))
-    return [(path, match[1]) for path, match in found if match is not None]
+    found = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
+    return [(path, match[1]) for path, match in found if match is not None and is_own(path)]
 
 
 def is_kept(basis: Basis) -> bool:
     """Whether `basis` is kept, with all its samples, or one of the same with more."""
     path = _path_of(basis)
-    kept = _entry(path).origin if path.is_file() else None
+    kept = _entry(path).origin if is_own(path) else None
     return kept is not None and (kept == basis.origin or kept.spp > basis.origin.spp)
 
 
 def _prune(path: Path) -> None:
     """Bring the folder back under LARGEST, and keep `path`."""
-    for leftover in (
-        path for end in (SUFFIX, CLEAN, KNOWN) for path in folder().glob(f".*{end}.*")
-    ):
+    for leftover in folder().glob(".*"):
         # What a killed process was writing.
-        if time.time() - leftover.stat().st_mtime > LEFTOVER_S:
+        if _is_leftover(leftover) and time.time() - leftover.stat().st_mtime > LEFTOVER_S:
             shutil.rmtree(leftover, ignore_errors=True)
     sweep(UNUSED_S)
     rest = LARGEST - _entry(path).size
@@ -179,10 +170,18 @@ def _prune(path: Path) -> None:
                 gone.unlink(missing_ok=True)
 
 
+def _is_leftover(path: Path) -> bool:
+    """Whether it is a folder in which just one file of the cache was being written."""
+    name = LEFTOVER_NAME.fullmatch(path.name)
+    if name is None or not path.is_dir() or path.is_symlink():
+        return False
+    return {inside.name for inside in path.iterdir()} <= {name[1]}
+
+
 def entries() -> list[Entry]:
     """What is kept, the longest unused first."""
-    there = (path for path in folder().glob(f"*{SUFFIX}") if path.is_file())
-    files = sorted(there, key=lambda path: path.stat().st_mtime)
+    there = [path for path in folder().glob(f"*{SUFFIX}") if BASIS_NAME.fullmatch(path.name)]
+    files = sorted(filter(is_own, there), key=lambda path: path.stat().st_mtime)
     return [_entry(path) for path in files]
 
 

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.cache_folder import CLEAN, is_own
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoise import denoised, how_denoised, is_there
@@ -153,8 +154,10 @@ def clean_plane(basis: Basis, k: int) -> tuple[Halves, float]:
 
 def kept_planes(basis: Basis) -> CleanPlanes | None:
     """Those that are kept of just these pixels; None for none, and for what is damaged."""
-    path = cache.place_beside(basis, cache.CLEAN)
-    with suppress(*_DAMAGES):
+    with suppress(*_DAMAGES, LightpaintError):
+        path = cache.place_beside(basis, CLEAN)
+        if not is_own(path):
+            return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
             if str(kept["made_of"]) != _made_of(basis):
                 return None
@@ -170,8 +173,8 @@ def kept_planes(basis: Basis) -> CleanPlanes | None:
 
 def keep_planes(basis: Basis, planes: CleanPlanes) -> bool:
     """Keep what was made of `basis`. Returns whether that worked: nothing is lost if not."""
-    path = cache.place_beside(basis, cache.CLEAN)
     try:
+        path = cache.place_beside(basis, CLEAN)
         with replacing(path) as place, place.open("wb") as file:
             made_of = np.array(_made_of(basis))
             parts: dict[str, Any] = {name: getattr(planes, name) for name in PARTS}

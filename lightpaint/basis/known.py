@@ -23,6 +23,7 @@ from typing import Any
 
 from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.basis.cache_folder import KNOWN, folder, is_own
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
 from lightpaint.records import read_record, strict_json
@@ -78,7 +79,9 @@ def recall(key: str) -> Known | None:
     if "mitsuba" in sys.modules:  # where somebody else may have told it to look for files
         return None
     with suppress(OSError, LightpaintError, LookupError, TypeError, ValueError):
-        for file in bases.folder().glob(f"*.{key}{bases.KNOWN}"):
+        for file in folder().glob(f"*.{key}{KNOWN}"):
+            if not is_own(file):
+                continue
             said = strict_json(file.read_text("utf-8"))
             if said["format"] == FORMAT and _is_as_it_was(said["places"], said["texts"]):
                 its = {**said["known"], "asked": Asked(**said["known"]["asked"])}
@@ -128,7 +131,7 @@ def remember(
         text = json.dumps(said, allow_nan=False)
         if strict_json(text)["known"]["asked"] != asdict(known.asked):
             return False  # TOML knows values that JSON does not
-        write_text(bases.place_beside(basis, f".{key}{bases.KNOWN}"), text)
+        write_text(bases.place_beside(basis, f".{key}{KNOWN}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):
         return False
     return True

@@ -1,6 +1,7 @@
 """Parts of a basis that are rendered and not yet added up, on the disk: no kill costs them."""
 
 import hashlib
+import re
 import shutil
 import tempfile
 import time
@@ -13,16 +14,19 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache_folder import PARTS, folder, is_believed
 from lightpaint.basis.render.parts import Part
-from lightpaint.errors import BasisError
+from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line
 from lightpaint.scene.scene import Scene
 from lightpaint.version import __version__
 
 #: Seconds after which nobody will go on with the parts of a basis.
 LEFTOVER_S = 7 * 86_400.0
+
+#: What the folder of the parts of one basis is called.
+_NAME = re.compile("[0-9a-f]{32}")
 
 
 class Spool:
@@ -34,11 +38,13 @@ class Spool:
         begun = None if start is None else start.origin
         what = (__version__, scene.identity, scene.sensor, seed, scene.size, begun, list(parts))
         name = hashlib.sha256(repr(what).encode()).hexdigest()[:32]
-        self.folder = cache.folder() / "parts" / name
-        self._delete_leftovers()
         try:
+            self.folder = folder() / PARTS / name
+            self._delete_leftovers()
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
+            if not is_believed(self.folder.stat()):
+                raise PermissionError(f"{self.folder} is somebody else's")
+        except (OSError, OutputError):
             self.folder = Path(tempfile.mkdtemp(prefix="lightpaint-"))
 
     @property
@@ -79,10 +85,12 @@ class Spool:
         return self.folder / f"{part.half}-{part.top}-{part.first}{light}.npz"
 
     def _delete_leftovers(self) -> None:
-        for folder in self.folder.parent.glob("*"):
+        for other in self.folder.parent.glob("*"):
+            if _NAME.fullmatch(other.name) is None:
+                continue
             with suppress(OSError):
-                if time.time() - folder.stat().st_mtime > LEFTOVER_S:
-                    shutil.rmtree(folder, ignore_errors=True)
+                if time.time() - other.stat().st_mtime > LEFTOVER_S:
+                    shutil.rmtree(other, ignore_errors=True)
 
 
 def read_lesson(file: str) -> Floats:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lightpaint.basis import cache as bases
+from lightpaint.basis.cache_folder import folder
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.manner import Outcome
@@ -16,12 +17,10 @@ def cache(*, action: str, names: Sequence[str]) -> Outcome:
     if action != "drop" and names:
         raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
     if action == "list":
-        kept, about = bases.entries(), {"folder": str(bases.folder()), "largest": bases.LARGEST}
+        kept, about = bases.entries(), {"folder": str(folder()), "largest": bases.LARGEST}
         tables.show_kept(kept)
         size = sum(entry.size for entry in kept) / 1e6
-        terminal.write(
-            f"kept in {bases.folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB"
-        )
+        terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB")
         listed = [documents.kept_document(entry) for entry in reversed(kept)]
         return Outcome(lambda: {**about, "kept": listed})
     dropped = bases.entries() if action == "clear" else _kept_by_names(names)
@@ -30,9 +29,9 @@ def cache(*, action: str, names: Sequence[str]) -> Outcome:
         freed += bases.sweep()
     if action == "drop":
         tables.show_kept(dropped)
-    terminal.write(f"{len(dropped)} deleted from {bases.folder()}: {freed / 1e6:.1f} MB are free")
+    terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")
     gone = [documents.kept_document(entry) for entry in dropped]
-    return Outcome(lambda: {"folder": str(bases.folder()), "dropped": gone, "freed": freed})
+    return Outcome(lambda: {"folder": str(folder()), "dropped": gone, "freed": freed})
 
 
 def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
@@ -46,7 +45,7 @@ def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
         if not (its := bases.named(name)):
             scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
             there = some_names(sorted(scenes)) or "none"
-            raise BasisError(f"no basis of {name!r} is kept in {bases.folder()}: it has {there}")
+            raise BasisError(f"no basis of {name!r} is kept in {folder()}: it has {there}")
         found |= {entry.path: entry for entry in its}
     return list(found.values())
 

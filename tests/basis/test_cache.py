@@ -11,16 +11,20 @@ import pytest
 from command import run
 from renderer import LIGHTS, same_basis, write_room
 
-from lightpaint.basis import cache
+from lightpaint.basis import cache, cache_folder
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis
+from lightpaint.basis.cache_folder import SUFFIX, TAG
+from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import is_on_the_way
-from lightpaint.errors import LightpaintError, SceneError
+from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.settings import Settings
+
+#: What one is called that no program has written to its end.
+DAMAGED = "da" * 16
 
 
 @pytest.fixture(autouse=True)
@@ -226,17 +230,18 @@ def test_bases_are_dropped_by_scene_or_file(
         basis = make_basis(2)
         origin = replace(basis.origin, scene=scene, scene_identity=identity)
         assert cache.keep(replace(basis, origin=origin))
-    (empty_cache / f"damaged{cache.SUFFIX}").write_bytes(b"junk")
+    whole = next(empty_cache.glob(f"*{SUFFIX}")).read_bytes()
+    (empty_cache / f"{DAMAGED}{SUFFIX}").write_bytes(whole[: whole.index(b"lightpaint-basis") + 20])
 
     def scenes(pattern: str) -> list[str]:
         return sorted(x.origin.scene if x.origin else "?" for x in cache.named(pattern))
 
     assert scenes("hall.xml") == scenes("hall") == scenes("h*") == ["hall.xml"] * 2
     assert scenes("*.xml") == ["hall.xml"] * 2 + ["room.xml"]
-    assert scenes("damaged") == scenes("dam*") == ["?"]
+    assert scenes(DAMAGED) == scenes("da*") == ["?"]
     assert scenes("hal") == scenes("") == []
     [file] = {entry.path.name for entry in cache.named("room")}
-    assert scenes(file) == scenes(file.removesuffix(cache.SUFFIX)) == ["room.xml"]
+    assert scenes(file) == scenes(file.removesuffix(SUFFIX)) == ["room.xml"]
     here = {"LIGHTPAINT_CACHE": str(empty_cache)}
     size = sum(entry.size for entry in cache.named("hall"))
     done = run(tmp_path, "cache", "drop", "hall", "h*", **here)
@@ -260,3 +265,104 @@ def test_bases_are_dropped_by_scene_or_file(
     assert "of at most 8590 MB" in run(tmp_path, "cache", **here).stdout
     assert run(tmp_path, "cache", "clear", **here).stdout.startswith("2 deleted")
     assert cache.entries() == []
+
+
+def bases_of(make_basis: Any, *scenes: str) -> None:
+    for k, scene in enumerate(scenes):
+        basis = make_basis(2)
+        origin = replace(basis.origin, scene=scene, scene_identity=f"{k:032x}")
+        assert cache.keep(replace(basis, origin=origin))
+
+
+def test_a_folder_with_other_files_is_no_cache(
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing in a folder of work is listed, deleted or written, whatever it is called."""
+    work = tmp_path / "work"
+    work.mkdir()
+    write_basis(work / "evening.basis.exr", make_basis(2))
+    write_basis(work / f"{'0f' * 16}.basis.exr", make_basis(2))
+    (work / f"{'0f' * 16}.clean.npz").write_bytes(b"mine")
+    (work / "parts" / "wheel").mkdir(parents=True)
+    os.utime(work / "parts" / "wheel", (0, 0))
+    before = sorted(work.rglob("*"))
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(work))
+    for line in (["clear"], ["list"], ["drop", "*"]):
+        done = run(tmp_path, "cache", *line, LIGHTPAINT_CACHE=str(work))
+        assert done.returncode == 2
+        [line_] = done.stderr.splitlines()
+        assert f"LIGHTPAINT_CACHE names {work}, which has other files in it" in line_
+        assert "evening.basis.exr" in line_
+    assert not cache.keep(make_basis(2))
+    with pytest.raises(OutputError, match="name a folder that is new or empty"):
+        cache.find("0", "sensor", 0, (4, 4))
+    assert sorted(work.rglob("*")) == before
+
+
+def test_only_our_own_files_are_deleted(empty_cache: Path, make_basis: Any) -> None:
+    """Also of a folder that is ours: by name, and by what is inside."""
+    bases_of(make_basis, "hall.xml")
+    [kept] = empty_cache.glob("*.basis.exr")
+    others = {
+        empty_cache / "evening.basis.exr": kept.read_bytes(),
+        empty_cache / f"{'ab' * 16}.basis.exr": b"not by this program",
+        empty_cache / f"{'ab' * 16}.clean.npz": b"not by this program",
+        empty_cache / ".evening.basis.exr.abcdefgh" / "evening.basis.exr": b"being written",
+        empty_cache / f".{'ab' * 16}.basis.exr.abcdefgh" / "something else": b"mine",
+    }
+    for path, data in others.items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(data)
+        os.utime(path.parent if path.parent != empty_cache else path, (0, 0))
+    leftover = empty_cache / f".{'cd' * 16}.basis.exr.abcdefgh"
+    leftover.mkdir()
+    os.utime(leftover, (0, 0))
+    bases_of(make_basis, "again.xml")  # which prunes
+    assert not leftover.exists()
+    done = run(empty_cache, "cache", "clear", LIGHTPAINT_CACHE=str(empty_cache))
+    assert done.stdout.startswith("1 deleted"), done.stderr
+    assert {path: path.read_bytes() for path in others} == others
+    assert {path.name for path in empty_cache.glob("[!.]*") if path not in others} == {TAG}
+
+
+def test_a_folder_from_before_there_was_a_mark_is_taken_on(
+    empty_cache: Path, make_basis: Any
+) -> None:
+    bases_of(make_basis, "hall.xml")
+    (empty_cache / TAG).unlink()
+    (empty_cache / ".drjit").mkdir()
+    assert [entry.origin.scene for entry in cache.entries() if entry.origin] == ["hall.xml"]
+    bases_of(make_basis, "hall.xml", "room.xml")
+    assert (empty_cache / TAG).read_text().startswith("Signature: 8a477f597d28d172789f06886806bc55")
+    # Once it is ours, what others put there is no reason to lose it.
+    (empty_cache / "notes.txt").write_text("mine")
+    assert len(cache.entries()) == 2
+    # The mark of another program's cache is none of ours.
+    (empty_cache / TAG).write_text("Signature: 8a477f597d28d172789f06886806bc55\n# by another")
+    with pytest.raises(OutputError, match="other files"):
+        cache.entries()
+
+
+def test_what_somebody_else_has_put_there_is_not_believed(
+    empty_cache: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    basis = make_basis(2)
+    asked = (basis.origin.scene_identity, "sensor", 0, basis.size)
+    assert cache.keep(basis)
+    assert cache.find(*asked) is not None
+    [path] = empty_cache.glob("*.basis.exr")
+    its = path.stat().st_uid
+    monkeypatch.setattr(cache_folder, "is_believed", lambda status: status.st_uid != its)
+    assert cache.find(*asked) is None
+    assert cache.entries() == []
+    assert cache.spp_of(*asked) == 0
+    assert cache.any_of(*asked[:2], samples=1, largest=2**30) is None
+
+
+def test_who_is_believed() -> None:
+    """Who runs the program, and who runs the machine."""
+    me = os.geteuid()
+    for owner, believed in ((me, True), (0, True), (me + 1, False)):
+        assert (
+            cache_folder.is_believed(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0]))) == believed
+        )

@@ -209,7 +209,8 @@ def test_a_basis_in_the_place_of_another_is_not_taken(
     other = cache._path("another", *asked[1:])
     kept.rename(other)
     assert cache.find("another", *asked[1:]) is None
-    (tmp_path / "gone.basis.exr").symlink_to("nowhere")
+    other.unlink()
+    (tmp_path / f"{'0a' * 16}.basis.exr").symlink_to("nowhere")
     assert cache.entries() == []
 
 

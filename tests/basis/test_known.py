@@ -9,10 +9,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
-from lightpaint.basis import cache, known
+from lightpaint.basis import cache, cache_folder, known
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.known import Known, key_of, recall, remember
 from lightpaint.basis.render.render import basis_lights
@@ -83,7 +84,7 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
     assert entry.size > entry.path.stat().st_size
     cache.drop([entry])
     assert recall(key) is None
-    assert list(cache.folder().iterdir()) == []
+    assert [x.name for x in cache_folder.folder().iterdir()] == [cache_folder.TAG]
 
 
 def same_bytes(path: Path) -> None:
@@ -168,7 +169,7 @@ def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
     scene = load_scene(folder / "hall.xml")
     key, later_s = asking(folder), time.time() + LATER_S
     assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
-    [path] = cache.folder().glob("*.known.json")
+    [path] = cache_folder.folder().glob("*.known.json")
     text = path.read_text("utf-8")
     for damage in ("", "[]", text[:-9], text.replace('"spp"', '"ssp"'), text.replace("lamp", "[")):
         path.write_text(damage, "utf-8")
@@ -178,11 +179,13 @@ def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
 def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> None:
     place = tmp_path / "cache"
     place.mkdir()
+    (place / cache_folder.TAG).write_text(cache_folder.TAG_TEXT)
     alone = place / f"{'0a' * 16}.clean.npz"
     mine = place / "notes.clean.npz"
     for path in (alone, mine):
-        path.write_bytes(b"data")
+        np.savez(path, made_of=np.array("0"))
+    size = alone.stat().st_size
     assert cache.sweep(3600) == 0
-    assert cache.sweep() == 4
+    assert cache.sweep() == size
     assert not alone.exists()
     assert mine.exists()

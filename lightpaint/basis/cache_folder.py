@@ -1,0 +1,116 @@
+"""The folder that bases are kept in, and which of its files are this program's own.
+
+Nothing is listed, believed or deleted there but files that have names of our own kind, the mark of
+our own formats inside, and an owner who may be believed: who names a folder of work as the cache
+loses nothing in it.
+"""
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from lightpaint.errors import OutputError
+from lightpaint.files import write_text
+from lightpaint.screen import some_names
+
+#: Names the folder, where it is not that of the user's cache.
+VARIABLE = "LIGHTPAINT_CACHE"
+
+#: Ending of a basis; of what is put beside: pictures made of one, what is known of its scene.
+SUFFIX, CLEAN, KNOWN = ".basis.exr", ".clean.npz", ".known.json"
+#: Folder of the parts of bases that are being rendered.
+PARTS = "parts"
+
+BASIS_NAME = re.compile(r"[0-9a-f]{32}\.basis\.exr")
+COMPANION_NAME = re.compile(r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json)")
+#: Of a file that is being written, as `files.replacing` calls its folder.
+LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
+
+#: The file that says what a folder is, by the convention for cache directories, which programs for
+#: backups know: https://bford.info/cachedir
+TAG = "CACHEDIR.TAG"
+TAG_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
+# This file is a cache directory tag created by lightpaint, which keeps rendered bases here.
+# All of this folder may be deleted at any time.
+"""
+
+#: What stands at or near the beginning of each kind of file, and how far in at most, in bytes.
+MARKS = {SUFFIX: b"lightpaint-basis", CLEAN: b"made_of.npy", KNOWN: b'"lightpaint-known'}
+MARK_WITHIN = {SUFFIX: 2**20, CLEAN: 2**8, KNOWN: 2**8}
+
+#: Other files that are named of a folder that is none of ours, and looked at before it is one.
+NAMED, LOOKED_AT = 3, 100_000
+
+
+def folder() -> Path:
+    """Return where bases are kept.
+
+    Raises OutputError for a folder that LIGHTPAINT_CACHE names and that has other files in it, not
+    having been made, or begun, for this.
+    """
+    named = os.environ.get(VARIABLE)
+    if not named:
+        return user_cache_path("lightpaint") / "bases"
+    path = Path(named)
+    if others := _others(path):
+        raise OutputError(
+            f"{VARIABLE} names {path}, which has other files in it ({some_names(others)}): name a "
+            "folder that is new or empty, where bases may be kept and deleted"
+        )
+    return path
+
+
+def claim() -> None:
+    """Mark the folder as one of ours, where it is not yet. Raises OutputError."""
+    tag = folder() / TAG
+    if not tag.exists():
+        write_text(tag, TAG_TEXT)
+
+
+def is_own(path: Path) -> bool:
+    """Return whether the file at `path` was written by this program, and by somebody to believe."""
+    ending = next((end for end in MARKS if path.name.endswith(end)), None)
+    if ending is None:
+        return False
+    try:
+        # What belongs to somebody else may be a link, or a pipe that never ends.
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as f:
+            its = os.fstat(f.fileno())
+            return is_believed(its) and MARKS[ending] in f.read(MARK_WITHIN[ending])
+    except OSError:
+        return False
+
+
+def is_believed(its: os.stat_result) -> bool:
+    """Return whether a file or folder belongs to who runs this, or to who runs the machine."""
+    return not hasattr(os, "geteuid") or its.st_uid in (os.geteuid(), 0)
+
+
+def _others(path: Path) -> list[str]:
+    """Some names in the folder that are not of our kinds; none if it is ours, new or hidden."""
+    with suppress(OSError):
+        if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
+            return []
+    found: list[str] = []
+    with suppress(OSError):
+        for name in _names(path):
+            if not (name.startswith(".") or _is_own_name(name)):
+                found.append(name)
+            if len(found) == NAMED:
+                break
+    return found
+
+
+def _is_own_name(name: str) -> bool:
+    kinds = (BASIS_NAME, COMPANION_NAME)
+    return name in (PARTS, TAG) or any(kind.fullmatch(name) for kind in kinds)
+
+
+def _names(path: Path) -> Iterator[str]:
+    with os.scandir(path) as entries:
+        for entry, _ in zip(entries, range(LOOKED_AT), strict=False):
+            yield entry.name
