@@ -3,6 +3,7 @@
     pip install '.[test]'
     python benchmarks/painter.py [--cases 12x960x540 64x960x540 ...] [--strokes N] [--minutes M]
     python benchmarks/painter.py --start scenes/gallery/scene.xml [--times N]
+    python benchmarks/painter.py --answers
 
 A basis of soft lights that is made up, the painter's own server, and headless Chromium that
 renders in software. A pointer is moved 60 times a second over the picture. For every answer that
@@ -12,6 +13,9 @@ waiting for it. With --minutes, how the memory of page and server grows while so
 
 With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
 with what that has kept, from the start of its process. The browser is open already.
+
+With --answers, how long a small answer over a connection that is kept takes, beside what it takes
+where the system may wait for more before it sends (Nagle).
 """
 
 import argparse
@@ -22,13 +26,16 @@ import os
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 from contextlib import suppress
 from functools import partial
+from http.client import HTTPConnection
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -92,7 +99,11 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.0)
     parser.add_argument("--start", metavar="SCENE")
     parser.add_argument("--times", type=int, default=5)
+    parser.add_argument("--answers", action="store_true")
     options = parser.parse_args()
+    if options.answers:
+        print_answers()
+        return
     if options.start:
         print_starts(options.start, options.times)
         return
@@ -227,9 +238,7 @@ class Opened:
         path = shutil.which("chromium")
         self.browser = self.playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         self.page: Page = self.browser.new_page(viewport={"width": 1600, "height": 900})
-        self.page.goto(self.url)
-        if self.view:
-            self.page.goto(f"{self.page.url.partition('?')[0]}?view={self.view}")
+        self.page.goto(self.url.replace("#", f"?view={self.view}#" if self.view else "#"))
         self.page.wait_for_function(
             "() => document.getElementById('lightpaint').painter?.engine.work.isReady",
             timeout=120_000,
@@ -309,6 +318,48 @@ STAGES = {
     "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.work;"
     " return !loader.missing().length && !loader.onTheWay.size; }",
 }
+
+
+def print_answers(count: int = 50) -> None:
+    """Medians over one connection that is kept, and their ratio."""
+    with tempfile.TemporaryDirectory() as folder:
+        subject = Subject("made up", Path(folder), basis=made_up(2, 16, 16))
+        studio = Studio([subject], partial(Store.open, Path(folder) / "made_up.lightpaint"))
+        server = Server(studio, port=0)
+        serving = Thread(target=server.run, daemon=True)
+        serving.start()
+        studio.start()
+        asking = HTTPConnection("127.0.0.1", server.port)
+        token = server.url.partition("token=")[2]
+        key = answer_of(asking, "/key", token).decode()
+        medians = []
+        for at_once in (1, 0):
+            assert server._serving is not None
+            for connection in server._serving.server_state.connections:
+                accepted = connection.transport.get_extra_info("socket")
+                accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, at_once)
+            times = []
+            for _ in range(count):
+                begin = time.perf_counter()
+                answer_of(asking, "/data/present", key)
+                times.append(1e3 * (time.perf_counter() - begin))
+            medians.append(float(np.median(times)))
+        print(f"an answer over a connection that is kept, at once     {medians[0]:8.2f} ms")
+        print(f"                         where the system may wait     {medians[1]:8.2f} ms")
+        print(
+            f"                                             ratio     {medians[1] / medians[0]:8.1f}"
+        )
+        asking.close()
+        server.stop()
+        serving.join()
+        server.close()
+        studio.close()
+
+
+def answer_of(asking: HTTPConnection, path: str, key: str) -> bytes:
+    """What is answered to whoever shows a key or a token."""
+    asking.request("GET", path, headers={"Authorization": f"Bearer {key}"})
+    return asking.getresponse().read()
 
 
 def print_starts(scene: str, times: int) -> None:

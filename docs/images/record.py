@@ -182,7 +182,7 @@ def painter(scene: str, spp: int, port: int, *more: str) -> Iterator[str]:
         server = subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         assert server.stdout is not None
         try:
-            yield next(word for line in server.stdout for word in line.split() if "?token=" in word)
+            yield next(word for line in server.stdout for word in line.split() if "#token=" in word)
         finally:
             server.terminate()
             server.wait(60)

@@ -222,8 +222,8 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--host",
         metavar="ADDRESS",
-        help="let others reach the page, by this address of the machine: whoever has its token can "
-        "paint (default: nobody but this machine)",
+        help="listen at this address of the machine, or at all of them (0.0.0.0), so that others "
+        "can reach the page: whoever has its token can paint (default: nobody but this machine)",
     )
     parser.add_argument(
         "--no-browser",

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from lightpaint.cli.manner import Outcome, manner
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint.address import Reach
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
@@ -19,11 +21,18 @@ if TYPE_CHECKING:
     from lightpaint.paint.server import Server
     from lightpaint.paint.wishes import Wishes
 
-#: Said of a --host.
-OPEN = (
-    "others can reach the painter at {host}: whoever has its address, with the token, can paint "
-    "here and have results written to {folder}; what is sent can be read on the way"
+#: What it means that others can.
+RISK = (
+    "whoever has its address, with the token, can paint here and have results written to {folder}, "
+    "and what is sent can be read on the way"
 )
+
+#: Who can reach the painter, said where an address was chosen.
+REACH = {
+    Reach.MACHINE: "programs of this machine, and nobody else, can reach the painter at {name}",
+    Reach.ADDRESS: "other machines can reach the painter at {name}; " + RISK,
+    Reach.ALL: "other machines can reach the painter at every address of this one; " + RISK,
+}
 
 
 def paint(
@@ -71,7 +80,9 @@ def paint(
     def opened(server: "Server") -> None:
         addresses.append(server.url)
         if host is not None:
-            terminal.complain("paint", OPEN.format(host=host, folder=folder))
+            about = REACH[server.address.reach].format(name=server.address.name, folder=folder)
+            is_open = server.address.reach is not Reach.MACHINE
+            (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
         said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
         (lines.err if manner().as_json else terminal.write)(said)
         if with_browser and _has_browser():

@@ -1,21 +1,23 @@
 """Who may speak to the painter's server: a page that came from this launch, and nobody else.
 
 Any page that is open in a browser can send requests to servers of the same machine, by whatever
-name it likes. So the name that a request calls this server by is looked at (a foreign name that
-leads here is an attack), what page it comes from, and a cookie that only this launch gives, to
-those who know its token.
+name it likes. So the guard looks at the name that a request calls this server by (a foreign name
+that leads here is an attack), and at what page the request comes from. And it wants a key.
 
-The token is exchanged by a page that loads the next by itself, and not by a redirect: the cookie is
-SameSite=Strict, and would not come along where a link on another page had led here.
+A browser attaches nothing by itself that opens anything: it sends a cookie to every port of a name,
+and so to every other server of the machine. The page has the launch token in the fragment of its
+address, which browsers send to nobody; it exchanges the token for the key, keeps that for its tab,
+and shows it in a header of what it fetches and in a subprotocol of its socket. What is loaded
+without a header is the page itself, which is the same for everybody.
 """
 
 import ipaddress
 import secrets
-import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import Any
-from urllib.parse import parse_qs
+
+from lightpaint.paint.address import LOOPBACK, Address, Reach
 
 #: What a browser is told of all that comes from here.
 POLICY = {
@@ -29,19 +31,19 @@ POLICY = {
     "frame-ancestors": "'none'",
 }
 
-#: Names of the machine itself.
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-
 #: Seconds in which a browser has to use the token that it was started with. Others who work on the
 #: machine can read that, as they can all command lines; it is good once.
 SOON_S = 120.0
 
-#: Said to who has no cookie, and to who has that of an earlier server.
+#: Where a page exchanges its token for the key, and asks whether its key is known.
+KEY_PATH = "/key"
+
+#: The protocol of a page's socket, and what its key stands behind in another one.
+PROTOCOL, KEY_PROTOCOL = "lightpaint", "lightpaint-key."
+
+#: Said to who shows no key, and to who shows that of an earlier server.
 UNKNOWN = "open the painter by the address that its terminal shows, which has a token"
 EARLIER = f"this page is of an earlier start of the painter: {UNKNOWN}"
-
-_AGAIN = b"""<!doctype html><html lang="en"><meta charset="utf-8"><title>lightpaint</title>
-<meta http-equiv="refresh" content="0; url=/"><p><a href="/">Open the painter</a></p></html>"""
 
 Scope = dict[str, Any]
 Receive = Callable[[], Any]
@@ -52,19 +54,21 @@ App = Callable[[Scope, Receive, Send], Any]
 class Guard:
     """Lets through to `app` what comes from a page of this launch, and answers all else itself.
 
-    port: by which the cookie is named, since browsers tell no ports apart. host: that was asked
-    for, if another than the loopback; then the machine's own names and addresses are right, too.
+    public: paths of the page's own files, which are for everybody who calls the server by its name.
+    address: where it listens. Where others are let in, the machine's own names and all addresses
+    are right names, too.
+
+    Attributes:
+        token: Opens pages for as long as the server runs, as often as somebody likes.
     """
 
-    def __init__(self, app: App, *, port: int, host: str | None = None) -> None:
-        self.app, self.port, self.is_open = app, port, host is not None
-        self.token, self._secret = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
-        self.cookie = f"lightpaint_{port}"
-        self._names = {*LOOPBACK, *(() if host is None else _names_of(host))}
+    def __init__(self, app: App, *, address: Address, public: Container[str] = ()) -> None:
+        self.app, self.public, self._address = app, public, address
+        self.token, self._key = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
         self._once: dict[str, float] = {}
 
     def once(self) -> str:
-        """A token that is good once, and soon."""
+        """Return a token that is good once, and soon."""
         token = secrets.token_urlsafe(24)
         self._once[token] = time.monotonic() + SOON_S
         return token
@@ -73,7 +77,7 @@ class Guard:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
         elif scope["type"] == "websocket":
-            if self._refusal(scope, is_socket=True) is None and self._is_known(scope):
+            if self.knows(scope):
                 await self.app(scope, receive, send)
             else:  # which a browser gets as 403
                 await send({"type": "websocket.close", "code": 1008})
@@ -81,16 +85,21 @@ class Guard:
             await _answer(_headed(send, scope), 403, reason)
         elif scope["method"] not in ("GET", "HEAD"):
             await _answer(_headed(send, scope), 405, "only GET is answered here")
-        elif scope["path"] == "/" and self._has_token(scope):
-            said = f"{self.cookie}={self._secret}; HttpOnly; SameSite=Strict; Path=/"
-            more = [(b"set-cookie", said.encode()), (b"content-type", b"text/html; charset=utf-8")]
-            await _answer(_headed(send, scope), 200, _AGAIN, more)
-        elif not self._is_known(scope):
-            # Where somebody was known by an earlier start of it, that is what there is to say.
-            status, reason = (410, EARLIER) if self._secrets(scope) else (403, UNKNOWN)
-            await _answer(_headed(send, scope), status, reason)
-        else:
+        elif scope["path"] == KEY_PATH and self._is_opened(scope):
+            await _answer(_headed(send, scope), 200, self._key)
+        elif scope["path"] in self.public or self.knows(scope):
             await self.app(scope, receive, _headed(send, scope))
+        else:
+            # Who has a key has that of an earlier start.
+            status, reason = (403, UNKNOWN) if _bearer(scope) is None else (410, EARLIER)
+            await _answer(_headed(send, scope), status, reason)
+
+    def knows(self, scope: Scope) -> bool:
+        """Return whether a request shows the key, and comes from a page of this server."""
+        is_socket = scope["type"] == "websocket"
+        given = _offered(scope) if is_socket else _bearer(scope)
+        is_right = given is not None and _same(given, self._key)
+        return is_right and self._refusal(scope, is_socket=is_socket) is None
 
     def _refusal(self, scope: Scope, *, is_socket: bool = False) -> str | None:
         """Why the names in a request are wrong, or None."""
@@ -108,35 +117,20 @@ class Guard:
             name = host
         elif port and not port.isdecimal():
             return False
-        if name.lower() in self._names:
+        if name.lower() in (*LOOPBACK, *self._address.names):
             return True
         # Whoever uses an address has been told of no foreign name that leads here.
-        return self.is_open and _is_address(name.removeprefix("[").removesuffix("]"))
+        is_open = self._address.reach is not Reach.MACHINE
+        return is_open and _is_address(name.removeprefix("[").removesuffix("]"))
 
-    def _is_known(self, scope: Scope) -> bool:
-        return any(_same(secret, self._secret) for secret in self._secrets(scope))
-
-    def _secrets(self, scope: Scope) -> list[str]:
-        """What somebody has been given at this port, by this server or an earlier one."""
-        # Other servers of the machine have theirs here, too, which need not be well formed.
-        pieces = [piece for said in _header(scope, b"cookie") for piece in said.split(";")]
-        named = [piece.strip().partition("=") for piece in pieces]
-        return [value for name, _, value in named if name == self.cookie]
-
-    def _has_token(self, scope: Scope) -> bool:
-        try:
-            given = parse_qs(scope["query_string"].decode("ascii"), max_num_fields=8)
-        except ValueError:
+    def _is_opened(self, scope: Scope) -> bool:
+        """Whether the token of a page is right; a token that is good once is used up by that."""
+        given = _bearer(scope)
+        if given is None or scope["method"] != "GET":
             return False
-        [token, *_] = given.get("token", [""])
-        if _same(token, self.token):
+        if _same(given, self.token):
             return True
-        return self._once.pop(token, 0.0) > time.monotonic()
-
-
-def _names_of(host: str) -> set[str]:
-    shown = f"[{host}]" if ":" in host else host
-    return {shown.lower(), socket.gethostname().lower(), socket.getfqdn().lower()}
+        return self._once.pop(given, 0.0) > time.monotonic()
 
 
 def _is_address(name: str) -> bool:
@@ -153,6 +147,19 @@ def _same(one: str, other: str) -> bool:
 
 def _header(scope: Scope, name: bytes) -> list[str]:
     return [value.decode("latin-1") for key, value in scope["headers"] if key == name]
+
+
+def _bearer(scope: Scope) -> str | None:
+    """What a request shows: a browser sends this header for nobody but the page's own script."""
+    given = [value.partition(" ") for value in _header(scope, b"authorization")]
+    [(scheme, _, shown)] = given if len(given) == 1 else [("", "", "")]
+    return shown if scheme.lower() == "bearer" else None
+
+
+def _offered(scope: Scope) -> str | None:
+    """What a socket shows: a page's script cannot give it headers, but names of protocols."""
+    found = [x for x in scope.get("subprotocols", ()) if x.startswith(KEY_PROTOCOL)]
+    return found[0].removeprefix(KEY_PROTOCOL) if len(found) == 1 else None
 
 
 def _headed(send: Send, scope: Scope) -> Send:
@@ -182,11 +189,11 @@ def _headed(send: Send, scope: Scope) -> Send:
 _UNKEPT = (b"cache-control", b"no-store")
 
 
-async def _answer(
-    send: Send, status: int, said: str | bytes, headers: list[tuple[bytes, bytes]] | None = None
-) -> None:
-    body = said.encode() if isinstance(said, str) else said
-    headers = headers or [(b"content-type", b"text/plain; charset=utf-8")]
-    length = (b"content-length", str(len(body)).encode())
-    await send({"type": "http.response.start", "status": status, "headers": [*headers, length]})
+async def _answer(send: Send, status: int, said: str) -> None:
+    body = said.encode()
+    headers = [
+        (b"content-type", b"text/plain; charset=utf-8"),
+        (b"content-length", str(len(body)).encode()),
+    ]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})

@@ -17,6 +17,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.views import check_same_lights
+from lightpaint.paint.address import Listening, listen
 from lightpaint.paint.database import set_aside
 from lightpaint.paint.keeping import Keeping, check_together, identity_of
 from lightpaint.paint.opening import Opening
@@ -113,7 +114,7 @@ def paint_in_browser(
     """Serve a page that paints these views, until Ctrl-C or the like; all that was done is kept.
 
     opened: called when the page can be opened. new: whether an earlier session is put aside. host,
-    port: as of `Server`. say: hears remarks.
+    port: as of `listen`. say: hears remarks.
 
     Raises PaintError where the session cannot be had, OutputError where what was done last could
     not be written.
@@ -122,13 +123,28 @@ def paint_in_browser(
     folder = subjects[0].folder
     check_writable(folder)
     path = folder / SESSION
+    listening = listen(host, port)  # before anything is written
+    with listening[0]:
+        _paint_at(listening, subjects, opened, path, new=new, say=say)
+
+
+def _paint_at(
+    listening: Listening,
+    subjects: Sequence[Subject],
+    opened: Callable[[Server], None],
+    path: Path,
+    *,
+    new: bool,
+    say: Callable[[str], None],
+) -> None:
+    """Serve the session of a file, which is made where there is none."""
     if new and (aside := set_aside(path)) is not None:
         say(f"the earlier session is kept as {aside}")
     keeping = Keeping(subjects, path, say)
     studio = Studio(subjects, keeping.opened)
     studio.on_unsaved = say
     try:
-        server = Server(studio, keeping.store, host=host, port=port, say=say)
+        server = Server(studio, keeping.store, listening=listening, say=say)
         keeping.server = server
         try:
             studio.on_failure = partial(_failed, server)

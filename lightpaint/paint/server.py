@@ -4,16 +4,16 @@ It knows nothing of light. The page is a table of files; pictures are raw bytes 
 generation; all else goes over one WebSocket. `guard.py` says who may ask.
 """
 
-import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
+from lightpaint.paint.address import Listening, listen
 from lightpaint.paint.client import Client
 from lightpaint.paint.frames import MAX_FRAME
-from lightpaint.paint.guard import App, Guard
+from lightpaint.paint.guard import PROTOCOL, App, Guard
 from lightpaint.paint.line import Line, Painted, pictured
 from lightpaint.paint.page_files import PageFile, page_files
 from lightpaint.paint.store import Store
@@ -23,10 +23,6 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
     from starlette.websockets import WebSocket
-
-#: Where it listens unless somebody says otherwise or another does already: at one place, so that
-#: the browser finds again what the page has put down for itself.
-PORT = 8421
 
 #: Bytes of a message beside its pixels, and of each pixel (light and importance) that it may bring.
 BESIDE, OF_PIXEL = 2**20, 16
@@ -69,12 +65,13 @@ def page_app(line: Line, *, files: dict[str, PageFile] | None = None) -> App:
             "x-shape": ",".join(map(str, about["shape"])),
         }
         if asked is not None and asked == str(before) == str(line.generations.get(name)):
-            # Another launch has another cookie, and other pictures.
-            headers |= {"cache-control": "private, max-age=31536000, immutable", "vary": "Cookie"}
+            # Another launch has another key, and other pictures.
+            kept = "private, max-age=31536000, immutable"
+            headers |= {"cache-control": kept, "vary": "Authorization"}
         return Response(content, headers=headers)
 
     async def live(websocket: "WebSocket") -> None:
-        await websocket.accept()
+        await websocket.accept(PROTOCOL)
         await line.serve(Client(websocket, websocket.query_params.get("page", "")))
 
     @asynccontextmanager
@@ -91,30 +88,15 @@ def page_app(line: Line, *, files: dict[str, PageFile] | None = None) -> App:
     return Starlette(routes=routes, lifespan=lifespan)
 
 
-def listening(host: str, port: int | None) -> socket.socket:
-    """A socket to hear on. port: None for the usual one, or any if that is taken.
-
-    Raises PaintError where there is none.
-    """
-    reason = "ports are numbers up to 65535"
-    for tried in (PORT, 0) if port is None else (port,):
-        if not 0 <= tried < 2**16:
-            break
-        try:
-            family = socket.AF_INET6 if ":" in host else socket.AF_INET
-            return socket.create_server((host, tried), family=family)
-        except OSError as error:
-            reason = error.strerror or str(error)
-    raise PaintError(f"cannot listen at {host}:{tried}: {reason}; choose another with port=...")
-
-
 class Server:
     """One session, served.
 
-    host, port: where to listen; a host other than the loopback is for those who know why. say: as
-    of `Line`.
+    host, port: as of `listen`; a host other than the loopback is for those who know why. listening:
+    what `listen` has returned, which `close` closes. say: as of `Line`. Raises PaintError where it
+    cannot listen.
 
     Attributes:
+        address: Where it listens.
         is_expected: Whether a browser has been told where the page is.
     """
 
@@ -125,27 +107,31 @@ class Server:
         *,
         host: str | None = None,
         port: int | None = None,
+        listening: Listening | None = None,
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         check_installed()
         self._line = Line(session, store, say)
-        self._socket = listening(host or "127.0.0.1", port)
-        self.port = int(self._socket.getsockname()[1])
-        self._guard = Guard(_nothing_yet, port=self.port, host=host)
-        self._host = _shown(host)
+        self._socket, self.address = listening or listen(host, port)
+        self._guard = Guard(_nothing_yet, address=self.address)
         self._serving: uvicorn.Server | None = None
         self._is_to_stop = False
         self.is_expected = False
 
     @property
+    def port(self) -> int:
+        """Where it listens."""
+        return self.address.port
+
+    @property
     def url(self) -> str:
-        """Where the page is, with the token that opens it."""
-        return f"http://{self._host}:{self.port}/?token={self._guard.token}"
+        """Where the page is, with the token that opens it: in the fragment, which stays there."""
+        return f"{self.address.url}#token={self._guard.token}"
 
     def url_once(self) -> str:
-        """The same, for a browser that is started now: good once."""
+        """Return the same for a browser that is started now: good once."""
         self.is_expected = True
-        return f"http://{self._host}:{self.port}/?token={self._guard.once()}"
+        return f"{self.address.url_here}#token={self._guard.once()}"
 
     def keeps(self, store: Store) -> None:
         """What is done is kept there, from now on; of a session that was opened later."""
@@ -170,19 +156,23 @@ class Server:
         # Whoever comes meanwhile waits at the socket.
         import uvicorn
 
+        from lightpaint.paint.connections import bounded_http
         from lightpaint.paint.goodbye import EndingServer, PageSocket, hanging_up
 
-        self._guard.app = page_app(self._line)
+        files = page_files()
+        self._guard.app, self._guard.public = page_app(self._line, files=files), files
         config = uvicorn.Config(
             self._guard,
-            http="h11",
+            http=bounded_http(self._guard.knows),
             ws=PageSocket,
             ws_max_size=self._largest,
             ws_per_message_deflate=False,
             ws_ping_interval=10.0,
             ws_ping_timeout=20.0,
             log_config=None,
+            log_level="error",  # junk of strangers is no news for the terminal
             access_log=False,
+            proxy_headers=False,
             server_header=False,
             limit_concurrency=256,
             timeout_graceful_shutdown=5,
@@ -206,10 +196,3 @@ class Server:
 
 async def _nothing_yet(scope: Any, receive: Any, send: Any) -> None:
     """What is behind the guard before anybody serves."""
-
-
-def _shown(host: str | None) -> str:
-    """As it stands in an address; where all are listened to, the machine's own."""
-    if host is None or host in ("0.0.0.0", "::"):
-        return "127.0.0.1" if host is None else socket.gethostname()
-    return f"[{host}]" if ":" in host else host

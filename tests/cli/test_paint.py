@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.request
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,10 +18,11 @@ from typing import Any
 import numpy as np
 import pytest
 from command import as_from_a_terminal, refused
+from keys import key_of, offered
 from light_groups import interleaved, pictures
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
+from websockets.typing import Origin, Subprotocol
 
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
@@ -185,8 +185,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
     path = here / "room.paint" / "session.db"
     with painting(here, "room.basis.exr") as (process, url):
         assert url.startswith("http://127.0.0.1:")
-        with urllib.request.urlopen(url) as answer:
-            assert "lightpaint_" in answer.headers["set-cookie"]
+        assert key_of(url)
         # Another process is told, and leaves it alone.
         again = refused(here, "paint", "room.basis.exr", "--no-browser", "--port", "0")
         assert re.search(r"session.db is in use: .* folder \(-o\)$", again)
@@ -223,12 +222,10 @@ def test_who_asks_twice_for_the_end_gets_one(here: Path, second: signal.Signals)
 
 def live(url: str) -> ClientConnection:
     """The socket of a page that was opened at `url`."""
-    with urllib.request.urlopen(url) as answer:
-        cookie = answer.headers["set-cookie"].partition(";")[0]
-    base = url.partition("/?")[0]
-    headers = {"Cookie": cookie}
+    base = url.partition("/#")[0]
+    speaks = [Subprotocol(word) for word in offered(key_of(url))]
     where = f"{base.replace('http', 'ws')}/live"
-    return connect(where, origin=Origin(base), additional_headers=headers, max_size=None)
+    return connect(where, origin=Origin(base), subprotocols=speaks, max_size=None)
 
 
 def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
@@ -287,16 +284,33 @@ def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(here:
             assert socket.protocol.extensions == []  # nothing is compressed
 
 
-def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(here: Path) -> None:
-    with painting(here, "groups.exr", "--host", "127.0.0.1") as (process, url):
-        with urllib.request.urlopen(url):
-            process.send_signal(signal.SIGHUP)
+@pytest.mark.parametrize(
+    ("host", "open_to"),
+    [
+        ("127.0.0.2", "programs of this machine, and nobody else, can reach"),
+        ("0.0.0.0", "other machines can reach the painter at every address of this one"),
+    ],
+)
+def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
+    here: Path, host: str, open_to: str
+) -> None:
+    with painting(here, "groups.exr", "--host", host) as (process, url):
+        assert key_of(url)
+        process.send_signal(signal.SIGHUP)
         assert process.wait(timeout=60) == 0
         assert process.stderr is not None
         said = process.stderr.read()
-    assert "whoever has its address, with the token, can paint here" in said
+    assert open_to in said
+    is_risk = "whoever has its address, with the token, can paint here" in said
+    assert is_risk == (host == "0.0.0.0")
     assert "Traceback" not in said
     assert said.endswith("what was painted is kept in groups.paint\n")
+
+
+@pytest.mark.parametrize("host", ["", "no.such.name.invalid", "192.0.2.1"])
+def test_a_host_that_this_machine_has_not_is_one_line(here: Path, host: str) -> None:
+    said = refused(here, "paint", "room.basis.exr", "--no-browser", "--host", host)
+    assert "give an address of this machine, 0.0.0.0 for all of them" in said
 
 
 def test_a_session_of_another_basis_is_refused(here: Path, make_basis: Any) -> None:

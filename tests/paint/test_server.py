@@ -16,28 +16,30 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_session import FakeSession
+from keys import bearer, offered
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
 from lightpaint.paint import client, server
+from lightpaint.paint.address import Address, Reach
 from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.guard import Guard
 from lightpaint.paint.line import Line
 from lightpaint.paint.page_files import page_files
 from lightpaint.paint.protocol import VERSION, Paint
-from lightpaint.paint.server import Server, listening, page_app
+from lightpaint.paint.server import page_app
 
 PORT = 8421
 HOST = f"127.0.0.1:{PORT}"
 REFUSED = (WebSocketDisconnect, WebSocketDenialResponse)
-HERE = {"origin": f"http://{HOST}"}
+HERE = Address("127.0.0.1", PORT, Reach.MACHINE, frozenset({"127.0.0.1"}))
 
 
 class Served:
-    """A session behind its guard, and a browser that has not shown its token yet."""
+    """A session behind its guard, and a browser whose page has not shown its token yet."""
 
-    def __init__(self, folder: Path, **how: Any) -> None:
+    def __init__(self, folder: Path, address: Address = HERE) -> None:
         (folder / "engine").mkdir(parents=True)
         (folder / "index.html").write_text("<!doctype html><title>page</title>", "utf-8")
         (folder / "engine" / "gl.js").write_text("export {}", "utf-8")
@@ -45,15 +47,24 @@ class Served:
         (folder / ".hidden.js").write_text("secret", "utf-8")
         self.session, self.said = FakeSession(), list[str]()
         self.line = Line(self.session, None, self.said.append)
-        self.guard = Guard(page_app(self.line, files=page_files(folder)), port=PORT, **how)
+        files = page_files(folder)
+        app = page_app(self.line, files=files)
+        self.guard = Guard(app, address=address, public=files)
         self.browser = TestClient(self.guard, base_url=f"http://{HOST}")
+        self.key = ""
+
+    def exchange(self, token: str, **headers: str) -> Any:
+        return self.browser.get("/key", headers={**bearer(token), **headers})
 
     def enter(self) -> None:
-        assert self.browser.get(f"/?token={self.guard.token}").status_code == 200
+        self.key = self.exchange(self.guard.token).text
+        self.browser.headers.update(bearer(self.key))
 
     def socket(self, page: str = "", **headers: str) -> WebSocketTestSession:
         return self.browser.websocket_connect(
-            f"ws://{HOST}/live?page={page}", headers={**HERE, **headers}
+            f"ws://{HOST}/live?page={page}",
+            headers={"origin": f"http://{HOST}", **headers},
+            subprotocols=offered(self.key),
         )
 
 
@@ -93,61 +104,83 @@ def greet(socket: WebSocketTestSession, seq: int = 0) -> dict[str, Any]:
 # Who may ask
 
 
-def test_a_stranger_gets_nothing(stranger: Served) -> None:
-    for path in ("/", "/engine/gl.js", "/data/present", "/?token=", "/?token=wrong", "/nowhere"):
+def test_a_stranger_gets_the_page_and_nothing_of_the_session(stranger: Served) -> None:
+    assert stranger.browser.get("/").text == "<!doctype html><title>page</title>"
+    assert stranger.browser.get("/engine/gl.js").text == "export {}"
+    for path in ("/data/present", "/data/", "/key", "/live", "/nowhere", "/engine"):
         answer = stranger.browser.get(path, follow_redirects=False)
         assert answer.status_code == 403
-        assert "page" not in answer.text.replace("painter", "")
+        assert "open the painter by the address that its terminal shows" in answer.text
     with pytest.raises(REFUSED), stranger.socket():
         pass
 
 
-def test_the_token_becomes_a_cookie_that_no_script_and_no_other_page_can_use(
+def test_the_token_is_exchanged_for_a_key_and_for_nothing_that_a_browser_keeps(
     stranger: Served,
 ) -> None:
-    answer = stranger.browser.get(f"/?token={stranger.guard.token}")
-    said = answer.headers["set-cookie"]
-    assert said.startswith(f"lightpaint_{PORT}=")
-    for word in ("HttpOnly", "SameSite=Strict", "Path=/"):
-        assert word in said.split("; ")
-    assert stranger.guard.token not in said
-    assert stranger.guard.token not in answer.text
-    assert 'content="0; url=/"' in answer.text
-    page = stranger.browser.get("/")
-    assert page.status_code == 200
-    assert page.headers["content-type"] == "text/html;charset=utf-8"
+    token = stranger.guard.token
+    for _ in range(2):  # the link of the terminal opens a second tab, too
+        answer = stranger.exchange(token)
+        assert answer.status_code == 200
+        assert "set-cookie" not in answer.headers
+        assert answer.headers["cache-control"] == "no-store"
+        assert answer.text not in ("", token)
+    key = answer.text
+    assert stranger.browser.get("/data/present", headers=bearer(key)).status_code == 200
+    # What opens the door is no key to the rooms; and an address grants nothing.
+    assert stranger.browser.get("/data/present", headers=bearer(token)).status_code == 410
+    for given in (token, key):
+        for path in (f"/key?token={given}", f"/data/present?token={given}&key={given}"):
+            assert stranger.browser.get(path).status_code == 403
+        cookie = {"cookie": f"lightpaint_{PORT}={given}; key={given}"}
+        assert stranger.browser.get("/data/present", headers=cookie).status_code == 403
 
 
 def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
     token = stranger.guard.once()
-    assert stranger.browser.get(f"/?token={token}").status_code == 200
-    stranger.browser.cookies.clear()
-    assert stranger.browser.get(f"/?token={token}").status_code == 403
+    assert stranger.browser.head("/key", headers=bearer(token)).status_code == 410
+    assert stranger.exchange(token).status_code == 200
+    assert stranger.exchange(token).status_code == 410
+
+
+def test_the_token_of_a_command_line_is_good_soon_whatever_the_clock_says(
+    stranger: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    early, late = stranger.guard.once(), stranger.guard.once()
+    now = time.monotonic()
+    monkeypatch.setattr(time, "time", lambda: 0.0)
+    assert stranger.exchange(early).status_code == 200
+    monkeypatch.setattr(time, "monotonic", lambda: now + 121)
+    assert stranger.exchange(late).status_code == 410
 
 
 @pytest.mark.parametrize(
-    "other", ['prefs={"a":"b"}', "name=John Smith", "flag", "x[]=1", 'q="', "é=é"]
+    "shown", ["", "wrong", "é", '"', "Bearer", "Bearer ", "Basic {}", "{}", "Bearer {} {}"]
 )
-def test_cookies_of_other_servers_of_the_machine_shut_nobody_out(
-    served: Served, other: str
-) -> None:
-    [own] = served.browser.cookies.jar
-    for said in (f"{other}; {own.name}={own.value}", f"{own.name}={own.value}; {other}"):
-        served.browser.cookies.clear()
-        assert served.browser.get("/", headers={"cookie": said.encode()}).status_code == 200
+def test_what_is_no_key_opens_nothing(served: Served, shown: str) -> None:
+    headers = {"authorization": shown.format(served.key, served.key).encode()}
+    assert served.browser.get("/data/present", headers=headers).status_code in (403, 410)
 
 
-def test_a_cookie_of_another_launch_is_worth_nothing(stranger: Served) -> None:
-    for value in ("", "wrong", "é", '"'):
-        headers = {"cookie": f"lightpaint_{PORT}={value}".encode()}
-        assert stranger.browser.get("/", headers=headers).status_code in (403, 410)
+def test_a_socket_without_the_key_is_refused(served: Served) -> None:
+    right = served.key
+    for key in ("", "wrong", right[:-1], f"{right}=", f"{right}, lightpaint-key.{right}"):
+        served.key = key
+        with pytest.raises(REFUSED), served.socket():
+            pass
+
+
+def test_two_keys_are_none(served: Served) -> None:
+    one = ("authorization", f"Bearer {served.key}")
+    asking = served.browser.build_request("GET", "/data/present", headers=[one, one])
+    assert served.browser.send(asking).status_code == 403
 
 
 def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path: Path) -> None:
     other = Served(tmp_path / "later")
-    other.browser.cookies = served.browser.cookies
+    other.browser.headers.update(bearer(served.key))
     with other.browser:
-        for path in ("/", "/data/", "/data/present"):
+        for path in ("/data/", "/data/present", "/key"):
             answer = other.browser.get(path)
             assert answer.status_code == 410
             assert "of an earlier start of the painter: open" in answer.text
@@ -156,17 +189,19 @@ def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path
             pass
         # Elsewhere it is told no more than anybody.
         for headers in ({"host": "evil.example"}, {"origin": "http://evil.example"}):
-            assert other.browser.get("/", headers=headers).status_code == 403
-        assert other.browser.head("/").status_code == 410
+            assert other.browser.get("/key", headers=headers).status_code == 403
+        assert other.browser.head("/key").status_code == 410
         other.enter()
-        assert other.browser.get("/").status_code == other.browser.head("/").status_code == 200
+        assert other.browser.get("/data/present").status_code == 200
 
 
 @pytest.mark.parametrize(
     "host", ["evil.example", f"evil.example:{PORT}", "", "127.0.0.1.evil.example", "192.168.1.2"]
 )
-def test_another_name_is_refused_even_with_the_cookie(served: Served, host: str) -> None:
-    assert served.browser.get("/", headers={"host": host}).status_code == 403
+def test_another_name_is_refused_even_with_the_key(served: Served, host: str) -> None:
+    for path in ("/", "/data/present"):
+        assert served.browser.get(path, headers={"host": host}).status_code == 403
+    assert served.exchange(served.guard.token, host=host).status_code == 403
     with pytest.raises(REFUSED), served.socket(host=host):
         pass
 
@@ -175,36 +210,39 @@ def test_another_name_is_refused_even_with_the_cookie(served: Served, host: str)
 def test_names_of_the_machine_itself_and_ports_of_tunnels_are_right(
     served: Served, host: str
 ) -> None:
-    [cookie] = served.browser.cookies.jar
-    headers = {"host": host, "cookie": f"{cookie.name}={cookie.value}"}
-    assert served.browser.get("/", headers=headers).status_code == 200
+    assert served.browser.get("/data/present", headers={"host": host}).status_code == 200
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "null", f"https://{HOST}", "http://127.0.0.1:9999", ""]
 )
-def test_a_page_of_another_server_is_refused_even_with_the_cookie(
-    served: Served, origin: str
-) -> None:
+def test_a_page_of_another_server_is_refused_even_with_the_key(served: Served, origin: str) -> None:
+    assert served.exchange(served.guard.token, origin=origin).status_code == 403
     assert served.browser.get("/data/present", headers={"origin": origin}).status_code == 403
     with pytest.raises(REFUSED), served.socket(origin=origin):
         pass
 
 
 def test_a_socket_that_says_nothing_of_its_page_is_refused(served: Served) -> None:
-    url = f"ws://{HOST}/live"
-    with pytest.raises(REFUSED), served.browser.websocket_connect(url):
+    offer = {"subprotocols": offered(served.key)}
+    with pytest.raises(REFUSED), served.browser.websocket_connect(f"ws://{HOST}/live", **offer):
         pass
+
+
+def test_a_socket_speaks_the_protocol_that_is_no_secret(served: Served) -> None:
+    with served.socket() as socket:
+        assert socket.accepted_subprotocol == "lightpaint"
 
 
 def test_where_others_are_let_in_addresses_are_right_and_foreign_names_are_not(
     tmp_path: Path,
 ) -> None:
-    served = Served(tmp_path / "page", host="0.0.0.0")
+    everywhere = Address("192.168.1.2", PORT, Reach.ALL, frozenset({"studio"}))
+    served = Served(tmp_path / "page", everywhere)
     with served.browser:
-        for host, code in (("192.168.1.2:8421", 200), ("[fe80::1]:8421", 200), ("evil.net", 403)):
-            answer = served.browser.get(f"/?token={served.guard.token}", headers={"host": host})
-            assert answer.status_code == code
+        for host in ("192.168.1.2:8421", "[fe80::1]:8421", "Studio:8421", "127.0.0.1:8421"):
+            assert served.exchange(served.guard.token, host=host).status_code == 200
+        assert served.exchange(served.guard.token, host="evil.net").status_code == 403
 
 
 def test_only_reading_is_answered(served: Served) -> None:
@@ -213,7 +251,7 @@ def test_only_reading_is_answered(served: Served) -> None:
 
 
 def test_every_answer_has_the_policy(served: Served) -> None:
-    for path in ("/", "/engine/gl.js", "/data/present", "/data/none", "/none", "/?token=wrong"):
+    for path in ("/", "/engine/gl.js", "/data/present", "/data/none", "/none", "/key"):
         headers = served.browser.get(path).headers
         policy = dict(x.split(" ", 1) for x in headers["content-security-policy"].split("; "))
         assert policy["default-src"] == "'none'"
@@ -296,7 +334,7 @@ def test_a_picture_is_kept_by_its_generation_only(served: Served) -> None:
         greet(socket)
         kept = served.browser.get("/data/present?g=1").headers
         assert "immutable" in kept["cache-control"]
-        assert kept["vary"] == "Cookie"
+        assert kept["vary"] == "Authorization"
         for asked in ("", "?g=0", "?g=2", "?g=x"):
             answer = served.browser.get(f"/data/present{asked}")
             assert answer.headers["cache-control"] == "no-store"
@@ -645,32 +683,6 @@ def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_a
     assert page._unsent == []
     page.send(Message("answer", {}), 1)
     assert page._unsent == []
-
-
-# The place
-
-
-def test_a_taken_port_is_told_and_the_usual_one_given_up() -> None:
-    with listening("127.0.0.1", 0) as taken:
-        port = taken.getsockname()[1]
-        with pytest.raises(PaintError, match=f"cannot listen at 127.0.0.1:{port}: .*port="):
-            listening("127.0.0.1", port)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(server, "PORT", port)
-            with listening("127.0.0.1", None) as other:
-                assert other.getsockname()[1] not in (0, port)
-    with pytest.raises(PaintError, match="cannot listen"):
-        listening("127.0.0.1", 70000)
-    with pytest.raises(PaintError, match="cannot listen"):
-        listening("256.0.0.1", 0)
-
-
-def test_by_itself_it_listens_to_the_machine_only() -> None:
-    made = Server(FakeSession(), port=0)
-    assert made._socket.getsockname()[0] == "127.0.0.1"
-    assert made.url.startswith(f"http://127.0.0.1:{made.port}/?token=")
-    assert made.url_once() != made.url
-    made.close()
 
 
 def test_without_its_libraries_the_line_to_run_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,12 +10,13 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from neighbour import Neighbour
 from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
@@ -64,6 +65,11 @@ class Fox:
             awaitPromise=True,
         )
         return json.loads(found["result"]["value"]) if found["type"] == "success" else None
+
+    def errors(self) -> list[str]:
+        """What the console has shown."""
+        said = [one.get("params", {}) for one in self.heard]
+        return [one["text"] for one in said if one.get("level") == "error"]
 
     def press(self, *keys: str) -> None:
         actions = [{"type": x, "value": key} for key in keys for x in ("keyDown", "keyUp")]
@@ -174,5 +180,17 @@ def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_pa
         until(is_answered, "the exact answer does not come")
         until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not shown")
         assert fox.seen(80, 40) == before
-    wrong = [x["params"]["text"] for x in fox.heard if x.get("params", {}).get("level") == "error"]
-    assert wrong == []
+        assert fox.errors() == []
+        # What another server of the machine collects of this browser opens nothing, and the page
+        # that is left for it and opened again goes on.
+        painter = url.partition("#")[0]
+        with closing(Neighbour()) as neighbour:
+            fox.open(f"{neighbour.url}?of={painter}")
+            assert neighbour.has_tried.wait(PATIENCE_S)
+            assert {how: what for how, what in neighbour.tried.items() if what} == {}
+            assert neighbour.collected
+            assert url.partition("=")[2] not in str(neighbour.collected)
+            assert neighbour.replay(painter) == []
+        fox.open(painter)
+        until(lambda: fox.look("return work.isReady && screen.width > 0"), "it does not go on")
+        until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not there")

@@ -264,12 +264,12 @@ def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any,
             const { SocketHost } = await import("/engine/host.js");
             const real = window.WebSocket;
             window.WebSocket = FakeSocket;
-            const host = new SocketHost();
+            const host = new SocketHost(document.baseURI, { key: async () => "k" });
             const heard = [];
             const early = await host.send("undo").catch((error) => error.message);
             host.on("connection", ({ state }) => heard.push(state));
             host.on("answer", ({ reply }) => heard.push(`answer ${reply}`));
-            host.open();
+            await host.open();
             const [first] = FakeSocket.made;
             first.open();
             first.receive(frame({ kind: "state", reply: 1, resources: { "plane/0": 4 } }));

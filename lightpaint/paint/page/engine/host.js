@@ -4,6 +4,7 @@
  * Every message has a number, and is answered by one that gives it back. A lost connection is
  * made anew, and begins with `hello`.
  */
+import { Entry, PROTOCOL, REFUSALS, shown } from './entry.js';
 import { VERSION, frame, pictureOf, unframe } from './protocol.js';
 
 /** @typedef {import("./protocol.js").Arrays} Arrays */
@@ -56,15 +57,16 @@ export class Hearers {
 /** Milliseconds before a lost connection is tried again: at first, and at most. */
 const WAITS = { first: 250, most: 5000 };
 
-/** How a server answers a page of an earlier start, or of nobody that it knows. */
-const REFUSALS = [403, 410];
-
 /** @implements {Host} */
 export class SocketHost extends Hearers {
-  /** Where the page came from. @param {string | URL} [base] */
-  constructor(base = document.baseURI) {
+  /** Where the page came from, and what knows the key to it.
+   * @param {string | URL} [base] @param {{key: () => Promise<string | null>}} [entry] */
+  constructor(base = document.baseURI, entry = new Entry(base)) {
     super();
     this.base = new URL('.', base);
+    this.entry = entry;
+    /** Without which nothing is answered. @type {string | null} */
+    this.key = null;
     /** By which the session knows this page when it is back. */
     this.page = crypto.randomUUID?.() ?? String(Math.random());
     this.seq = 0;
@@ -81,10 +83,22 @@ export class SocketHost extends Hearers {
   }
 
   /** Connect, now and whenever the connection is lost. */
-  open() {
+  async open() {
+    try {
+      this.key ??= await this.entry.key();
+    } catch {
+      return this.retry(); // It is not there.
+    }
+    if (this.isOver) return;
+    if (this.key === null) this.refuse();
+    else this.connect(this.key);
+  }
+
+  /** @param {string} key */
+  connect(key) {
     const url = new URL(`live?page=${this.page}`, this.base);
     url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
-    const socket = new WebSocket(url);
+    const socket = new WebSocket(url, [PROTOCOL, `${PROTOCOL}-key.${key}`]);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
     let wasOpen = false;
@@ -107,21 +121,31 @@ export class SocketHost extends Hearers {
     const gone = new Error('the connection to the painter is lost');
     for (const { reject } of this.asked.values()) reject(gone);
     this.asked.clear();
+    this.retry();
+  }
+
+  /** Connect again, after a while. */
+  retry() {
     if (this.isOver) return;
     this.tell('connection', { kind: 'connection', state: 'lost' });
-    this.timer = setTimeout(() => this.open(), this.wait);
+    this.timer = setTimeout(() => void this.open(), this.wait);
     this.wait = Math.min(WAITS.most, 2 * this.wait);
+  }
+
+  /** Say that the server does not know this page, and ask it no more. */
+  refuse() {
+    this.close();
+    this.tell('connection', { kind: 'connection', state: 'stale' });
   }
 
   /** Whether a server is there that does not know this page; then it is not asked again, since the
    * page of the new address would find the session taken. */
   async askWhy() {
     try {
-      const how = /** @type {RequestInit} */ ({ credentials: 'same-origin', cache: 'no-store' });
-      const { status } = await fetch(this.base, { ...how, method: 'HEAD' });
+      const how = /** @type {RequestInit} */ ({ method: 'HEAD', cache: 'no-store' });
+      const { status } = await fetch(new URL('key', this.base), { ...how, ...shown(this.key) });
       if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
-      this.close();
-      this.tell('connection', { kind: 'connection', state: 'stale' });
+      this.refuse();
     } catch {
       // It is not there.
     }
@@ -164,7 +188,7 @@ export class SocketHost extends Hearers {
     const url = new URL(`data/${path}`, this.base);
     const generation = this.generations[name];
     if (generation !== undefined) url.searchParams.set('g', String(generation));
-    const response = await fetch(url, { credentials: 'same-origin' });
+    const response = await fetch(url, shown(this.key));
     if (!response.ok) throw new Error(`${name}: ${await response.text()}`);
     const shape = (response.headers.get('x-shape') ?? '').split(',').map(Number);
     const dtype = response.headers.get('x-dtype') ?? '';

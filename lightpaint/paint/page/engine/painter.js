@@ -29,7 +29,7 @@ const LEAST_ALBEDO = 0.02;
 /** The session behind the server that the page came from. @returns {Host} */
 export function openHost() {
   const host = new SocketHost();
-  host.open();
+  void host.open();
   return host;
 }
 

@@ -31,7 +31,7 @@ function stale(unheard) {
   const lost = unheard
     ? ` Painted on it, never heard, and lost: ${counted(unheard, 'stroke')}.`
     : '';
-  return `This page is of an earlier start of the painter: open the address that its terminal shows.${lost}`;
+  return `The painter that runs here does not know this page: open the address that its terminal shows.${lost}`;
 }
 
 /** Over the pictures; in the middle where there are none. @param {{ui: Ui, hands: Hands}} props */

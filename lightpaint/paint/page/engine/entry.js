@@ -1,0 +1,74 @@
+/**
+ * How a page comes by the key of the painter's server, and shows it.
+ *
+ * The address that a terminal shows has a token in its fragment, which browsers send to nobody. The
+ * page takes it from there and exchanges it for the key. What a browser would attach by itself, a
+ * cookie, goes to all servers of the machine; the key goes where the page sends it.
+ */
+
+/** What a socket speaks. */
+export const PROTOCOL = 'lightpaint';
+
+/** Under which name the key is kept for a page that is loaded anew: for one tab, and one origin,
+ * which has its port. */
+const KEPT = 'lightpaint-key';
+
+/** How a server answers a page of an earlier start, or one that shows no key. */
+export const REFUSALS = [403, 410];
+
+/** Who shows a key, or a token. @param {string | null} key @returns {RequestInit} */
+export function shown(key) {
+  return { credentials: 'omit', headers: { authorization: `Bearer ${key}` } };
+}
+
+export class Entry {
+  /** Where the page came from. @param {string | URL} base */
+  constructor(base) {
+    this.url = new URL('key', new URL('.', base));
+    this.token = takenToken();
+    // Who is given a new address in the same tab stays on the page: only its fragment changes.
+    addEventListener('hashchange', () => {
+      if (tokenIn(location.hash)) location.reload();
+    });
+  }
+
+  /** The key, or null for who has none; fails where no server is. @returns {Promise<string | null>} */
+  async key() {
+    if (this.token === null) return kept();
+    const answer = await fetch(this.url, { ...shown(this.token), cache: 'no-store' });
+    if (!answer.ok && !REFUSALS.includes(answer.status)) throw new Error(await answer.text());
+    const key = answer.ok ? await answer.text() : kept();
+    this.token = null;
+    if (key !== null) keep(key);
+    return key;
+  }
+}
+
+/** @param {string} fragment of an address */
+function tokenIn(fragment) {
+  return new URLSearchParams(fragment.slice(1)).get('token');
+}
+
+/** The token of this page, which its address has no longer. */
+function takenToken() {
+  const token = tokenIn(location.hash);
+  if (token) history.replaceState(history.state, '', location.pathname + location.search);
+  return token;
+}
+
+function kept() {
+  try {
+    return sessionStorage.getItem(KEPT);
+  } catch {
+    return null; // The browser is told to keep nothing.
+  }
+}
+
+/** @param {string} key */
+function keep(key) {
+  try {
+    sessionStorage.setItem(KEPT, key);
+  } catch {
+    // A page that is loaded anew then has to come by the address again.
+  }
+}

@@ -1,0 +1,118 @@
+"""Who gets the session in a browser: pages of the terminal's address, however often, and no others.
+
+Nothing that a browser attaches by itself opens it, so another server of this machine that collects
+what it is sent, and sends it on, gets nothing.
+"""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from neighbour import Neighbour
+
+from lightpaint.paint.server import Server
+from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+
+UNKNOWN = "does not know this page: open the address that its terminal shows"
+
+
+@pytest.fixture
+def server(make_basis: Any, tmp_path: Path) -> Iterator[Server]:
+    """A painter on a port of its own."""
+    subject = Subject("room.basis.exr", tmp_path / "room", basis=make_basis(2, (27, 48)))
+    studio = Studio([subject], MemoryStore)
+    made = Server(studio, port=0)
+    thread = threading.Thread(target=made.run, daemon=True)
+    thread.start()
+    studio.start()
+    yield made
+    made.stop()
+    thread.join()
+    made.close()
+    studio.close()
+
+
+@pytest.fixture
+def neighbour() -> Iterator[Neighbour]:
+    made = Neighbour()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def tab(browser: Any) -> Iterator[Any]:
+    """Opens tabs of one browser."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context.set_default_timeout(20_000)
+    yield context.new_page
+    context.close()
+
+
+def has_painter(page: Any) -> None:
+    """Wait until the painter is there, with a picture that was fetched."""
+    page.wait_for_selector(".lightpaint .tag")
+    page.wait_for_function(
+        "() => document.getElementById('lightpaint').painter.engine.work.isReady"
+    )
+
+
+def test_a_neighbour_that_is_visited_gets_nothing_that_opens_the_session(
+    server: Server, neighbour: Neighbour, tab: Any
+) -> None:
+    page = tab()
+    page.goto(server.url)
+    has_painter(page)
+    assert page.url == server.address.url  # the token is seen no longer
+    where = f"{neighbour.url}?of={server.address.url}"
+    page.evaluate("(url) => { location.href = url; }", where)  # as a link would
+    assert neighbour.has_tried.wait(20)
+    beside = tab()
+    beside.goto(where)
+    beside.wait_for_function("() => document.title === 'done'")
+    assert len(neighbour.collected) >= 3
+    assert {how: what for how, what in neighbour.tried.items() if what} == {}
+    token = server.url.partition("=")[2]
+    for headers in neighbour.collected:
+        assert token not in str(headers)
+        assert str(server.port) not in headers.get("Referer", "").partition("?")[0]
+    assert neighbour.replay(server.address.url) == []
+    # The person comes back to a page that goes on.
+    page.go_back()
+    has_painter(page)
+
+
+def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
+    server: Server, tab: Any
+) -> None:
+    first = tab()
+    first.goto(server.url)
+    has_painter(first)
+    first.reload()
+    has_painter(first)
+    second = tab()
+    second.goto(server.url)
+    second.get_by_role("button", name="Take over").click()
+    has_painter(second)
+    # The address alone opens nothing, and says what does.
+    third = tab()
+    third.goto(server.address.url)
+    third.get_by_text(UNKNOWN).wait_for()
+    third.goto(server.url)  # in the same tab, where no more than its fragment changes
+    third.get_by_role("button", name="Take over").click()
+    has_painter(third)
+    assert third.url == server.address.url
+
+
+def test_the_address_that_a_browser_was_started_with_is_good_once(server: Server, tab: Any) -> None:
+    url = server.url_once()
+    first, second = tab(), tab()
+    first.goto(url)
+    has_painter(first)
+    second.goto(url)
+    second.get_by_text(UNKNOWN).wait_for()
+    first.reload()
+    has_painter(first)

@@ -1,0 +1,125 @@
+"""Where the painter's server listens: what is open is known, and the address that is said works."""
+
+import socket
+import threading
+import urllib.request
+from contextlib import closing
+from typing import Any
+
+import pytest
+from fake_session import FakeSession
+
+from lightpaint.errors import PaintError
+from lightpaint.paint import address
+from lightpaint.paint.address import Reach, listen
+from lightpaint.paint.server import Server
+
+
+def has_ipv6() -> bool:
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        return False
+    return True
+
+
+IPV6 = pytest.mark.skipif(not has_ipv6(), reason="no IPv6")
+
+
+def test_a_taken_port_is_told_and_the_usual_one_given_up() -> None:
+    taken, its = listen("127.0.0.1", 0)
+    with taken:
+        with pytest.raises(PaintError, match=f"cannot listen at 127.0.0.1:{its.port}: .*port="):
+            listen("127.0.0.1", its.port)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(address, "PORT", its.port)
+            other, there = listen()
+            other.close()
+            assert there.port not in (0, its.port)
+    with pytest.raises(PaintError, match="cannot listen"):
+        listen("127.0.0.1", 70000)
+
+
+def test_by_itself_it_listens_to_the_machine_only() -> None:
+    made = Server(FakeSession(), port=0)
+    assert made._socket.getsockname()[0] == "127.0.0.1"
+    assert made.url.startswith(f"http://127.0.0.1:{made.port}/#token=")
+    assert made.url_once() != made.url
+    made.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "name", "reach"),
+    [
+        (None, "127.0.0.1", Reach.MACHINE),
+        ("127.0.0.2", "127.0.0.2", Reach.MACHINE),
+        ("127.1", "127.0.0.1", Reach.MACHINE),
+        ("localhost", "localhost", Reach.MACHINE),
+        ("LOCALHOST", "localhost", Reach.MACHINE),
+        ("0.0.0.0", "", Reach.ALL),
+        ("0", "", Reach.ALL),
+        pytest.param("::1", "[::1]", Reach.MACHINE, marks=IPV6),
+        pytest.param("[::1]", "[::1]", Reach.MACHINE, marks=IPV6),
+        pytest.param("::", "", Reach.ALL, marks=IPV6),
+    ],
+)
+def test_who_can_reach_it_is_known_and_its_address_leads_there(
+    host: str | None, name: str, reach: Reach
+) -> None:
+    made, its = listen(host, 0)
+    with made:
+        made.settimeout(5)
+        made.accept()[0].close()  # it has been tried
+        assert its.reach is reach
+        assert its.name == (name or its.name)
+        assert its.name not in ("", "0.0.0.0", "[::]", "::")
+        for url in (its.url, its.url_here):
+            place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
+            with closing(socket.create_connection((place, its.port), 5)):
+                made.accept()[0].close()
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "",
+        " ",
+        "[]",
+        "no.such.name.invalid",
+        "a b",
+        "http://127.0.0.1",
+        "127.0.0.1:9000",
+        "256.0.0.1",
+        "192.0.2.1",  # of no machine: RFC 5737
+        "255.255.255.255",
+        "224.0.0.1",
+        "fe80::1%lo",
+        "é" * 70,
+        "127.0.0.1\n",
+        "\0",
+        "\ud800",
+    ],
+)
+def test_a_wrong_host_is_one_line_that_says_what_to_give(host: str) -> None:
+    with pytest.raises(PaintError) as refusal:
+        listen(host, 0)
+    said = str(refusal.value)
+    assert "give an address of this machine, 0.0.0.0 for all of them, or leave it out" in said
+    assert "\n" not in said
+    assert len(said) < 300
+
+
+def test_the_page_is_there_where_the_address_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where this machine has a name that leads nowhere."""
+    monkeypatch.setattr(socket, "gethostname", lambda: "no.such.name.invalid")
+    made: Any = Server(FakeSession(), host="0.0.0.0", port=0)
+    serving = threading.Thread(target=made.run, daemon=True)
+    serving.start()
+    try:
+        for url in (made.url, made.url_once()):
+            with urllib.request.urlopen(url, timeout=10) as answer:
+                assert answer.status == 200
+    finally:
+        made.stop()
+        serving.join(20)
+        made.close()

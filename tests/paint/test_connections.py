@@ -1,0 +1,140 @@
+"""Connections to the painter's server: strangers take no room and no time of a page's."""
+
+import http.client
+import socket
+import time
+from contextlib import closing, suppress
+from typing import Any
+
+import pytest
+from keys import bearer
+from serving import Page, Serving, until
+
+from lightpaint.paint import connections
+from lightpaint.paint.protocol import VERSION
+
+HALF = b"GET / HTTP/1.1\r\nHost: 127.0"
+
+
+def status(serving: Serving, path: str, key: str = "") -> int:
+    """How a page's request is answered, on a connection of its own."""
+    with closing(http.client.HTTPConnection("127.0.0.1", serving.server.port, 20)) as asking:
+        asking.request("GET", path, headers=bearer(key) if key else {})
+        return asking.getresponse().status
+
+
+def is_cut(connection: socket.socket) -> bool:
+    """Whether the server has closed it; waits until there is something to say of it."""
+    try:
+        return connection.recv(1 << 16) == b""
+    except ConnectionResetError:
+        return True
+
+
+def there(serving: Serving) -> list[Any]:
+    assert serving.server._serving is not None
+    return list(serving.server._serving.server_state.connections)
+
+
+def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: Serving) -> None:
+    page = Page(serving)
+    for _ in range(300):
+        serving.connection().sendall(HALF)
+    until(lambda: len(there(serving)) >= connections.MOST_STRANGERS, "they do not come")
+    assert status(serving, "/data/present", serving.key) == 200
+    assert status(serving, "/") == 200  # a page that is being opened
+    another = Page(serving)
+    for one in (page, another):
+        one.says("hello", version=VERSION)
+        assert one.hears()[0]["kind"] in ("state", "closed")
+    assert len(there(serving)) <= connections.MOST_STRANGERS + 4
+    # The latest have the best chance of being people.
+    assert is_cut(serving.connections[1])
+
+
+def test_a_request_comes_in_time_or_its_connection_is_closed(
+    serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "REQUEST_S", 0.3)
+    silent, half, second, slow, known = (serving.connection() for _ in range(5))
+    page = Page(serving)
+    half.sendall(HALF)
+    second.sendall(f"GET / HTTP/1.1\r\nHost: {serving.here}\r\n\r\n".encode())
+    assert second.recv(12) == b"HTTP/1.1 200"
+    second.sendall(HALF)
+    shown = f"Host: {serving.here}\r\n{serving.key_header}\r\n\r\n"
+    known.sendall(f"GET /data/present HTTP/1.1\r\n{shown}".encode())
+    assert known.recv(12) == b"HTTP/1.1 200"
+    known.sendall(HALF)
+    # Who sends it in drops has no longer.
+    begin = time.monotonic()
+    with suppress(OSError):
+        for drop in range(100):
+            slow.sendall(b"GET / HTTP/1.1\r\n"[drop : drop + 1] or b"x")
+            time.sleep(0.05)
+    assert time.monotonic() - begin < 3
+    for one in (silent, half, slow):
+        assert is_cut(one)
+    while second.recv(1 << 16):
+        pass  # what it had asked for comes whole
+    # Who has shown the key, and a page, have all the time they want.
+    page.says("hello", version=VERSION)
+    assert page.hears()[0]["kind"] == "state"
+    known.sendall(f".0.1:{serving.server.port}\r\n{serving.key_header}\r\n\r\n".encode())
+    until(lambda: b"HTTP/1.1 200" in known.recv(1 << 16), "it is not answered again")
+
+
+def test_an_answer_that_is_taken_slowly_is_not_cut(
+    serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the page's own files through a slow tunnel are, by a browser that has no key yet."""
+    monkeypatch.setattr(connections, "REQUEST_S", 0.1)
+    asking = serving.connection()
+    until(lambda: there(serving), "it is not there")
+    for connection in there(serving):  # else the system takes it all
+        accepted = connection.transport.get_extra_info("socket")
+        accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    asking.sendall(f"GET /main.js HTTP/1.1\r\nHost: {serving.here}\r\n\r\n".encode())
+    head = asking.recv(1 << 12)
+    [length] = [
+        int(line.partition(b":")[2])
+        for line in head.split(b"\r\n")
+        if line.startswith(b"content-length")
+    ]
+    time.sleep(0.5)
+    got = len(head.partition(b"\r\n\r\n")[2])
+    while got < length:
+        data = asking.recv(1 << 16)
+        assert data, f"{got} of {length} bytes"
+        got += len(data)
+
+
+def test_what_is_sent_goes_at_once(serving: Serving) -> None:
+    """Nothing waits until what was sent before it is acknowledged (RFC 896): 40 ms an answer."""
+    kept, page = serving.connection(), Page(serving)
+    kept.sendall(HALF)
+    page.says("hello", version=VERSION)
+    until(lambda: len(there(serving)) >= 2, "they are not there")
+    for connection in there(serving):
+        accepted = connection.transport.get_extra_info("socket")
+        assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+def test_junk_of_strangers_is_no_news(serving: Serving, capfd: pytest.CaptureFixture[str]) -> None:
+    for junk in (
+        b"\x16\x03\x01\x02\0\x01\0\x01\xfc\x03\x03",  # a browser that tries TLS
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n",
+        b"GET /" + b"x" * 70_000 + b" HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: x\r\nConnection: upgrade\r\nUpgrade: h2c\r\n\r\n",
+        b"GET /live HTTP/1.1\r\nHost: x\r\nConnection: upgrade\r\nUpgrade: websocket\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999\r\n\r\nx",
+        b"POST / HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nffffffff\r\nx",
+        b"\0" * 100,
+    ):
+        one = serving.connection()
+        one.sendall(junk)
+        with suppress(ConnectionResetError):
+            one.recv(1 << 16)
+    assert status(serving, "/data/present", serving.key) == 200
+    assert capfd.readouterr() == ("", "")

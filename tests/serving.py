@@ -1,0 +1,117 @@
+"""A painter's server over real connections, and pages that speak to it byte by byte."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from fake_session import FakeSession
+from keys import bearer, key_of, offered
+from websockets.client import ClientProtocol
+from websockets.datastructures import Headers
+from websockets.typing import Subprotocol
+from websockets.uri import parse_uri
+
+from lightpaint.paint.frames import Message, of_frame, to_frame
+from lightpaint.paint.guard import PROTOCOL
+from lightpaint.paint.server import Server
+
+#: More than the system takes for somebody who does not read.
+LARGE = np.zeros((2048, 2048, 4), np.float32)
+
+
+class Serving:
+    """A session served on a port of its own, and what that has ended in."""
+
+    def __init__(self) -> None:
+        self.session = FakeSession()
+        self.session.pictures["large"] = LARGE
+        self.server = Server(self.session, port=0)
+        self.ended_in: BaseException | None = None
+        self.connections: list[socket.socket] = []
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self.thread.start()
+        self.key = key_of(self.server.url)
+
+    @property
+    def key_header(self) -> str:
+        """The line of a request that shows the key."""
+        [(name, value)] = bearer(self.key).items()
+        return f"{name}: {value}"
+
+    @property
+    def here(self) -> str:
+        """The name of the server, as requests have it."""
+        return f"127.0.0.1:{self.server.port}"
+
+    def _run(self) -> None:
+        try:
+            self.server.run()
+        except BaseException as error:
+            self.ended_in = error
+
+    def connection(self) -> socket.socket:
+        """One whose end here takes next to nothing unless it is read."""
+        made = socket.socket()
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        made.connect(("127.0.0.1", self.server.port))
+        made.settimeout(20)
+        self.connections.append(made)
+        return made
+
+    def end(self) -> None:
+        """Stop, and fail if that is an error or never comes."""
+        self.server.stop()
+        self.thread.join(20)
+        self.server.close()
+        assert not self.thread.is_alive()
+        assert self.ended_in is None
+
+
+class Page:
+    """A page's end of the socket, byte by byte."""
+
+    def __init__(self, serving: Serving) -> None:
+        self.connection = serving.connection()
+        here = serving.here
+        self.protocol = ClientProtocol(
+            parse_uri(f"ws://{here}/live"), subprotocols=[Subprotocol(PROTOCOL)]
+        )
+        request = self.protocol.connect()
+        offer = {"Sec-WebSocket-Protocol": ", ".join(offered(serving.key))}
+        request.headers = Headers({**dict(request.headers), **offer, "Origin": f"http://{here}"})
+        self.protocol.send_request(request)
+        self._sent()
+        self.hears()
+        assert self.protocol.handshake_exc is None
+
+    def says(self, kind: str, **fields: object) -> None:
+        self.protocol.send_binary(to_frame(Message(kind, {"seq": 1, **fields}).content(), []))
+        self._sent()
+
+    def says_goodbye(self) -> None:
+        self.protocol.send_close(1001)
+        self._sent()
+
+    def hears(self) -> list[dict[str, object]]:
+        """The next that comes; nothing at the end."""
+        while True:
+            data = self.connection.recv(1 << 16)
+            if not data:
+                return []
+            self.protocol.receive_data(data)
+            if events := self.protocol.events_received():
+                frames = [bytes(e.data) for e in events if getattr(e, "opcode", None) == 2]
+                return [of_frame(frame)[0] for frame in frames]
+
+    def _sent(self) -> None:
+        self.connection.sendall(b"".join(self.protocol.data_to_send()))
+
+
+def until(is_so: Callable[[], object], what: str) -> None:
+    """Wait for it, as long as anything takes on a busy machine."""
+    end = time.monotonic() + 20
+    while not is_so():
+        assert time.monotonic() < end, what
+        time.sleep(0.01)
