@@ -143,14 +143,14 @@ def from_two_seats(hand: Hand) -> None:
     hand.drag((x, y), (x + 40, y - 90))
     hand.wait()
     hand.page.keyboard.press("n")
-    _load(hand.page)
+    load(hand.page)
     hand.page.keyboard.press("b")
     hand.page.keyboard.press("x")
     hand.drag(on(0.44, 0.3), on(0.5, 0.2), on(0.58, 0.35))
     hand.wait()
 
 
-def _load(page: Page) -> None:
+def load(page: Page) -> None:
     """Until all is rendered, and clean: nothing that is published has grain."""
     page.wait_for_function(
         """() => {
@@ -165,9 +165,11 @@ def _load(page: Page) -> None:
 
 
 @contextmanager
-def painter(scene: str, spp: int, port: int, *more: str) -> Iterator[str]:
-    """The address of a painter with a session of its own."""
-    with tempfile.TemporaryDirectory() as folder:
+def painter(
+    scene: str, spp: int, port: int, *more: str, folder: str | None = None
+) -> Iterator[str]:
+    """Start a painter and give its address. folder: of its session, by default one of its own."""
+    with tempfile.TemporaryDirectory() as own:
         words = [
             "paint",
             str(SCENES / scene / "scene.xml"),
@@ -176,7 +178,7 @@ def painter(scene: str, spp: int, port: int, *more: str) -> Iterator[str]:
             f"--port={port}",
             "--no-browser",
             "-o",
-            folder,
+            folder or own,
         ]
         run = [sys.executable, "-m", "lightpaint", *words]
         server = subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -197,7 +199,7 @@ def using(url: str) -> Iterator[Hand]:
         page = browser.new_page(viewport={"width": WINDOW[0], "height": WINDOW[1]})
         page.goto(url)
         page.locator("[data-light]").first.wait_for(timeout=600_000)
-        _load(page)
+        load(page)
         yield Hand(page)
         browser.close()
 
