@@ -10,6 +10,7 @@ from lightpaint.basis.render.obtain import check_same_view
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.job import Job
+from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline import run
 from lightpaint.progress import Progress, silent
@@ -35,6 +36,7 @@ def paint_with_light(
 ) -> list[Look]: ...
 
 
+@keywords(Settings)
 def paint_with_light(
     scene: AnyScene | Sequence[AnyScene] | None,
     target: AnyTarget | Sequence[AnyTarget],
@@ -43,6 +45,8 @@ def paint_with_light(
     basis: str | Path | Basis | LightGroups | list[Basis] | None = None,
     constraints: Constraints | None = None,
     mask: str | Path | None = None,
+    layer: str | None = None,
+    find: bool = True,
     sensor: int | str | None = None,
     parameters: Mapping[str, object] | None = None,
     lights: Iterable[str] | None = None,
@@ -61,7 +65,10 @@ def paint_with_light(
         basis: One made before, or another renderer's light groups; kept or rendered if not given.
             For several views a list, which is emptied, so that no pixel is held twice.
         constraints: What is asked of the lights; it goes before what the scene's lights file asks.
-        mask: As `read_target` takes it, where `target` is a path.
+        mask: As of `read_target`, as are the next two: picture of what counts, where `target` is a
+            path.
+        layer: Of an EXR.
+        find: Whether a template is looked for beside the painting.
         sensor: As of `load_scene`, as are the next four: index or id, where `scene` is a path.
         parameters: Values of `$name` parameters.
         lights: Names or patterns of those to adjust.
@@ -95,27 +102,26 @@ def paint_with_light(
         scene = [_on_film_of(x, its) for x, its in zip(_listed(scene), bases, strict=True)]
         # They are on the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
-    job = _job((scene, how), (target, mask), Path(folder), basis, constraints, Settings(**settings))
+    read = {"mask": mask and str(mask), "layer": layer, "find": find}
+    job = _job((scene, how), (target, read), Path(folder), basis, constraints, Settings(**settings))
     looks = run(job, progress, bases=bases)
     return looks if job.by_sensor else looks[0]
 
 
 def _job(
     scene: tuple[Any, Mapping[str, Any]],
-    target: tuple[Any, str | Path | None],
+    target: tuple[Any, Mapping[str, Any]],
     folder: Path,
     basis: Any,
     constraints: Constraints | None,
     settings: Settings,
 ) -> Job:
     """What the arguments of `paint_with_light` ask for. scene, target: and how to read them."""
-    (scenes, how), (targets, mask) = scene, target
+    (scenes, how), (targets, read) = scene, target
     how = {name: value for name, value in how.items() if value not in (None, {})}
     by_sensor = isinstance(scenes, list | tuple)
-    painted: dict[str, Any] = {
-        "mask": mask and str(mask),
-        "transform": TransformChoice.of(settings.transform),
-    }
+    painted = {**read, "transform": TransformChoice.of(settings.transform)}
+    changed = [name for name, value in read.items() if value not in (None, True)]
     scenes = [SceneFile(str(x), **how) if _is_path(x) else x for x in _listed(scenes)]
     targets = [Painting(str(x), **painted) if _is_path(x) else x for x in _listed(targets)]
     if how and not scenes:
@@ -123,8 +129,9 @@ def _job(
     if how and not any(isinstance(x, SceneFile) for x in scenes):
         named = ", ".join(f"{name}=..." for name in how)
         raise SceneError(f"{named} cannot change a scene that is already loaded: give its path")
-    if mask is not None and not any(isinstance(x, Painting) for x in targets):
-        raise TargetError("mask=... cannot change a target that is already read: give its path")
+    if changed and not any(isinstance(x, Painting) for x in targets):
+        named = ", ".join(f"{name}=..." for name in changed)
+        raise TargetError(f"{named} cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
     asked = Constraints() if constraints is None else constraints
     return Job(tuple(scenes), tuple(targets), folder, basis, asked, settings, by_sensor)

@@ -5,6 +5,7 @@
     ├── SceneError       the scene XML, a sensor, a light
     ├── ImageError       an image file that cannot be read as what it should be
     │   └── ViewError    … or a view transform, to decode it by, that there is none of
+    ├── KeywordError     an argument that a function does not have; a TypeError as well
     ├── ColorError       a colour that means nothing: hexadecimal digits, a temperature
     ├── BasisError       a basis file, or one that does not fit what it is used with
     ├── TargetError      a painting or mask that cannot be solved for
@@ -47,6 +48,10 @@ class ImageError(LightpaintError):
 
 class ViewError(ImageError):
     """A view transform that there is none of, or that cannot be undone."""
+
+
+class KeywordError(LightpaintError, TypeError):
+    """An argument, by name, that a function does not have."""
 
 
 class ColorError(LightpaintError):

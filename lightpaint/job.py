@@ -15,6 +15,7 @@ from lightpaint.basis.render.obtain import check_same_view
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
+from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
@@ -64,6 +65,7 @@ class PaintedView:
     basis: Basis | None = None
 
 
+@keywords()
 @dataclass(frozen=True, eq=False)
 class Job:
     """One lighting to be found, for one view or several; checked whole when it is born.
@@ -166,6 +168,7 @@ class Job:
         )
 
     @staticmethod
+    @keywords()
     def from_json(text: str) -> "Job":
         """The job that `to_json` wrote, of the files as they are here and now.
 

@@ -11,6 +11,7 @@ from lightpaint.basis.render.obtain import Render, obtain_basis
 from lightpaint.basis.render.render import render_basis, samples_for
 from lightpaint.images.estimate import write_estimate
 from lightpaint.job import Job, PaintedView
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.file import write_lighting
@@ -35,6 +36,7 @@ from lightpaint.settings import Settings
 FEWEST = 4
 
 
+@keywords()
 def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = None) -> list[Look]:
     """Do `job`: find its lighting, prove it, and write results to its folder.
 

@@ -19,6 +19,7 @@ from lightpaint.images.blocks import block_mean
 from lightpaint.images.denoise import Features, denoised, how_denoised
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.png import png_bytes, png_says, write_png
+from lightpaint.keywords import keywords
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline import obtain
 from lightpaint.progress import Listener, Progress, listener, silent
@@ -49,6 +50,7 @@ MANY_PIXELS, FEW_PIXELS, MUCH, FEW_RENDERS = 2**20, 2**12, 2**27, 6
 SHEET_KEY = "lightpaint.lights"
 
 
+@keywords()
 def render_template(
     scene: Scene,
     folder: str | Path,

@@ -11,6 +11,7 @@ from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analyse import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
@@ -63,6 +64,7 @@ RESULTS = (
 )
 
 
+@keywords()
 @dataclass(frozen=True)
 class Look:
     """One painting and its answer.

@@ -6,6 +6,7 @@ from typing import ClassVar, TypedDict
 
 from lightpaint.errors import LightpaintError
 from lightpaint.expected import SWITCH, Check, a, number, one_of, whole
+from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
 from lightpaint.scene.film import check_resolution
@@ -15,6 +16,7 @@ from lightpaint.scene.quality import Quality
 MAX_REFINE = 100
 
 
+@keywords()
 @dataclass(frozen=True)
 class Settings(Fit):
     """How a painting is to be answered.

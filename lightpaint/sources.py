@@ -15,6 +15,7 @@ from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import BasisError, LightpaintError
+from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints, Tie
 from lightpaint.records import strict_json
 from lightpaint.scene.scene import Scene, load_scene
@@ -31,6 +32,7 @@ RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "su
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
+@keywords()
 @dataclass(frozen=True)
 class SceneFile:
     """A scene by its file, as `load_scene` takes it; loaded once, when it is first asked for.
@@ -69,6 +71,7 @@ class SceneFile:
         return load_scene(**vars_of(self))
 
 
+@keywords()
 @dataclass(frozen=True)
 class Painting:
     """A painting by its file, as `read_target` takes it; read once.

@@ -14,6 +14,7 @@ from lightpaint.errors import BasisError
 from lightpaint.expected import BRIGHTEST, is_amount
 from lightpaint.images.denoise import Features
 from lightpaint.images.objects import Objects
+from lightpaint.keywords import keywords
 from lightpaint.scene.lights_file import Asked
 from lightpaint.screen import Listed, Shown, some_names, some_of
 from lightpaint.version import __version__
@@ -105,6 +106,7 @@ class Origin:
         return sum(self.halves)
 
 
+@keywords()
 @dataclass(frozen=True)
 class Basis(Shown):
     """The images of a scene lit by one light at a time.

@@ -20,6 +20,7 @@ from lightpaint.images.denoise import Features
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
 from lightpaint.images.objects import Objects
+from lightpaint.keywords import keywords
 from lightpaint.records import fields_of, read_record, strict_json
 
 FORMAT = "lightpaint-basis 1"
@@ -38,6 +39,7 @@ MAX_BYTES = 2**36
 _DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
+@keywords()
 def write_basis(path: str | Path, basis: Basis) -> None:
     """Write `basis` as a multi-part EXR, whole or not at all.
 
@@ -84,6 +86,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     write_parts(Path(path), parts)
 
 
+@keywords()
 def read_basis(path: str | Path) -> Basis:
     """Read what `write_basis` wrote, also where another program has put its parts in another order.
 

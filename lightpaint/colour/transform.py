@@ -23,6 +23,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.curves import BUILT_IN, Curve
 from lightpaint.colour.display import MAX_STOPS
 from lightpaint.errors import ViewError
+from lightpaint.keywords import keywords
 
 
 class Encoding(Protocol):
@@ -48,6 +49,7 @@ class Encoding(Protocol):
         """
 
 
+@keywords()
 @dataclass(frozen=True)
 class ViewTransform:
     """A view transform at an exposure. Build it with `ViewTransform.parse`, or by its name.
@@ -78,6 +80,7 @@ class ViewTransform:
         _encoding(self.name)
 
     @staticmethod
+    @keywords()
     def parse(text: str, stops: float = 0.0) -> "ViewTransform":
         """The transform that `text` names. `ocio` is the default display and view of the
         configuration.
@@ -142,6 +145,7 @@ class ViewTransform:
         return shown, slopes * scale if self.stops else slopes
 
 
+@keywords()
 @dataclass(frozen=True)
 class TransformChoice:
     """What somebody asks of a transform, maybe half of one; the rest is what a picture says.
@@ -165,6 +169,7 @@ class TransformChoice:
         self.over(None)
 
     @staticmethod
+    @keywords()
     def of(transform: "ViewTransform | TransformChoice | None") -> "TransformChoice":
         """A whole transform, a choice as it is, or nothing asked."""
         if isinstance(transform, ViewTransform):

@@ -10,11 +10,13 @@ from pathlib import Path
 
 from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes
+from lightpaint.keywords import keywords
 
 #: What is copied of the scene's folder, and what makes it is not.
 PATTERNS = ("scene.xml", "meshes/*.ply", "textures/*.png")
 
 
+@keywords()
 @dataclass(frozen=True)
 class Demo:
     """The demo in a folder of one's own.
@@ -34,6 +36,7 @@ class Demo:
     answer: Path
 
 
+@keywords()
 def write_demo(folder: str | Path) -> Demo:
     """Copy the demo into `folder`; what is there and the same is left alone.
 

@@ -11,12 +11,14 @@ from lightpaint.errors import ImageError
 from lightpaint.files import one_line
 from lightpaint.images.blocks import block_mean
 from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
+from lightpaint.keywords import keywords
 from lightpaint.screen import shortly, some_names
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"
 
 
+@keywords()
 @dataclass(frozen=True)
 class Estimate:
     """The mean of two independent renders A and B, and half their difference.
@@ -45,6 +47,7 @@ class Estimate:
             )
 
     @classmethod
+    @keywords()
     def of_halves(cls, a: Floats, b: Floats) -> "Estimate":
         """From two independent renders of equal sample count."""
         return cls((a + b) / 2, (a - b) / 2)

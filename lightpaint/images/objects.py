@@ -7,11 +7,13 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools
 from lightpaint.errors import SizeError
+from lightpaint.keywords import keywords
 
 #: Index of a pixel in which there is nothing.
 NOTHING = -1
 
 
+@keywords()
 @dataclass(frozen=True)
 class Objects:
     """Whose surface is seen first in each pixel.

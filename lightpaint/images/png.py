@@ -19,6 +19,7 @@ from lightpaint.colour.icc import Profile, gamma_profile, srgb_profile
 from lightpaint.colour.primaries import is_rec709, primaries_in
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing, write_bytes
+from lightpaint.keywords import keywords
 
 #: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
 MAX_CHUNK = 2**24
@@ -72,6 +73,7 @@ def png_says(path: Path, key: str) -> bool:
     return head.startswith(b"\x89PNG") and b"tEXt" + key.encode() + b"\0" in head
 
 
+@keywords()
 def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:
     """A linear image as a picture that a notebook shows.
 

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
+from lightpaint.keywords import keywords
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.software import Software
 from lightpaint.screen import shortly
 
 
+@keywords()
 @dataclass(frozen=True)
 class Certificate:
     """How good a solve is, per colour channel (R, G, B).

@@ -8,6 +8,7 @@ from typing import Any
 
 from lightpaint.errors import LightingError
 from lightpaint.files import one_line, read_text, write_text
+from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
@@ -26,6 +27,7 @@ FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basi
 SEEN = ("delta_e", "delta_e_noise", "delta_e_asked")
 
 
+@keywords()
 def write_lighting(path: str | Path, lighting: Lighting) -> None:
     """Write lighting.json (docs/formats.md), whole or not at all.
 
@@ -68,6 +70,7 @@ def lighting_fields(lighting: Lighting) -> dict[str, Any]:
     return data
 
 
+@keywords()
 def read_lighting(path: str | Path) -> Lighting:
     """Read what `write_lighting` wrote.
 

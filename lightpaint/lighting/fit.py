@@ -8,6 +8,7 @@ from lightpaint.colour.exposure import choose_exposure
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.expected import SWITCH, Check, a, check_fields, number, one_of
+from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.target.target import Target
 
@@ -29,6 +30,7 @@ F = TypeVar("F", bound="Fit")
 Emitters = Literal["auto", "count", "skip"]
 
 
+@keywords()
 @dataclass(frozen=True)
 class Fit:
     """How close is measured, and how the closest is found.

@@ -14,11 +14,13 @@ from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.expected import BRIGHTEST
 from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.screen import Shown, some_names, some_of
 
 
+@keywords()
 @dataclass(frozen=True)
 class Lighting(Shown, Mapping[str, LightSetting]):
     """Emissions for named lights: a mapping of their names to their settings, in their order.
@@ -145,6 +147,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return replace(self, certificate=certificate)
 
     @classmethod
+    @keywords()
     def of_weights(
         cls,
         basis: Basis,
@@ -169,6 +172,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return cls(settings, scene_identity=basis.origin.scene_identity, **about)
 
     @classmethod
+    @keywords()
     def present(cls, basis: Basis) -> "Lighting":
         """The scene's lighting as it is."""
         return cls.of_weights(basis, basis.present_weights)
@@ -196,6 +200,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return np.array([given[name] for name in basis.names], dtype=np.float64)
 
 
+@keywords()
 def combine(
     basis: Basis, lighting: Lighting | Mapping[str, float | Sequence[float]] | npt.ArrayLike
 ) -> Estimate:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, ConstraintError, TargetError
+from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
@@ -50,6 +51,7 @@ class Refinement:
     share: float
 
 
+@keywords()
 @dataclass(frozen=True)
 class Problem:
     """A loss over the pictures that a basis can make, and what the lights may do.
@@ -101,6 +103,7 @@ class Problem:
     __repr__ = shortly
 
     @classmethod
+    @keywords()
     def of(
         cls,
         basis: Basis | Sequence[Basis],
@@ -109,6 +112,7 @@ class Problem:
         constraints: Constraints | None = None,
         start: Doubles | None = None,
         fit: Fit | None = None,
+        resize: bool = False,
     ) -> "Problem":
         """Of one view, or of several: their bases and targets in the same order. As of `solve`.
 
@@ -124,7 +128,7 @@ class Problem:
         asked = constraints_of(whole.asked).and_then(constraints or Constraints())
         fit = fit or Fit()
         fitted = [
-            what_counts(its.fitted_to(one.size, resize=False), one.emitters_seen, fit.emitters)
+            what_counts(its.fitted_to(one.size, resize=resize), one.emitters_seen, fit.emitters)
             for its, one in zip(targets, parts, strict=True)
         ]
         views = Views(parts, tuple(fitted))

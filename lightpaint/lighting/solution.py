@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.fit import Space
 from lightpaint.lighting.lighting import Lighting
@@ -17,6 +18,7 @@ from lightpaint.lighting.reweighted import Reweighting
 from lightpaint.screen import Shown
 
 
+@keywords()
 @dataclass(frozen=True)
 class Solution(Shown):
     """The lighting that comes closest to a target, and the problem it solves.

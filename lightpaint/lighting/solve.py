@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
+from lightpaint.keywords import keywords
 from lightpaint.lighting.approach import near_optimum
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -33,12 +34,14 @@ from lightpaint.target.target import Target
 PULL = 1e-7
 
 
+@keywords(Fit)
 def solve(
     basis: Basis | Sequence[Basis],
     target: Target | Sequence[Target],
     *,
     constraints: Constraints | None = None,
     start: Lighting | None = None,
+    resize: bool = False,
     **fit: Any,
 ) -> Solution:
     """Find the non-negative light colours whose image comes closest to `target`.
@@ -55,6 +58,7 @@ def solve(
         start: Lighting to begin with (the present one by default): a good guess saves sweeps, the
             answer is the same, but for what no painted pixel tells: lights that reach none keep the
             start.
+        resize: Whether a target of another size than the basis, of the same shape, is resampled.
         **fit: Any of `Fit`, by name: `unpainted=0.1` also holds what is not painted to the current
             look, `transform=lp.ViewTransform("agx")` comes closest in what that shows instead of in
             linear light.
@@ -63,7 +67,8 @@ def solve(
         The lighting, the problem it solves, and the certificate.
 
     Raises:
-        SizeError: If basis and target differ in size.
+        SizeError: If basis and target differ in size, and not in whole blocks of pixels.
+        KeywordError: For a name that neither this nor `Fit` has.
         TargetError: If nothing counts.
         ConstraintError: If a constraint does not fit the lights.
         BasisError: If views differ in lights.
@@ -75,7 +80,8 @@ def solve(
         >>> solution
         Solution(closest there is (KKT residual ...)...)
     """
-    problem = Problem.of(basis, target, constraints=constraints, fit=Fit(**fit))
+    how = Fit(**fit)
+    problem = Problem.of(basis, target, constraints=constraints, fit=how, resize=resize)
     begin = problem.start if start is None else start.weights_for(problem.basis)
     return solution_of(replace(problem, start=begin))
 

@@ -16,6 +16,7 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.blocks import whole_factor
+from lightpaint.keywords import keywords
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.additions import Addition, find_additions
 from lightpaint.placement.candidates import Candidates
@@ -61,6 +62,7 @@ def check_suggestible(scene: Scene) -> None:
         )
 
 
+@keywords()
 def suggest_lights(
     scene: Scene,
     basis: Basis,

@@ -4,11 +4,13 @@ from dataclasses import dataclass, field
 
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.colour.photometry import Photometry, photometry, point_flux
+from lightpaint.keywords import keywords
 
 #: Of the intensity of a point light.
 UNIT = "W/sr"
 
 
+@keywords()
 @dataclass(frozen=True)
 class Suggestion:
     """A point light to add to the scene.

@@ -15,6 +15,7 @@ from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.exr import write_rgb
+from lightpaint.keywords import keywords
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
@@ -24,6 +25,7 @@ from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
 
 
+@keywords()
 def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     """Write `scene` with the emissions of `lighting` to `path`, and load it back.
 

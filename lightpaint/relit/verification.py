@@ -15,6 +15,7 @@ from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 
 #: Side of the blocks of pixels over which differences are averaged before they are judged.
@@ -27,6 +28,7 @@ LIMIT = 5.0
 PRECISION = 1e-5
 
 
+@keywords()
 @dataclass(frozen=True)
 class Verification(Shown):
     """How far prediction and verification are apart.

@@ -3,12 +3,14 @@
 from lightpaint.errors import SizeError
 from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.verification import Verification, compare
 from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
 
 
+@keywords()
 def verify(
     predicted: Estimate,
     relit: Scene,

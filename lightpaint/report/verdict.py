@@ -4,6 +4,7 @@ import numpy as np
 
 from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.held_back import Held
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
@@ -19,6 +20,7 @@ HOLDING: dict[Held, str] = {
 }
 
 
+@keywords()
 def verdict(
     solution: Solution,
     predicted: Estimate,

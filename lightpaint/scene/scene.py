@@ -17,6 +17,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
+from lightpaint.keywords import keywords
 from lightpaint.scene.checks.old import words_for_old_scenes
 from lightpaint.scene.checks.xml import MAX_XML
 from lightpaint.scene.choice import REST, choose_lights
@@ -35,6 +36,7 @@ from lightpaint.screen import Listed, Shown, some_names, some_of
 _Made = TypeVar("_Made")
 
 
+@keywords()
 @dataclass(frozen=True)
 class Scene(Shown):
     """A parsed scene, seen through one of its sensors.
@@ -254,6 +256,7 @@ class Scene(Shown):
         return np.array(rgb)
 
 
+@keywords()
 @MITSUBA.taken()
 def load_scene(
     path: str | Path,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lightpaint.errors import BackendError
+from lightpaint.keywords import keywords
 from lightpaint.scene.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
 from lightpaint.scene.plugins import loaded_plugins
 from lightpaint.signals import interruptible_between_pieces
@@ -37,6 +38,7 @@ class Backend:
 _current: Backend | None = None
 
 
+@keywords()
 def use_variant(wanted: str | None = None) -> Backend:
     """Set up Mitsuba once, as `wanted` or as the fastest RGB variant that works here.
 

@@ -12,6 +12,7 @@ from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.keywords import keywords
 from lightpaint.target.own import painted_of
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target, share_of, spoken_share
@@ -58,6 +59,7 @@ class _Reading:
         return name if self.folder is None else str(self.folder / name)
 
 
+@keywords()
 def read_target(
     path: str | Path,
     *,

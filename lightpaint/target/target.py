@@ -8,16 +8,22 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
+from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.blocks import block_mean, whole_factor
 from lightpaint.images.resample import resampled
+from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 
 #: By how much more than half one of two shares prevails, beyond the rounding of float32.
 TIE = 1e-5
 
+#: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.
+NEGATIVE = 1e-3
 
+
+@keywords()
 @dataclass(frozen=True)
 class Target(Shown):
     """The painted image Ψ and its importance D.
@@ -94,13 +100,16 @@ class Target(Shown):
             )
 
     @classmethod
+    @keywords()
     def of(
         cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = "target"
     ) -> "Target":
         """A target from arrays, which are copied as float32.
 
-        image: (h, w, 3) floats, linear Rec.709, finite. importance: (h, w) >= 0, or a mask of
-        bools; without one every pixel counts 1. name: what messages and results call it.
+        image: (h, w, 3) floats, linear Rec.709, finite. Single components may be negative, as those
+        of colours that Rec.709 lacks; where it counts luminance may not, beyond a thousandth of
+        the brightest. importance: (h, w) >= 0, or a mask of bools; without one every pixel counts
+        1. name: what messages and results call it.
 
         Raises TargetError or SizeError for what is none.
         """
@@ -119,6 +128,8 @@ class Target(Shown):
             raise TargetError(f"target {name}: importance of {counts.dtype}: expected numbers")
         with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, and refused
             pixels, counts = given.astype(np.float32), counts.astype(np.float32)
+        if counts.shape == pixels.shape[:2]:  # else that is told
+            _check_is_light(name, pixels, counts > 0)
         return cls(name, pixels, counts, everything=importance is None)
 
     def __repr__(self) -> str:
@@ -237,6 +248,18 @@ class Target(Shown):
                 f"{width}x{height}: crop it to that shape, since resize=True does not stretch"
             )
         return self.resized(size)
+
+
+def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
+    """Raise TargetError where there would have to be less than no light."""
+    bright = np.where(counts & np.isfinite(image).all(axis=-1), luminance(image), 0)
+    least = float(bright.min())
+    if least < -NEGATIVE * float(np.abs(bright).max()):
+        below = int((bright < 0).sum())
+        raise TargetError(
+            f"target {name} has a negative luminance in {below} of {bright.size} pixels, down to "
+            f"{least:.3g}: expected light, which is never below 0; np.maximum(image, 0) cuts it off"
+        )
 
 
 def share_of(importance: Floats) -> float:

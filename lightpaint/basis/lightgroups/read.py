@@ -19,6 +19,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import FILES
 from lightpaint.basis.lightgroups.roles import Roles, roles_of
 from lightpaint.errors import BasisError
+from lightpaint.keywords import keywords
 from lightpaint.screen import shortly, some_names
 
 #: What one unit of weight is.
@@ -28,6 +29,7 @@ AS_RENDERED = "× as rendered"
 REST = "rest"
 
 
+@keywords()
 @dataclass(frozen=True)
 class LightGroups:
     """What `read_light_groups` found.
@@ -81,6 +83,7 @@ class LightGroups:
         return all(layer.is_half for layer in self.layers)
 
 
+@keywords()
 def read_light_groups(
     path: str | Path, *, pattern: str | None = None, leave_out: Iterable[str | Path] = ()
 ) -> LightGroups:

@@ -14,6 +14,7 @@ from lightpaint.basis.render.separate import (
     render_separately,
 )
 from lightpaint.errors import BasisError, SceneError
+from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
@@ -29,6 +30,7 @@ SEPARATE = "separate renders"
 IN_PARTS = "one pass, in parts"
 
 
+@keywords()
 def render_basis(
     scene: Scene,
     *,

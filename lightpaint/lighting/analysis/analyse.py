@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.color_choices import Choices, best_of_each, color_choices
 from lightpaint.lighting.analysis.costs import without_constraints
@@ -16,6 +17,7 @@ from lightpaint.screen import shortly
 from lightpaint.threads import side_by_side
 
 
+@keywords()
 @dataclass(frozen=True)
 class Analysis:
     """What is known of an answer, or of the answer to one of several views.
@@ -48,6 +50,7 @@ class Analysis:
     __repr__ = shortly
 
 
+@keywords()
 def analyse(solution: Solution) -> tuple[Analysis, ...]:
     """An analysis for each view.
 

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.directions import all_columns
 from lightpaint.lighting.analysis.grain import grain
 from lightpaint.lighting.analysis.noise import pseudo_inverse
@@ -52,6 +53,7 @@ class Place:
     object: str = ""
 
 
+@keywords()
 @dataclass(frozen=True)
 class Diagnosis:
     """The residual's energy Σ D (Ψ − ΣwΦ)², all channels together, and where it comes from.
@@ -114,6 +116,7 @@ class Diagnosis:
         return part / self.total if self.total > 0 else 0.0
 
 
+@keywords()
 def diagnose(solution: Solution) -> Diagnosis:
     """Split what `solution`, of one view, misses of its target.
 

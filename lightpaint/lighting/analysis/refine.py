@@ -14,6 +14,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.directions import moving
 from lightpaint.lighting.analysis.noise import (
     lacking_gradient,
@@ -27,6 +28,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
 
 
+@keywords()
 def refine(solution: Solution, mixed: Estimate) -> Solution:
     """One step from the weights w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over w' >= 0.
 

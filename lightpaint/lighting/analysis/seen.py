@@ -14,6 +14,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.difference import ciede2000
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.objects import Objects
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
 from lightpaint.lighting.analysis.held_back import Held, held_back_by
 from lightpaint.lighting.analysis.looking import Looking
@@ -44,6 +45,7 @@ GETS_THERE, DOES_MUCH = 0.01, 0.1
 THINNED = 2
 
 
+@keywords()
 @dataclass(frozen=True)
 class Seen:
     """How far an answer looks from what was painted: mean CIEDE2000 over the paint.
@@ -113,6 +115,7 @@ class Seen:
         return is_another or self.is_in_vain
 
 
+@keywords()
 def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     """How far `solution` looks from its painting, where most, and what keeps it from there.
 

@@ -14,6 +14,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
+from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.directions import (
     Room,
     answer_to,
@@ -51,6 +52,7 @@ SAME_NOISE = 1e-4
 SHARES = 8
 
 
+@keywords()
 @dataclass(frozen=True)
 class Uncertainty:
     """What noise does to a solve. All are estimates themselves, good to a third or so.
@@ -103,6 +105,7 @@ class Uncertainty:
         return np.hypot(self.scatter, self.bias)
 
 
+@keywords()
 def error_bars(solution: Solution) -> Uncertainty | None:
     """Standard error and bias of every weight that a solve or `refine` found.
 
@@ -211,6 +214,7 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
     return np.asarray(np.maximum(solved - low, high - solved) > solved)
 
 
+@keywords()
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """The solution of the equations without that share of the noise power in M and b.
 

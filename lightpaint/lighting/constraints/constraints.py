@@ -11,6 +11,7 @@ from typing import Any
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import ConstraintError
+from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.values import (
     Level,
     Lock,
@@ -104,6 +105,7 @@ class Tie:
             raise ConstraintError(f"{self.where}: expected names of at least two lights")
 
 
+@keywords()
 @dataclass(frozen=True)
 class Constraints:
     """What is asked of the lights, besides to come close to the painting.
@@ -141,6 +143,7 @@ class Constraints:
         return bool(self.lights or self.ties or self.prefer_current or self.sparse is not None)
 
     @classmethod
+    @keywords()
     def of(
         cls,
         light: Mapping[str, Mapping[str, Any]] | None = None,

@@ -6,6 +6,7 @@ from typing import Any
 
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
+from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.values import check_keys, strength_of
 from lightpaint.scene.lights_file import Asked, read_keys
@@ -14,6 +15,7 @@ from lightpaint.scene.lights_file import Asked, read_keys
 MAX_SAID = 1000
 
 
+@keywords()
 def read_constraints(path: str | Path) -> Constraints:
     """What the lights file at `path` asks of the lights; nothing if it only chooses them.
 

@@ -14,6 +14,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
 from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.keywords import keywords
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
@@ -32,6 +33,7 @@ _FORMULA = re.compile(r"(\A|[;\t\r\n])(?=['=+\-@\t\r\n＝＋－＠])")
 LARGEST_HALF = 65504.0
 
 
+@keywords()
 def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -> list[Path]:
     """Write `lighting`, solved from `groups`, into `folder` for other programs.
 

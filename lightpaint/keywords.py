@@ -1,0 +1,58 @@
+"""Names of arguments: one that a function does not have is told with the one that is near."""
+
+import difflib
+import inspect
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import fields
+from functools import wraps
+from typing import Any, TypeVar
+
+from lightpaint.errors import KeywordError
+from lightpaint.screen import some_names
+
+_Call = TypeVar("_Call", bound=Callable[..., Any])
+
+
+def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
+    """Make a function, or a class when it is called, raise KeywordError for a name it has not.
+
+    Python's own TypeError names no near argument before 3.13, and none of what is passed on.
+
+    passed_on: dataclasses that the function's `**` is passed on to; where it has `**` and none is
+    given, what it is passed on to checks it.
+    """
+
+    def decorate(call: _Call) -> _Call:
+        inner: Any = call.__init__ if isinstance(call, type) else call  # type: ignore[misc]
+        parameters = inspect.signature(inner).parameters
+        known = _names(parameters) | {x.name for kind in passed_on for x in fields(kind) if x.init}
+
+        if not passed_on and any(x.kind is x.VAR_KEYWORD for x in parameters.values()):
+            return call
+
+        @wraps(inner)
+        def checked(*given: Any, **named: Any) -> Any:
+            for name in named:
+                if name not in known:
+                    # Of a function that was called, and not of the decorator.
+                    raise _unknown(call.__qualname__, name, known) from None
+            return inner(*given, **named)
+
+        if isinstance(call, type):
+            call.__init__ = checked  # type: ignore[misc]
+            return call
+        return checked  # type: ignore[return-value]
+
+    return decorate
+
+
+def _names(parameters: Mapping[str, inspect.Parameter]) -> set[str]:
+    """Return the names that can be given, in which an object's own is none."""
+    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return {x.name for x in parameters.values() if x.kind in kinds} - {"self", "cls"}
+
+
+def _unknown(call: str, name: str, known: Collection[str]) -> KeywordError:
+    near = difflib.get_close_matches(name, sorted(known), 1)
+    hint = f": did you mean {near[0]!r}?" if near else f"; it has {some_names(sorted(known))}"
+    return KeywordError(f"{call}() has no argument {name!r}{hint}")
