@@ -1,5 +1,7 @@
 """The corridor: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
 
+import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.placement.suggest import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
+from lightpaint.relit.budget import Budget, verification_budget
 from lightpaint.relit.export.exports import write_exports
 from lightpaint.relit.relight import relight, settle
 from lightpaint.relit.rounds import refine_by_rendering
@@ -31,9 +34,6 @@ from lightpaint.results import Look, write_predicted, write_report
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.settings import Settings
-
-#: Samples per pixel of a verification that has a large film for a small basis, at least.
-FEWEST = 4
 
 
 @keywords()
@@ -100,14 +100,16 @@ def obtain(
     views: that share the time there is. render: who renders what is missing.
     """
     listen = listener(progress)
-    is_rendered = False
+    is_rendered = is_all_rendered = False
 
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-        nonlocal is_rendered
+        nonlocal is_rendered, is_all_rendered
+        is_all_rendered |= not is_rendered and done == 0
         is_rendered = True
         listen(label, done, total, unit)
 
     asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+    began_s = time.perf_counter()
     basis = obtain_basis(
         scene,
         spp=asked,
@@ -118,6 +120,8 @@ def obtain(
         progress=report,
         render=render,
     )
+    if is_all_rendered:
+        basis = replace(basis, render_s=time.perf_counter() - began_s)
     if settings.use_cache and not cache.is_kept(basis):
         listen.say(
             f"the basis could not be kept in {folder()}, so the next run renders it again: "
@@ -210,19 +214,22 @@ def _finished(
     place = folder / view.folder.relative_to(job.folder)
     place.mkdir(exist_ok=True)
     predicted = combine(basis, solution.lighting)
-    spp = settings.spp or (basis.origin.spp if scene is None else scene.spp)
-    verification, suggestions = None, None
+    verification, suggestions, budget = None, None, None
     if relit is not None and scene is not None:
         if relit.sensor != scene.sensor:
             relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False)
-        if settings.checks_as_basis:
-            pixels, checked = (size[0] * size[1] for size in (basis.size, relit.size))
-            spp = max(FEWEST, basis.origin.spp * pixels // checked)
-    write_predicted(place / "predicted.exr", predicted, origin=basis.origin, spp=spp)
-    if relit is not None and settings.verify:
-        verification = verify(predicted, relit, spp=spp, seed=settings.seed, progress=listen)
+        budget = _budget(settings, basis, relit)
+    spp, size = basis.origin.spp, basis.size
+    if budget is not None:
+        spp, size = budget.spp, budget.scene.size
+    write_predicted(place / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size)
+    if budget is not None and settings.verify:
+        listen.say(_spoken(budget, basis))
+        verification = verify(
+            predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
+        )
         write_estimate(place / "verified.exr", verification.verified, {})
-        listen.note(f"verified with {spp} samples per pixel")
+        listen.note(f"verified with {budget.spp} samples per pixel")
     if settings.suggest and scene is not None:
         suggestions = suggest_lights(
             scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
@@ -243,3 +250,27 @@ def _finished(
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look
+
+
+def _budget(settings: Settings, basis: Basis, relit: Scene) -> Budget:
+    """Return what the verification of `relit`, on its whole film, may cost."""
+    most = None if settings.checks_as_basis else settings.spp or relit.spp
+    spp = basis.origin.spp
+    if settings.time_s is None:
+        # A basis that was kept may have many times the samples that are asked for.
+        spp = min(spp, samples(settings.quality, spp=settings.spp, time_s=None) or relit.spp)
+    return verification_budget(relit, basis.size, spp, most_spp=most, asked_spp=settings.verify_spp)
+
+
+def _spoken(budget: Budget, basis: Basis) -> str:
+    """How long a verification takes, before it starts."""
+    height, width = budget.scene.size
+    its = f"verification of {budget.spp} samples per pixel on {width}x{height}"
+    how = "(verify=False leaves it out)"
+    if basis.render_s is not None:
+        seconds = math.ceil(budget.share * basis.render_s)
+        long = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
+        return f"{its}: {long} at most {how}"
+    if budget.share <= 1:
+        return f"{its}: no longer than so many samples of the basis took {how}"
+    return f"{its}: {budget.share:.2g} times as long as the basis took at most {how}"

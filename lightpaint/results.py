@@ -9,6 +9,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
+from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
 from lightpaint.keywords import keywords
@@ -152,12 +153,15 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
     return names
 
 
-def write_predicted(path: Path, predicted: Estimate, *, origin: Origin, spp: int) -> None:
+def write_predicted(
+    path: Path, predicted: Estimate, *, origin: Origin, spp: int, size: tuple[int, int]
+) -> None:
     """predicted.exr, with a note of how to see the relit scene as the basis saw it.
 
-    origin: of the basis. spp: samples per pixel of the verification.
+    origin: of the basis. spp, size: samples per pixel of the verification, (height, width).
     """
-    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp}
+    film = {"width": size[1], "height": size[0]}
+    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film}
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
 
 
@@ -172,8 +176,12 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
         return
     verified = look.verification.verified.image if look.verification else None
     larger = None
-    if look.relit is not None and verified is not None and look.relit.size != look.basis.size:
-        larger = render_features(look.relit)
+    if look.relit is not None and verified is not None:
+        height, width = size = verified.shape[:2]
+        if size != look.basis.size:
+            is_whole = size == look.relit.size
+            film = look.relit if is_whole else look.relit.reduced(f"{width}x{height}")
+            larger = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
     looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
     transform = transform_of(look.target, look.basis, predicted)
@@ -247,6 +255,11 @@ def verify_result(
     predicted, attributes = read_estimate(path)
     seen = _read_view(path, attributes.get(VIEW_KEY, "{}"))
     relit = load_scene(relit_xml, sensor=seen.sensor, use_lights_file=False)
+    if seen.width is not None and seen.height is not None:
+        film = (seen.height, seen.width)
+        # A scene that was changed by hand has another film, which `verify` refuses by name.
+        if relit.size != film and whole_factor(relit.size, film) is not None:
+            relit = relit.reduced(f"{seen.width}x{seen.height}")
     return verify(
         predicted,
         relit,
@@ -259,10 +272,15 @@ def verify_result(
 
 @dataclass(frozen=True)
 class _Seen:
-    """What stands under VIEW_KEY; None where nothing does. spp: samples per pixel."""
+    """What stands under VIEW_KEY; None where nothing does.
+
+    spp: samples per pixel. width, height: of the verification; of the whole film if not there.
+    """
 
     sensor: str | None = None
     spp: int | None = None
+    width: int | None = None
+    height: int | None = None
 
     def __post_init__(self) -> None:
         if self.spp == 0:

@@ -33,13 +33,12 @@ class Settings(Fit):
             light, sRGB at an exposure that shows something.
         emitters: Whether pixels in which the camera sees an emitter count, as of `Fit`.
         resize: Whether a target of another size is resampled.
-        spp: Samples per pixel of the basis and of the verification.
+        spp: Samples per pixel of the basis, and at most of the verification.
         time_s: Instead of spp, seconds in which the basis is rendered, of all views together.
         seed: Of the basis and, with other random numbers, of the verification.
         resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
-            verification has the whole film.
-        quality: Preset of spp and resolution, where these are not given. With a time or a preset
-            the verification has about as many samples as the basis, whatever the resolution.
+            verification has the whole film, or as much of it as its samples are enough for.
+        quality: Preset of spp and resolution, where these are not given.
         use_cache: Whether a basis from an earlier run is taken, and this one kept.
         exact_spp: Whether the basis has just as many samples as are asked for, even where one with
             more is kept: then the answer does not depend on what earlier runs have left.
@@ -50,7 +49,9 @@ class Settings(Fit):
         suggest: How many point lights that would help most are looked for at most; needs a scene,
             and one view only.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
-        verify: Whether the scene as it was relit is rendered, to see that the prediction holds.
+        verify: Whether the scene as it was relit is rendered, to see that the prediction holds,
+            with as many samples as the basis has at most, so that it takes no longer.
+        verify_spp: Instead, samples per pixel of the verification, on the whole film.
         report: Whether there are report.html and comparison.png beside the numbers.
         force: Whether results of something else, or changed by hand, are replaced.
         command: The shell command that asks for this, for the report.
@@ -80,6 +81,7 @@ class Settings(Fit):
     suggest: int = 0
     cd_per_unit: float | None = None
     verify: bool = True
+    verify_spp: int | None = None
     report: bool = True
     force: bool = False
     command: str = ""
@@ -100,6 +102,7 @@ class Settings(Fit):
         "suggest": whole(0),
         "cd_per_unit": number("cd/m²"),
         "verify": SWITCH,
+        "verify_spp": whole(2),
         "report": SWITCH,
         "force": SWITCH,
         "command": a(str, "the text of a shell command"),
@@ -116,6 +119,11 @@ class Settings(Fit):
             raise LightpaintError(
                 f"exact_spp is True and time_s {self.time_s:g}: expected a number of samples, of "
                 "which a time says nothing"
+            )
+        if self.verify_spp is not None and not self.verify:
+            raise LightpaintError(
+                f"verify is False and verify_spp {self.verify_spp}: expected one of them, no "
+                "verification or its samples"
             )
         if self.resolution is not None:
             check_resolution(self.resolution)
@@ -158,6 +166,7 @@ class SettingsByName(TypedDict, total=False):
     suggest: int
     cd_per_unit: float | None
     verify: bool
+    verify_spp: int | None
     report: bool
     force: bool
     command: str

@@ -28,7 +28,8 @@ FORMAT = "lightpaint-job 1"
 FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by_sensor")
 
 #: Settings that only change what is rendered, and those that light groups know nothing of.
-RENDERED = ("spp", "exact_spp", "time_s", "quality", "resolution", "refine", "suggest")
+SAMPLED = ("spp", "exact_spp", "time_s", "quality", "resolution")
+RENDERED = (*SAMPLED, "refine", "suggest", "verify_spp")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 

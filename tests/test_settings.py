@@ -32,6 +32,7 @@ WRONG = {
     "suggest": (-1, 1.5, None, True),
     "cd_per_unit": (0, -100, math.nan, math.inf, "100", True),
     "verify": ("no", 0, None),
+    "verify_spp": (1, 1.5, "many"),
     "report": ("no", 1, None),
     "command": (None, ["lightpaint"]),
 }
@@ -59,6 +60,7 @@ RIGHT = {
     "suggest": (0, 3),
     "cd_per_unit": (None, 100, 0.5),
     "verify": (True, False),
+    "verify_spp": (None, 2, 64),
     "report": (True, False),
     "command": ("", "lightpaint solve a b"),
 }

@@ -127,6 +127,8 @@ class Basis(Shown):
         objects: Whose surfaces are seen, or None.
         source: Path of the file that it was read from, or of the scene that it was rendered of, for
             people; of memory only.
+        render_s: Seconds that all of it took to render in this process; None where that is not
+            known, as of what was kept; of memory only.
 
     Examples:
         >>> basis.names
@@ -145,6 +147,7 @@ class Basis(Shown):
     features: Features | None = None
     objects: Objects | None = None
     source: str = field(default="", compare=False)
+    render_s: float | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         n = len(self.lights)

@@ -168,8 +168,8 @@ def add_resolution(parser: argparse.ArgumentParser) -> None:
         "--resolution",
         metavar="1/N|WxH",
         help="render with a pixel for each square block of the film's pixels, like 1/4 or 320x180; "
-        "what makes no whole block at the right and at the bottom is left out; the verification of "
-        "solve keeps the whole film (default: the whole film)",
+        "what makes no whole block at the right and at the bottom is left out (default: the whole "
+        "film)",
     )
 
 

@@ -29,6 +29,7 @@ from lightpaint.cli.solve_options import (
     add_pattern,
     add_several,
     add_variations,
+    add_verification,
     add_wanted,
 )
 from lightpaint.version import __version__
@@ -120,6 +121,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_several(parser)
     add_variations(parser)
     add_method(parser)
+    add_verification(parser)
     add_wanted(parser)
     add_unit(parser)
     add_lights(parser)

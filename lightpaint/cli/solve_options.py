@@ -153,6 +153,24 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_verification(parser: argparse.ArgumentParser) -> None:
+    """How the answer is checked."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "--no-verify",
+        dest="verify",
+        action="store_false",
+        help="do not render the scene as it was relit (default: as many samples as the basis has, "
+        "at most, on the whole film or as much of it as they are enough for)",
+    )
+    group.add_argument(
+        "--verify-spp",
+        type=arguments.at_least(2),
+        metavar="N",
+        help="samples per pixel of that render, on the whole film, however long it takes",
+    )
+
+
 def add_several(parser: argparse.ArgumentParser) -> None:
     """What several paintings of one scene are to each other."""
     parser.add_argument(

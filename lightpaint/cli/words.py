@@ -41,6 +41,7 @@ OPTIONS = {
     "time_s": "--time",
     "transform": "--view",
     "variant": "-m",
+    "verify_spp": "--verify-spp",
 }
 
 #: What is spelled otherwise than by an option and a value.
@@ -49,6 +50,7 @@ SPELLINGS = {
     "find=False": "--no-template",
     "noise_correction=False": "--no-correct-noise",
     "use_cache=False": "--no-cache",
+    "verify=False": "--no-verify",
 }
 
 #: `name=value` as the library writes it: alone among words, so that no path is taken for one.

@@ -555,7 +555,8 @@ def test_wrong_choices_are_refused_in_one_line(
 
 
 def test_solved_small_and_verified_large(tmp_path: Path) -> None:
-    arguments = ("solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 16, "--seed", 8)
+    few = ("--resolution", "1/4", "--spp", 16, "--seed", 8)
+    arguments = ("solve", CORNELL, WARM, *few, "--verify-spp", 16)
     output = succeed(tmp_path, *arguments)
     assert "A render confirms it." in output
     sizes = {}
@@ -604,12 +605,14 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
     assert done.stderr == "basis: 1 seconds\n"
     first = spp_of(done.stdout)
     assert spp_of(succeed(tmp_path, *arguments)) > first
-    # The verification has as many samples as the basis: a sixteenth in each pixel.
+    # The verification has as many samples as the basis: a sixteenth in each pixel, or a quarter in
+    # each of a smaller film.
     solved = ("solve", CORNELL, WARM, *arguments[2:], "--quality", "final")
     assert "A render confirms it." in succeed(tmp_path, *solved)
     [part] = read_parts(tmp_path / "warm" / "predicted.exr")
     has = spp_of(succeed(tmp_path, "basis", CORNELL, *arguments[4:], "--spp", 2))
-    assert json.loads(part.attributes["lightpaint.view"])["spp"] == max(4, has // 16)
+    seen = json.loads(part.attributes["lightpaint.view"])
+    assert seen["spp"] * seen["width"] * seen["height"] == pytest.approx(has * 32 * 32, rel=0.1)
 
 
 def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_path: Path) -> None:
@@ -640,7 +643,7 @@ def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     mask[50:] = 1
     write_parts(tmp_path / "mask.exr", [Part("mask", {"Y": mask})])
     solve = ("solve", "room.xml", "look.exr", "--mask", "mask.exr", *size, "--quality", "preview")
-    done = run(tmp_path, *solve, "--spp", 8)
+    done = run(tmp_path, *solve, "--spp", 8, "--verify-spp", 8)
     assert done.returncode == 0, done.stderr
     assert (
         "film of 171x128 reduced to 42x32 blocks of 4x4 pixels: 3 columns of pixels at the right "
