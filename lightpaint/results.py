@@ -9,7 +9,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
-from lightpaint.images.blocks import whole_factor
+from lightpaint.images.blocks import Size, whole_factor
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.png import png_bytes
 from lightpaint.keywords import keywords
@@ -154,13 +154,14 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
 
 
 def write_predicted(
-    path: Path, predicted: Estimate, *, origin: Origin, spp: int, size: tuple[int, int]
+    path: Path, predicted: Estimate, *, origin: Origin, spp: int, size: Size | None = None
 ) -> None:
     """predicted.exr, with a note of how to see the relit scene as the basis saw it.
 
-    origin: of the basis. spp, size: samples per pixel of the verification, (height, width).
+    origin: of the basis. spp, size: samples per pixel of the verification, and (height, width) of
+    its film, the whole one by default.
     """
-    film = {"width": size[1], "height": size[0]}
+    film = {} if size is None else {"width": size[1], "height": size[0]}
     seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film}
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
 

@@ -198,9 +198,9 @@ def test_both_ways_the_same():
     assert there.agrees == back.agrees
 
 
-@pytest.mark.parametrize(("brightness", "exposure"), [(1.0, 1.0), (2.0**-10, 2.0**10)])
+@pytest.mark.parametrize(("brightness", "exposure"), [(1.0, 1.0), (2.0**-10, 2.0**8.5)])
 def test_colour_difference_is_taken_as_it_is_shown(brightness: float, exposure: float):
-    """A picture too dark to show anything is compared at the exposure of the report."""
+    """A picture too dark to show anything is compared near middle grey: at 0.36."""
     image = np.full((8, 8, 3), 1.0, np.float32) * np.float32(brightness)
     other = image * np.array([0.9, 1, 1], np.float32)
     other[:2] = image[:2]
