@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from lightpaint.batch import cluster_worker
+from lightpaint.batch.cluster_tls import check_trust
 from lightpaint.batch.cluster_worker import versions as own_versions
 from lightpaint.batch.parcels import Parcel, pieces, sent_files
 from lightpaint.errors import BatchError
@@ -138,12 +139,13 @@ def _connected(address: str) -> Any:
     except ImportError as error:
         raise BatchError(f"a cluster needs Dask's distributed: {INSTALL}") from error
     try:
-        # A client that finds nobody takes its time, and has last words.
+        # A client that finds nobody, or is not let in, takes its time, and has last words.
         place = get_address_host_port(address, strict=True)
-        socket.create_connection(place, timeout=ANSWER_S).close()
+        with socket.create_connection(place, timeout=ANSWER_S) as connection:
+            check_trust(address, connection)
         return Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise BatchError(
             f"no scheduler answers at {address}: {first_line(error) or 'none is there'}; give its "
-            "address, like tcp://host:8786 (dask scheduler tells it)"
+            "address, like tcp://host:8786 or tls://host:8786 (dask scheduler tells it)"
         ) from error
