@@ -16,6 +16,14 @@ Check = tuple[Callable[[Any], bool], str]
 BRIGHTEST = 1e30
 
 
+#: Longest name of a light, a group or a pattern for them, in characters.
+MAX_NAME = 1000
+#: Lights, groups, patterns or ties that a file or a message may list.
+MAX_LISTED = 10_000
+#: Colours that one light may mix: more than any fixture has.
+MAX_PRIMARIES = 16
+
+
 def is_amount(value: float) -> bool:
     """Whether that much light, or of what makes it, can be computed with."""
     return 0 <= value <= BRIGHTEST

@@ -2,6 +2,7 @@
 
 import json
 import math
+import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from types import UnionType
@@ -9,8 +10,12 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from lightpaint.screen import some_names
 
-#: Longest text that is read, in characters.
-MAX_CHARACTERS = 2**20
+#: Longest text that is read, in characters, and most values of a list or an object.
+MAX_CHARACTERS, MAX_VALUES = 2**14, 2**17
+
+#: Most dots in a line of TOML, squared and summed over all lines: what the parser takes for a
+#: dotted key goes by the square of its parts, 24 ns each.
+MAX_DOTS = 10**8
 
 _Record = TypeVar("_Record")
 
@@ -37,6 +42,21 @@ def strict_json(text: str) -> Any:
     except UnicodeEncodeError as error:
         raise ValueError(f"it has text that is not Unicode: {error.reason}") from None
     return data
+
+
+def strict_toml(text: str) -> dict[str, Any]:
+    """What the TOML in `text` says.
+
+    Raises ValueError for what is no TOML, and for lines that would take the parser forever.
+    """
+    dots = [line.count(".") for line in text.splitlines()]
+    if sum(n * n for n in dots) > MAX_DOTS:
+        line = dots.index(max(dots)) + 1
+        raise ValueError(f"line {line} has too many dots, {max(dots)}, for a key or names")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -122,6 +142,8 @@ def _read(kind: Any, value: Any) -> Any:
         return value
     if outer is UnionType:  # something, or None
         return None if value is None else _read(inner[0], value)
+    if type(value) in (list, dict) and len(value) > MAX_VALUES:
+        raise ValueError(f"it lists {len(value)} values, and at most {MAX_VALUES} are read")
     if outer is tuple and type(value) is list:
         kinds = inner[:1] * len(value) if inner[-1] is ... else inner
         if len(kinds) == len(value):

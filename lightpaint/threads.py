@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
-from lightpaint.progress import wanted
+from lightpaint.progress import wanted, while_wanted
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -52,6 +52,10 @@ def linear_algebra() -> tuple[str, str]:
     )
 
 
+class _EndedError(Exception):
+    """Work of which the rest was given up."""
+
+
 def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
     """work(job) of each job, several at a time with BLAS on one thread; results in order.
 
@@ -65,11 +69,17 @@ def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
     turns = count()
     ended, check = Event(), wanted()
 
+    def check_both() -> None:
+        check()
+        if ended.is_set():
+            raise _EndedError
+
     def take_turns() -> None:
         while not ended.is_set() and (k := next(turns)) < len(waiting):
             try:
-                check()
-                results[k] = work(waiting[k])
+                with while_wanted(check_both):
+                    check_both()
+                    results[k] = work(waiting[k])
             except Exception as error:
                 errors[k] = error
 

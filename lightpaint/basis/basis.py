@@ -11,7 +11,7 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
 from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import BasisError
-from lightpaint.expected import BRIGHTEST, is_amount
+from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
 from lightpaint.images.denoise import Features
 from lightpaint.images.objects import Objects
 from lightpaint.keywords import keywords
@@ -53,6 +53,8 @@ class BasisLight:
     unit_flux: RGB | None = None
 
     def __post_init__(self) -> None:
+        if len(self.name) > MAX_NAME:
+            raise BasisError(f"a light has a name of more than {MAX_NAME} characters")
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
         if self.is_fixed and self.emission != (1, 1, 1):

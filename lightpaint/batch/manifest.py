@@ -1,6 +1,5 @@
 """A manifest as it stands, `looks.toml`: its tables, with keys and values that mean something."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from lightpaint.batch.keys import DEFAULTS, GIVEN, LOOK, SEQUENCE, SUBJECTS, Mis
 from lightpaint.errors import BatchError
 from lightpaint.expected import Check, a
 from lightpaint.files import one_line, read_text
+from lightpaint.records import strict_toml
 
 #: Longest manifest that is read, in bytes; and its tables.
 MAX_BYTES = 2**22
@@ -72,8 +72,8 @@ def read_manifest(path: str | Path) -> Manifest:
     path = Path(path)
     text = read_text(path, "manifest", BatchError, limit=MAX_BYTES)
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        data = strict_toml(text)
+    except ValueError as error:
         raise BatchError(f"{path} is not TOML: {one_line(str(error))}") from None
     mistakes = Mistakes(str(path))
     right = mistakes.keys(data, TABLES, "")

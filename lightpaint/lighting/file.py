@@ -17,6 +17,9 @@ from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
 
+#: Longest lighting file that is read, in bytes: some 2 kB are written for a light.
+MAX_BYTES = 2**23
+
 #: Fields of a lighting that stand in its file under their own names.
 READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
 
@@ -85,7 +88,7 @@ def read_lighting(path: str | Path) -> Lighting:
         (2.0, 1.5, 1.0)
     """
     path = Path(path)
-    text = read_text(path, "lighting file", LightingError)
+    text = read_text(path, "lighting file", LightingError, limit=MAX_BYTES)
     try:
         data = strict_json(text)
     except ValueError as error:

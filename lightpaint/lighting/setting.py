@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import LightingError
-from lightpaint.expected import BRIGHTEST, is_amount
+from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
 
 #: A number of each channel, None where nothing tells; an interval of each.
 Errors = tuple[float | None, float | None, float | None]
@@ -50,6 +50,8 @@ class LightSetting:
     untold: bool = False
 
     def __post_init__(self) -> None:
+        if len(self.name) > MAX_NAME:
+            raise LightingError(f"a light has a name of more than {MAX_NAME} characters")
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
         self._check_errors()

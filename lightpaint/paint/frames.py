@@ -26,6 +26,9 @@ from lightpaint.records import read_record, strict_json
 #: Longest frame that is read, in bytes, and longest JSON in it.
 MAX_FRAME, MAX_TEXT = 2**28, 2**20
 
+#: Longest text in a message, in characters, and most values of a list or an object in it.
+MAX_CHARACTERS, MAX_VALUES = 1000, 4096
+
 #: What buffers may hold.
 DTYPES = {"float16": "<f2", "float32": "<f4", "float64": "<f8", "int16": "<i2", "uint8": "|u1"}
 
@@ -102,6 +105,7 @@ def said_of(
     if not (type(seq) is int and 0 <= seq < 2**53):
         raise PaintError("a message without its number")
     plain = {k: v for k, v in content.items() if k not in ("kind", "seq", "buffers")}
+    _check_lengths(kind, plain)
     try:
         said = read_record(KINDS[kind], plain)
     except ValueError as error:
@@ -121,6 +125,21 @@ def said_of(
         array.flags.writeable = False
         arrays[about["name"]] = array
     return seq, said, arrays
+
+
+def _check_lengths(kind: str, value: Any) -> None:
+    """Raise PaintError for more words or values than a page has any use for."""
+    if isinstance(value, str) and len(value) > MAX_CHARACTERS:
+        raise PaintError(
+            f"{kind}: a text of {len(value)} characters, and at most {MAX_CHARACTERS} are taken"
+        )
+    if isinstance(value, list | dict):
+        if len(value) > MAX_VALUES:
+            raise PaintError(
+                f"{kind}: a list of {len(value)} values, and at most {MAX_VALUES} are taken"
+            )
+        for one in [*value, *value.values()] if isinstance(value, dict) else value:
+            _check_lengths(kind, one)
 
 
 def _json(text: bytes) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from lightpaint.paint.client import Client, Heard
 from lightpaint.paint.frames import Message
 from lightpaint.paint.protocol import Said
 from lightpaint.paint.store import Store
+from lightpaint.progress import while_wanted
 
 #: Pages that are told that another has the session, at most.
 MOST_PAGES = 16
@@ -126,7 +127,16 @@ class Line:
         if self._is_over:
             raise PaintError(self.farewell)
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._worker, partial(work, *given))
+        return await loop.run_in_executor(self._worker, partial(self._while_open, work, *given))
+
+    def _while_open(self, work: Callable[..., _Made], *given: Any) -> _Made:
+        """What the session does, which long work of it gives up at the end."""
+        with while_wanted(self._check_open):
+            return work(*given)
+
+    def _check_open(self) -> None:
+        if self._is_over:
+            raise PaintError(self.farewell)
 
     async def _answering(self, client: Client) -> None:
         while True:

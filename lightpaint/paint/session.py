@@ -253,9 +253,10 @@ class Session:
 
         with_stroke: whether a stroke that is open is as it will stay, and kept so.
         """
-        self._leave_slider()
-        if with_stroke and self.is_open:
+        is_stroke = with_stroke and self.views.is_open
+        if is_stroke:  # kept before anything is solved, which may be given up
             self._close("stroke")
+        if self.answering.move_back() or is_stroke:
             self._changed()
 
     def _leave_slider(self) -> None:

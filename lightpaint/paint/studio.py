@@ -38,7 +38,12 @@ from lightpaint.scene.turns import MITSUBA
 
 
 class OldError(Exception):
-    """Somebody has painted on."""
+    """Somebody has painted on, or left."""
+
+
+def _give_up() -> None:
+    """Have work end that nobody waits for."""
+    raise OldError
 
 
 class Studio:
@@ -113,7 +118,9 @@ class Studio:
         self._writing.end()
         with self._lock:
             if self._session is not None:
-                self._session.left(with_stroke=True)
+                # All is kept before anything is solved, and nobody asks for the answer any more.
+                with suppress(OldError), while_wanted(_give_up):
+                    self._session.left(with_stroke=True)
                 self._session.store.close()
 
     def wait(self) -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from lightpaint.errors import SceneError
+from lightpaint.expected import MAX_LISTED, MAX_NAME
 from lightpaint.scene.alike import alike_groups, without
 from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.lights import Light, check_adjustable, keep, tie
@@ -98,8 +99,11 @@ def _members_of_groups(
     names = [emitter.name for emitter in emitters]
     group_of: dict[str, str] = {}
     for group, patterns in groups.items():
-        if not group:
-            raise SceneError("a group needs a name: its members are given by it")
+        if not 0 < len(group) <= MAX_NAME:
+            raise SceneError(
+                "a group needs a name, by which its members are given, of at most "
+                f"{MAX_NAME} characters"
+            )
         listed = _listed(patterns, f"group {group!r}")
         for pattern in listed:
             found = _matching(pattern, names, f"group {group!r}", scene)
@@ -163,6 +167,8 @@ def _listed(names: Iterable[str], where: str) -> list[str]:
     """Checked to be a list that names something."""
     # A text is a list of its letters too, and never what was meant.
     listed = [names] if isinstance(names, str) else list(names)
+    if len(listed) > MAX_LISTED:
+        raise SceneError(f"{where} lists {len(listed)} names: at most {MAX_LISTED} are read")
     if not listed or not all(isinstance(name, str) and name for name in listed):
         raise SceneError(f"{where}: name at least one light, and each by its name")
     return listed

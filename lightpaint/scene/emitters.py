@@ -11,6 +11,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
+from lightpaint.expected import MAX_NAME
 from lightpaint.scene.emission import (
     AS_AUTHORED,
     ENVIRONMENTS,
@@ -23,9 +24,6 @@ from lightpaint.scene.emission import (
 )
 from lightpaint.scene.hanging import hangs_on, has_name
 from lightpaint.scene.parsed import ParsedScene
-
-#: Characters of a name beyond which it is a mistake.
-MAX_NAME = 1000
 
 #: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
 NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}

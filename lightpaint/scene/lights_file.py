@@ -4,14 +4,15 @@ For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What
 lights in the solve is kept as it stands (lighting/constraints/file.py makes something of it).
 """
 
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
+from lightpaint.expected import MAX_LISTED, MAX_NAME
 from lightpaint.files import one_line, read_text
+from lightpaint.records import strict_toml
 
 SUFFIX = ".lights.toml"
 #: What asks for something in the solve.
@@ -22,9 +23,6 @@ KNOWN = ("lights", "groups", "group_alike", *CONSTRAINTS)
 
 #: Longest lights file that is read, in bytes.
 MAX_BYTES = 2**20
-#: Most dots in a line, squared and summed over all lines: what the parser takes for a dotted key
-#: goes by the square of its parts, 24 ns each.
-MAX_DOTS = 10**8
 
 
 @dataclass(frozen=True)
@@ -110,13 +108,9 @@ def read_lights_file(path: Path) -> LightsFile:
 def read_keys(path: Path) -> dict[str, Any]:
     """All keys of a lights file, none of them unknown. Raises SceneError."""
     text = read_text(path, "lights file", SceneError, limit=MAX_BYTES, may_be_empty=True)
-    dots = [line.count(".") for line in text.splitlines()]
-    if sum(n * n for n in dots) > MAX_DOTS:
-        line = dots.index(max(dots)) + 1
-        raise SceneError(f"{path}: line {line} has too many dots, {max(dots)}, for a key or names")
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        data = strict_toml(text)
+    except ValueError as error:
         end = f"at line {text.rstrip().count(chr(10)) + 1}, the end"
         reason = one_line(str(error).replace("at end of document", end))
         raise SceneError(f"{path} is not TOML: {reason}") from None
@@ -126,6 +120,10 @@ def read_keys(path: Path) -> dict[str, Any]:
         )
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
+    if (count := sum(1 for _ in _texts_in(data))) > MAX_LISTED:
+        raise SceneError(f"{path} names {count} lights and more: at most {MAX_LISTED} are read")
+    if any(len(text) > MAX_NAME for text in _texts_in(data)):
+        raise SceneError(f"{path} has a name of more than {MAX_NAME} characters")
     return data
 
 
@@ -138,6 +136,19 @@ def _texts(value: Any) -> Iterator[str]:
     elif isinstance(value, list):
         for one in value:
             yield from _texts(one)
+
+
+def _texts_in(value: Any) -> Iterator[str]:
+    """All keys and texts, however deep."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from value
+        for one in value.values():
+            yield from _texts_in(one)
+    elif isinstance(value, list):
+        for one in value:
+            yield from _texts_in(one)
 
 
 def _integers(value: Any) -> Iterator[int]:

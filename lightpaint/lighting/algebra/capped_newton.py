@@ -10,6 +10,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import RIDGE
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
+from lightpaint.progress import wanted
 
 #: Steps after which it is left to methods that cannot go in circles.
 MAX_STEPS = 20
@@ -20,7 +21,9 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
     multipliers = q.cap_multipliers(x, q.gradient(x))
     at_lower, at_upper = q.caps_met(x)
     at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
+    check = wanted()
     for step in range(MAX_STEPS + 1):
+        check()
         gradient = q.gradient(x)
         left = gradient - multipliers @ q.A
         value = q.A @ x

@@ -12,6 +12,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.nearest import is_suspect
 from lightpaint.lighting.algebra.quadratic import EPSILON, kkt_step
+from lightpaint.progress import wanted
 
 #: Times √n, added to the unit diagonal of M, so that no set of lights, coincident ones
 #: included, is singular. A step then is that of the proximal-point method: repeated, it loses
@@ -42,7 +43,9 @@ def clipped_newton(
     that are as good (see nearest.py). Where a residual is more than `tolerance`, x is of no use.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
+    check = wanted()
     for step in range(MAX_STEPS + 1):
+        check()
         gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b
         residual = np.abs(kkt_step(gradient, x, lower, upper)).max(axis=1, initial=0) / size
         is_open = residual > tolerance

@@ -14,6 +14,7 @@ from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.nearest import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED, Cap, Quadratic, scaled
+from lightpaint.progress import wanted
 from lightpaint.threads import one_thread, side_by_side
 
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
@@ -236,7 +237,9 @@ def _by_sweeps(
     """(x, sweeps, 0): Gauss–Seidel alone."""
     _, _, residual = q.violations(x)
     sweeps = 0
+    check = wanted()
     while residual > tolerance and sweeps < max_sweeps:
+        check()
         # Computed anew each time, the gradient's round-off does not decide when to stop.
         sweep(q, x, q.gradient(x))
         sweeps += 1

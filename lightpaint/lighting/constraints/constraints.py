@@ -11,11 +11,13 @@ from typing import Any
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import ConstraintError
+from lightpaint.expected import MAX_LISTED
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.values import (
     Level,
     Lock,
     check_keys,
+    check_lengths,
     color_of,
     count_of,
     described,
@@ -64,6 +66,7 @@ class LightConstraint:
         each other.
         """
         check_keys(asked, LIGHT_KEYS, where)
+        check_lengths(asked, where)
         asked = {key: value for key, value in asked.items() if value is not False}
         _check_contradictions(asked, where)
         lock = lock_of(asked["lock"], f"{where}.lock") if "lock" in asked else None
@@ -164,6 +167,10 @@ class Constraints:
         lead = f"{where}: " if where else ""
         if not isinstance(light, Mapping | None):
             raise ConstraintError(f"{lead}light is {light!r}: expected tables [light.NAME]")
+        if light is not None and len(light) > MAX_LISTED:
+            raise ConstraintError(
+                f"{lead}light has {len(light)} names: at most {MAX_LISTED} are read"
+            )
         lights = []
         for name, asked in (light or {}).items():
             # Looked at now, so that no mistake waits for the light to be met.
@@ -239,6 +246,8 @@ def _ties(given: Any, where: str) -> tuple[Tie, ...]:
         raise ConstraintError(expected)
     if given and all(isinstance(name, str) for name in given):
         given = [given]  # one tie
+    if len(given) > MAX_LISTED:
+        raise ConstraintError(f"{where} lists {len(given)}: at most {MAX_LISTED} are read")
     ties = []
     for entry in given:
         if isinstance(entry, Mapping):

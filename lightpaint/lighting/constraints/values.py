@@ -9,7 +9,8 @@ import numpy as np
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.errors import ColorError, ConstraintError
-from lightpaint.expected import BRIGHTEST, is_amount
+from lightpaint.expected import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount
+from lightpaint.files import one_line
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,25 @@ def check_keys(asked: Any, known: Iterable[str], where: str) -> None:
     if not isinstance(asked, Mapping):
         raise ConstraintError(f"{where} is {asked!r}: expected keys like lock = true")
     if unknown := [key for key in asked if key not in known]:
-        raise ConstraintError(f"{where} has the key {unknown[0]!r}: known are {', '.join(known)}")
+        raise ConstraintError(
+            f"{where} has the key {one_line(repr(unknown[0]))}: known are {', '.join(known)}"
+        )
+
+
+def check_lengths(asked: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError for a value that is longer than any that means something."""
+    for key, value in asked.items():
+        texts = [*value] if isinstance(value, list | tuple) else [value]
+        if key != "primaries":  # of which fewer can be had, as is said where they are read
+            texts.append(value)
+        if isinstance(value, Mapping):
+            texts = [x for pair in value.items() for x in pair]
+        for text in texts:
+            if isinstance(text, str | list | tuple | Mapping) and len(text) > MAX_NAME:
+                raise ConstraintError(
+                    f"{where}.{key} has a value of {len(text)} characters or numbers: at most "
+                    f"{MAX_NAME} are read"
+                )
 
 
 def lock_of(value: Any, where: str) -> Lock:
@@ -104,7 +123,12 @@ def primaries_of(asked: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None
     given = asked["primaries"]
     if not isinstance(given, Sequence) or isinstance(given, str) or not given:
         raise ConstraintError(
-            f'{where}.primaries is {given!r}: expected a list of colours, ["#ff0000", "3000K"]'
+            f"{where}.primaries is {one_line(repr(given))}: expected a list of colours, "
+            '["#ff0000", "3000K"]'
+        )
+    if len(given) > MAX_PRIMARIES:
+        raise ConstraintError(
+            f"{where}.primaries lists {len(given)} colours: at most {MAX_PRIMARIES} can be mixed"
         )
     return tuple(color_of(color, f"{where}.primaries") for color in given)
 
