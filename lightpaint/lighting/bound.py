@@ -9,6 +9,9 @@ Kind = Literal["zero", "kept", "lock", "off", "left out", "tie", "limits", "colo
 #: What a multiplier is per unit of.
 Per = Literal["emission", "luminance", "dimmer"]
 
+#: To which side of its whites a light would go; "" for neither.
+Tint = Literal["", "greener", "pinker"]
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -25,6 +28,7 @@ class Bound:
     Of three channels where it is per `emission`; one number per `luminance` of the emission; and
     per unit of its `dimmer`, 1 being the present, one for each tied light moved by itself, or
     one number for all.
+    tint: where a range of white holds a light, the side of it to which the light would go.
     """
 
     lights: tuple[str, ...]
@@ -33,6 +37,7 @@ class Bound:
     gain: float
     multiplier: tuple[float, ...]
     per: Per
+    tint: Tint = ""
 
     @property
     def is_switched_off(self) -> bool:

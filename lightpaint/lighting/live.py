@@ -16,9 +16,12 @@ stroke in one costs no more than where there is no other.
 from collections.abc import Sequence
 from functools import reduce
 from operator import add
+from typing import Any
 
 from lightpaint.arrays import Doubles
+from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.on_locus import around, next_whites, snapped
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.fit import Fit, Space
@@ -27,6 +30,12 @@ from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import reduced_by
 from lightpaint.lighting.pull import pull_of, to_present
+
+#: Steps between whites for one answer, at most: the next answer goes on.
+WHITE_STEPS = 2
+
+#: Pieces of a range of white within which a light first looks for its white, under the hand.
+WHITE_WIDTH = 8
 
 #: Of which views, and what pulls to the present and to its colours.
 _Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
@@ -83,12 +92,17 @@ class Live:
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             asked = equations if pull is None else equations + pull
-            return solve_reduced(asked, self._reduction, begin, method=self._fit.method).weights
+            return _best(asked, self._reduction, begin, self._fit.method)
 
         if self.mode == "linear":
             return best(reduce(add, (x.tiles().equations(rest_weight) for x in views)), start)
         films = self._films_of(views)
-        return films.nearer(films.pixels(rest_weight, self._fit.transform), start, best, pull)
+        pixels = films.pixels(rest_weight, self._fit.transform)
+        return films.nearer(pixels, start, best, pull, self._on_locus)
+
+    def _on_locus(self, weights: Doubles) -> Doubles:
+        """Weights (n, 3), a mix of answers, as lights can have them that keep to whites."""
+        return snapped(self._reduction, weights)
 
     def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
         """What pulls at the weights, as of `Problem.pull`: the colours' part is found once."""
@@ -145,5 +159,23 @@ def untouched(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Of what constraints leave, (n, 3), by how bright the lights are."""
+    """Of what constraints leave, (n, 3), by how bright the lights are.
+
+    Lights that keep to a range of white get its nearest one, as bright as they are.
+    """
+    weights = snapped(reduction, weights)
+    reduction = around(reduction, weights)
     return solve_reduced(to_present(_power(views), weights), reduction, weights).weights
+
+
+def _best(
+    equations: NormalEquations, reduction: Reduction, start: Doubles, method: Method
+) -> Doubles:
+    """The best weights (n, 3) of what constraints leave, near those to begin with."""
+    if not reduction.white_knobs:
+        return solve_reduced(equations, reduction, start, method=method).weights
+    start = snapped(reduction, start)
+    near = solve_reduced(equations, around(reduction, start, WHITE_WIDTH), start, method=method)
+    reduction = around(reduction, near.weights)
+    how: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
+    return next_whites(equations, reduction, near.weights, **how)[1].weights

@@ -169,10 +169,12 @@ class Films:
         start: Doubles,
         best: Callable[[NormalEquations, Doubles], Doubles],
         pull: NormalEquations | None,
+        allowed: Callable[[Doubles], Doubles],
     ) -> Doubles:
         """One round of reweighting: weights (n, 3) that miss no more than those before.
 
         As of `reweighted.rounds`, but for singles, and for a step that is halved a few times only.
+        allowed: from weights between two that are allowed to such.
         """
 
         def missed(w: Doubles, x: Doubles) -> float:
@@ -192,7 +194,7 @@ class Films:
         )
         found, value = best(equations, start), missed(start, before)
         for part in PARTS:
-            nearer = between(start, found, part)
+            nearer = allowed(between(start, found, part))
             if missed(nearer, self._mixed(nearer)) <= value:
                 return nearer
         return start

@@ -14,6 +14,7 @@ from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
+from lightpaint.lighting.constraints.on_locus import tangent
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.whites import white_where_free
 from lightpaint.lighting.fit import Fit, Space, meant_by
@@ -33,6 +34,10 @@ from lightpaint.lighting.pull import pull_of
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
+
+#: Mireds by which a light that keeps to a range of white may leave its white, where it is asked how
+#: firmly that is known, or what it is held by.
+REACH = 32.0
 
 
 @dataclass(frozen=True)
@@ -174,6 +179,18 @@ class Problem:
     def asks(self) -> bool:
         """Whether anything limits the lights: constraints, or that they are to be white."""
         return bool(self.constraints) or self.fit.colors == "white"
+
+    @cached_property
+    def about_answer(self) -> Reduction:
+        """`reduction` where an answer is asked about: whites of a range along a straight line."""
+        return tangent(self.reduction, REACH)
+
+    def reduced(self, reduction: Reduction) -> "Problem":
+        """This problem with that reduction, which differs in the whites that lights came to."""
+        if self.reduction is self.full:
+            return replace(self, reduction=reduction, full=reduction)
+        windows = {k: reduction.knobs[k].window for k in reduction.white_knobs}
+        return replace(self, reduction=reduction, full=self.full.with_windows(windows))
 
     @property
     def solved(self) -> NormalEquations:

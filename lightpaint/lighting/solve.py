@@ -12,6 +12,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.approach import near_optimum
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.on_locus import next_whites, solve_on_locus
 from lightpaint.lighting.constraints.reduced_problem import (
     ReducedOptimum,
     problems,
@@ -32,6 +33,10 @@ from lightpaint.target.target import Target
 
 #: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
 PULL = 1e-7
+
+#: Times that lights go on to other whites, of a loss that is no linear problem, at most, and the
+#: part of it that this has to gain.
+WHITES_TRIED, WORTH = 20, 1e-7
 
 
 @keywords(Fit)
@@ -98,13 +103,14 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     every = replace(problem, constraints=_of_all(problem.constraints))
     first = _linear(replace(every, loss=problem.squares), begin)
     reached = first.reached
-    solution = _descended(every, first.weights, reached)
+    solution = _descended(every.reduced(first.problem.reduction), first.weights, reached)
     if problem.constraints.sparse is not None:
         # The lights are chosen where all of them would lead.
         chosen = _linear(
             replace(solution.problem, constraints=problem.constraints), solution.weights
         )
-        held = replace(problem, reduction=chosen.problem.reduction)
+        its = chosen.problem
+        held = replace(problem, reduction=its.reduction, full=its.full)
         reached = chosen.reached
         solution = replace(_descended(held, chosen.weights, reached), tried=chosen.tried)
         first = chosen
@@ -136,13 +142,13 @@ def _linear(problem: Problem, start: Doubles) -> Solution:
     equations, curve = problem.pulled(problem.solved), []
     path = best_knobs(problems(equations, problem.full), problem.full, count)
     for chosen in path:
-        found = solve_reduced(equations, only(problem.full, chosen), start)
+        _, found = solve_on_locus(equations, only(problem.full, chosen), start)
         curve.append((len(chosen), found.weights))
     best = max((chosen for chosen in path if len(chosen) <= count), key=len)
     solution = _one(replace(problem, reduction=only(problem.full, best)), start)
     # What was chosen and has come out dark is left out as well.
     on = [k for k, x in enumerate(problem.full.knobs) if solution.weights[list(x.lights)].any()]
-    left = replace(solution.problem, reduction=only(problem.full, on))
+    left = replace(solution.problem, reduction=only(solution.problem.full, on))
     solution = replace(solution, problem=left, tried=tuple(curve))
     norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
     told = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
@@ -151,16 +157,46 @@ def _linear(problem: Problem, start: Doubles) -> Solution:
 
 def _one(problem: Problem, start: Doubles, reached: Bools | None = None) -> Solution:
     """The solution of the squares as the reduction has the lights. reached: as of `_solution`."""
-    equations = problem.pulled(problem.solved)
-    optimum = solve_reduced(equations, problem.reduction, start, method=problem.fit.method)
-    return _solution(problem, optimum, optimum.weights, equations, reached)
+    equations, method = problem.pulled(problem.solved), problem.fit.method
+    reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
+    return _solution(problem.reduced(reduction), optimum, optimum.weights, equations, reached)
 
 
 def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
     """From weights (n, 3) within what is asked to the least of the loss.
 
-    reached: as of `_solution`.
+    reached: as of `_solution`. The whites of lights that keep to a range of them stay as the
+    reduction has them while the loss falls, and are asked again where it is least.
     """
+    solution = _descended_between(problem, start, reached)
+    if not problem.reduction.white_knobs:
+        return solution
+    count, value = solution.certificate.rounds, _missed(solution)
+    for _ in range(WHITES_TRIED):
+        at = solution.problem
+        equations = at.pulled(at.equations)
+        reduction, optimum = next_whites(equations, at.reduction, solution.weights)
+        if all(reduction.knobs[k] is at.reduction.knobs[k] for k in reduction.white_knobs):
+            break
+        nearer = _descended_between(at.reduced(reduction), optimum.weights, reached, is_near=True)
+        count, missed = count + nearer.certificate.rounds, _missed(nearer)
+        if missed > value * (1 - WORTH):
+            break
+        solution, value = nearer, missed
+    return solution.told(rounds=count)
+
+
+def _missed(solution: Solution) -> float:
+    """The loss, and what pulls at the weights."""
+    problem, w = solution.problem, solution.weights
+    pull = 0.0 if problem.pull is None else float(problem.pull.objective(w).sum())
+    return float(problem.objective(w).sum()) + pull
+
+
+def _descended_between(
+    problem: Problem, start: Doubles, reached: Bools, *, is_near: bool = False
+) -> Solution:
+    """The least of the loss over what the reduction is. is_near: whether the start is near it."""
 
     def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
         asked = problem.pulled(equations)
@@ -171,9 +207,12 @@ def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
 
     basis, loss, pull = problem.basis, problem.loss, problem.pull
     assert isinstance(loss, PaintingLoss)
-    near = near_optimum(basis, loss, problem.equations, start, weights_of, pull=pull)
+    near = None
+    if not is_near:
+        near = near_optimum(basis, loss, problem.equations, start, weights_of, pull=pull)
     begin = start if near is None else near
-    found = descend(basis, loss, begin, weights_of, pull=pull, from_clipping=near is None)
+    from_clipping = near is None and not is_near
+    found = descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
     solved = replace(problem, squares=found.squares, equations=found.equations)
     optimum = best_of(found.equations, found.reweighting.at)
     equations = problem.pulled(found.equations)

@@ -13,6 +13,7 @@ paintings.
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
@@ -214,7 +215,11 @@ class Session:
     @property
     def unpainted(self) -> dict[str, Any]:
         """What is said of the answer while nothing is painted."""
-        return unpainted_fields(is_asked=bool(self.wishes.lights))
+        is_white = self.answering.fit.colors == "white"
+        # What was asked before the session began counts as well.
+        is_other = not np.allclose(self.weights, self.answering.basis.present_weights)
+        is_asked = bool(self.wishes.lights) or (is_other and not is_white)
+        return unpainted_fields(is_asked=is_asked, is_white=is_white)
 
     @property
     def about(self) -> dict[str, Any]:

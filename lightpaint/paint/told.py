@@ -127,14 +127,18 @@ def analysis_fields(analyses: Sequence[Analysis], painted: Sequence[int]) -> dic
     }
 
 
-def unpainted_fields(*, is_asked: bool) -> dict[str, Any]:
+def unpainted_fields(*, is_asked: bool, is_white: bool) -> dict[str, Any]:
     """What is said before anything is painted, and after all of it has been undone.
 
-    is_asked: whether something is asked of the lights.
+    is_asked: whether something is asked of the lights. is_white: whether all are to be white.
     """
-    stay = "the lights stay as they are, but for what you ask of them"
-    said = f"Nothing is painted: {stay if is_asked else 'the answer is the present lighting'}."
-    return {"headline": said, "help": None, "of_views": None}
+    stay = "the answer is the present lighting"
+    if is_white:
+        stay = "every light has the white that is nearest to its colour, as bright as it is"
+    if is_asked:
+        also = ", and keeps to what you ask of it" if is_white else ", but for what you ask of them"
+        stay = f"{stay if is_white else 'the lights stay as they are'}{also}"
+    return {"headline": f"Nothing is painted: {stay}.", "help": None, "of_views": None}
 
 
 def sketched(seen: Seen) -> str:

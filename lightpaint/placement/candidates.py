@@ -68,7 +68,7 @@ class Candidates:
             np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
             image,
             importance,
-            _with_free_lights(solution.problem.reduction, count),
+            _with_free_lights(solution.problem.about_answer, count),
             _pull(solution, count),
             count,
         )

@@ -235,6 +235,12 @@ def spoken_bound(bound: Bound, share: float) -> str:
             f"the other lights leave it ({spoken_percent(share)} of the miss)."
         )
     it = "it" if is_one else "them"
+    if bound.tint:
+        return (
+            f"{spoken_lights(bound.lights, start=True)} would have to be {bound.tint} than its "
+            f"whites ({bound.held_by}): any colour would take away {spoken_percent(share)} of the "
+            "miss."
+        )
     held = {
         "kept": f"kept as it is; adjusting {it} too",
         "lock": f"locked; adjusting {it}",

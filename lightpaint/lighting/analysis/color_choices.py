@@ -17,6 +17,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.approach import sample
+from lightpaint.lighting.constraints.on_locus import next_whites, solve_on_locus
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.fit import Colors
@@ -24,7 +25,7 @@ from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, reduced_by
-from lightpaint.lighting.reweighted import Asked, rounds
+from lightpaint.lighting.reweighted import Asked, Led, change, rounds
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
 
@@ -33,6 +34,9 @@ SAMPLE, EACH, LOOKED_AT = 2**12, 2**6, 2**12
 
 #: Change of a light's picture in a round, beside the brightest light's, that ends the rounds.
 ENOUGH = 1e-3
+
+#: Times that lights which are to be white go on to other whites, at most.
+WHITES_TRIED = 5
 
 #: Part of all light that the hue of one must change to be spoken of.
 NOTABLE = 0.03
@@ -107,25 +111,37 @@ def _finder(solution: Solution) -> Callable[[Problem], Doubles]:
     """What finds the weights (n, 3) that are best for the same with other colours."""
     loss, at, solved = solution.problem.loss, solution.weights, solution.problem.solved
 
-    def squares(problem: Problem) -> Doubles:
-        return solve_reduced(problem.pulled(solved), problem.reduction, at).weights
+    def squares(problem: Problem) -> tuple[Problem, Doubles]:
+        asked = problem.pulled(solved)
+        reduction, found = solve_on_locus(asked, problem.reduction, at)
+        return problem.reduced(reduction), found.weights
 
     if isinstance(loss, Squares):
-        return squares
+        return lambda problem: squares(problem)[1]
     lit = LitPixels.of(solution.basis, loss)
     size = max(SAMPLE, EACH * len(at))
     part = lit
     if np.count_nonzero(loss.importance) > size:
         part = sample(lit, np.einsum("cii->ic", solution.equations.M), size)
 
-    def best(problem: Problem) -> Doubles:
+    def led(problem: Problem, begin: Doubles) -> Led:
         def solve(equations: NormalEquations, begin: Doubles) -> Doubles:
             return solve_reduced(problem.pulled(equations), problem.reduction, begin).weights
 
-        led = rounds(
-            part, Asked(problem.pull), squares(problem), solve, from_clipping=False, until=ENOUGH
-        )
-        return led.weights
+        asked = Asked(problem.pull)
+        return rounds(part, asked, begin, solve, from_clipping=False, until=ENOUGH)
+
+    def best(problem: Problem) -> Doubles:
+        problem, begin = squares(problem)
+        found = led(problem, begin)
+        for _ in range(WHITES_TRIED if problem.reduction.white_knobs else 0):
+            asked = problem.pulled(found.equations)
+            reduction, near = next_whites(asked, problem.reduction, found.weights)
+            if change(found.equations, found.weights, near.weights) <= ENOUGH:
+                break
+            problem = problem.reduced(reduction)
+            found = led(problem, near.weights)
+        return found.weights
 
     return best
 

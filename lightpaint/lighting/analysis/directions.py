@@ -68,7 +68,7 @@ class Room:
 
 def rooms(solution: Solution, equations: NormalEquations) -> Iterator[Room]:
     """One for every set of channels that the unknowns couple. equations: what is solved."""
-    reduction, lit = solution.problem.reduction, solution.equations.reached
+    reduction, lit = solution.problem.about_answer, solution.equations.reached
     x = solve_reduced(equations, reduction, solution.weights).x
     rows, left = _at_caps(reduction, x)
     for block in reduction.blocks:
@@ -95,7 +95,7 @@ def answer_to(solution: Solution, equations: NormalEquations) -> Doubles:
     """The weights (n, 3) that solve `equations` under the same bounds as the answer."""
     problem = solution.problem
     asked = problem.pulled(equations)
-    return solve_reduced(asked, problem.reduction, solution.weights).weights
+    return solve_reduced(asked, problem.about_answer, solution.weights).weights
 
 
 def all_columns(solution: Solution) -> Iterator[Doubles]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lightpaint.arrays import RGB
+from lightpaint.colour.whites import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.expected import MAX_LISTED
 from lightpaint.keywords import keywords
@@ -25,6 +26,7 @@ from lightpaint.lighting.constraints.values import (
     lock_of,
     primaries_of,
     strength_of,
+    whites_of,
 )
 from lightpaint.screen import some_of
 
@@ -42,6 +44,7 @@ class LightConstraint:
     lock: to stay at this. off: to be black. least, most: limits of its emission.
     primaries: the colours it can mix, each of luminance 1: one for a fixed colour, the two
     ends of a range of white, the LEDs of a fixture; None if any colour will do.
+    whites: the range of white that it keeps to, if it does.
     label: all this in few words. where: what errors call it.
     """
 
@@ -50,6 +53,7 @@ class LightConstraint:
     least: Level | None = None
     most: Level | None = None
     primaries: tuple[RGB, ...] | None = None
+    whites: WhiteRange | None = None
     label: str = ""
     where: str = ""
 
@@ -76,6 +80,7 @@ class LightConstraint:
             limits_of(asked["limits"], f"{where}.limits") if "limits" in asked else (None,) * 2
         )
         primaries = primaries_of(asked, where)
+        whites = whites_of(asked, where)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
                 raise ConstraintError(
@@ -88,7 +93,7 @@ class LightConstraint:
                     "of its colours open: lock it at a colour"
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
-        return cls(lock, "off" in asked, least, most, primaries, _label(asked), where)
+        return cls(lock, "off" in asked, least, most, primaries, whites, _label(asked), where)
 
 
 def _label(asked: Mapping[str, Any]) -> str:

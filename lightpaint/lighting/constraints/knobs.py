@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import BasisLight
 from lightpaint.colour.color import luminance
+from lightpaint.colour.whites import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
 from lightpaint.lighting.constraints.limits import (
@@ -35,11 +36,15 @@ class Knob:
     """What turns by itself: a light, or several on one dimmer.
 
     limit: coefficients, least and most of a sum over its unknowns, if one is limited.
+    whites: the range of white of a light that keeps to one. window: between which of these its two
+    unknowns mix at present (whites.py).
     """
 
     lights: tuple[int, ...]
     unknowns: tuple[Unknown, ...]
     limit: tuple[tuple[float, ...], float, float] | None = None
+    whites: WhiteRange | None = None
+    window: tuple[int, int] = (0, 0)
 
     @cached_property
     def is_free(self) -> bool:
@@ -54,6 +59,24 @@ class Knob:
         return replace(
             self, unknowns=tuple(replace(u, lower=0.0, upper=0.0) for u in self.unknowns)
         )
+
+    def within(self, window: tuple[int, int]) -> "Knob":
+        """It as a mix of two other whites of its range."""
+        assert self.whites is not None
+        return self._mixing(self.whites.colors[list(window)], window)
+
+    def along_tangent(self, reach: float) -> "Knob":
+        """It on the straight line that its window is part of, by `reach` mireds further."""
+        assert self.whites is not None
+        return self._mixing(self.whites.tangent(self.window, reach), self.window)
+
+    def _mixing(self, colors: Doubles, window: tuple[int, int]) -> "Knob":
+        [light] = self.lights
+        unknowns = tuple(
+            replace(u, columns=((light, rgb),))
+            for u, rgb in zip(self.unknowns, colors, strict=True)
+        )
+        return replace(self, unknowns=unknowns, window=window)
 
     @classmethod
     def of_any_colour(cls, light: int, *, is_scalar: bool = False) -> "Knob":
@@ -74,12 +97,14 @@ def mix_of(k: int, light: BasisLight, one: LightConstraint) -> Knob:
     darkest, brightest = float(coefficients @ lower), float(coefficients @ upper)
     check_room(one, light, max(least, darkest), most)
     check_room(one, light, least, min(most, brightest))
+    window = (0, one.whites.last) if one.whites is not None else (0, 0)
     if least == 0 and np.isinf(most):
-        return Knob((k,), tuple(unknowns))
+        return Knob((k,), tuple(unknowns), None, one.whites, window)
     # Round-off may have parted ends that are the same.
     most = max(most, darkest)
     least = min(least, most, brightest)
-    return Knob((k,), tuple(unknowns), (tuple(map(float, coefficients)), least, most))
+    limit = tuple(map(float, coefficients)), least, most
+    return Knob((k,), tuple(unknowns), limit, one.whites, window)
 
 
 def dimmer_of(k: int, light: BasisLight, one: LightConstraint) -> Knob:

@@ -3,10 +3,11 @@
 A light that may have any colour has three unknowns; one of fixed colour, or several on one
 dimmer, a single one; one that mixes primaries, an unknown for each. What is locked is in w₀
 and moves to the right-hand side. Limits are bounds on x, or on its luminance. So whatever is
-asked for, the problem stays one convex quadratic.
+asked for, the problem stays one convex quadratic; with ranges of white it is one for each choice
+of neighbouring whites (on_locus.py).
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -54,6 +55,23 @@ class Reduction:
         """Which of the x are a knob's, for each."""
         ends = np.cumsum([0, *(len(knob.unknowns) for knob in self.knobs)]).tolist()
         return tuple(tuple(range(first, last)) for first, last in pairwise(ends))
+
+    @cached_property
+    def white_knobs(self) -> tuple[int, ...]:
+        """Places of the knobs of lights that keep to a range of white, and may be on."""
+        return tuple(
+            k
+            for k, knob in enumerate(self.knobs)
+            if knob.whites is not None and any(x.upper > 0 for x in knob.unknowns)
+        )
+
+    def with_windows(self, windows: Mapping[int, tuple[int, int]]) -> "Reduction":
+        """The same with knobs, by their places, between other whites of their ranges."""
+        knobs = [*self.knobs]
+        for k, window in windows.items():
+            if knobs[k].window != window:
+                knobs[k] = knobs[k].within(window)
+        return replace(self, knobs=tuple(knobs))
 
     @cached_property
     def is_free(self) -> Bools:

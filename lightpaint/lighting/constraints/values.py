@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
+from lightpaint.colour.whites import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.expected import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount
 from lightpaint.files import one_line
@@ -117,7 +118,8 @@ def primaries_of(asked: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None
     if "color" in asked:
         return (color_of(asked["color"], f"{where}.color", duv=_duv(asked, where)),)
     if "kelvin" in asked:
-        return _white(asked["kelvin"], _duv(asked, where), f"{where}.kelvin")
+        ends = _kelvins(asked["kelvin"], f"{where}.kelvin")
+        return tuple(_kelvin(x, _duv(asked, where), f"{where}.kelvin") for x in ends)
     if "primaries" not in asked:
         return None
     given = asked["primaries"]
@@ -133,8 +135,14 @@ def primaries_of(asked: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None
     return tuple(color_of(color, f"{where}.primaries") for color in given)
 
 
-def _white(value: Any, duv: float, where: str) -> tuple[RGB, ...]:
-    """One colour for one temperature, and for a range the colours at its ends."""
+def whites_of(asked: Mapping[str, Any], where: str) -> WhiteRange | None:
+    """The range of white that a light keeps to; None where it is not asked for one."""
+    ends = _kelvins(asked["kelvin"], f"{where}.kelvin") if "kelvin" in asked else []
+    return white_range(*ends, _duv(asked, where)) if len(ends) == 2 else None
+
+
+def _kelvins(value: Any, where: str) -> list[float]:
+    """One temperature, or both ends of a range."""
     ends = [value] if _is_number(value) else value
     is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
     if not is_range or not all(map(_is_number, ends)) or sorted(ends) != list(ends):
@@ -142,7 +150,7 @@ def _white(value: Any, duv: float, where: str) -> tuple[RGB, ...]:
             f"{where} is {value!r}: expected a temperature, 3200, or a range from low to high, "
             "[2700, 6500]"
         )
-    return tuple(_kelvin(float(kelvin), duv, where) for kelvin in dict.fromkeys(ends))
+    return [float(kelvin) for kelvin in dict.fromkeys(ends)]
 
 
 def color_of(value: Any, where: str, *, duv: float = 0.0) -> RGB:

@@ -1,7 +1,7 @@
 """Constraints against scipy on the pixels, against their own definition, and in closed form."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from least_squares import stacked
 from qp import least
 from scipy.optimize import lsq_linear, nnls
 
-from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb
+from lightpaint.colour.color import cct_and_duv, hex_to_rgb, kelvin_to_rgb
+from lightpaint.colour.whites import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import problems
@@ -79,17 +80,15 @@ def _check_close(mine: float, oracle: float, y: Any, *, tolerance: float = SAME)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
-def test_fixed_colours_ranges_of_white_and_leds(make_basis: Any, seed: int) -> None:
+def test_fixed_colours_and_leds(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     A, y = stacked(basis, target)
     free = _solved(basis, target, sparse=None, prefer_current=0, light={})[1]
-    ends = [kelvin_to_rgb(2700, 0.002), kelvin_to_rgb(6500, 0.002)]
     leds = [hex_to_rgb(text) for text in ("#ff2000", "#20ff00", "#3000ff", "#ffb070")]
     for asked, colours in (
         ({"color": "3200K"}, [kelvin_to_rgb(3200)]),
         ({"color": "#ffaa66"}, [hex_to_rgb("#ffaa66")]),
         ({"color": [0.2, 0, 1]}, [[0.2, 0, 1]]),
-        ({"kelvin": [2700, 6500], "duv": 0.002}, ends),
         ({"primaries": ["#ff2000", "#20ff00", "#3000ff", "#ffb070"]}, leds),
     ):
         w, mine, solution = _solved(basis, target, light={"l1": asked})
@@ -120,23 +119,42 @@ def test_limits_of_emission(make_basis: Any, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
+def test_a_range_of_white_is_as_good_as_the_best_of_its_pieces(make_basis: Any, seed: int) -> None:
+    basis, target = _problem(make_basis, seed)
+    A, y = stacked(basis, target)
+    asked = {"kelvin": [2700, 6500], "duv": 0.002}
+    w, mine, solution = _solved(basis, target, light={"l1": asked})
+    pieces = pairwise(white_range(2700, 6500, 0.002).colors)
+    best = min(_best(A, y, _columns(4, 1, piece), np.zeros(12)) for piece in pieces)
+    _check_close(mine, best, y)
+    assert solution.lighting.lights[1].constraint
+    if w[1].any():
+        kelvin, duv = cct_and_duv(w[1])  # type: ignore[misc]
+        assert 2700 - 0.1 <= kelvin <= 6500 + 0.1
+        assert abs(duv - 0.002) < 1e-4
+
+
+@pytest.mark.parametrize("seed", PROBLEMS)
 def test_limits_of_luminance(make_basis: Any, seed: int) -> None:
     basis, target = _problem(make_basis, seed)
     A, y = stacked(basis, target)
     present = float(_present(basis)[1] @ LUMINANCE)
-    ends = [kelvin_to_rgb(2700), kelvin_to_rgb(6500)]
+    whites = list(pairwise(white_range(2700, 6500).colors))
     for limits, lowest, most in (
         ({"max": 0.2}, 0.0, 0.2),
         ({"max": "40%"}, 0.0, 0.4 * present),
         ({"min": 0.5, "max": 0.9}, 0.5, 0.9),
     ):
-        for extra, colours in (({}, np.eye(3)), ({"kelvin": [2700, 6500]}, ends)):
+        for extra, mixes in (({}, [np.eye(3)]), ({"kelvin": [2700, 6500]}, whites)):
             w, mine, _ = _solved(basis, target, light={"l1": {"limits": limits, **extra}})
             # Round-off of a sum of three.
             assert lowest - 1e-12 <= w[1] @ LUMINANCE <= most + 1e-12
-            C = _columns(4, 1, colours)
-            row = LUMINANCE @ C[3:6]
-            _check_close(mine, _best_capped(A, y, C, row, lowest, most), y)
+            each = [_columns(4, 1, colours) for colours in mixes]
+            best = [_best_capped(A, y, C, LUMINANCE @ C[3:6], lowest, most) for C in each]
+            # Of whites that no neighbour and no other white alone betters there may be several.
+            tolerance = 2e-4 if extra else SAME
+            assert mine >= min(best) - SAME * (y @ y)
+            _check_close(mine, min(best), y, tolerance=tolerance)
 
 
 @pytest.mark.parametrize("seed", PROBLEMS)
@@ -179,13 +197,18 @@ def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
     _check_close(mine, _best(rows, aims, C, np.zeros(12)), aims)
 
 
-def _feasible(rng: Any, basis: Any) -> Any:
-    """A random lighting that keeps to `EVERYTHING`, by its words alone."""
+def _feasible(rng: Any, basis: Any, answer: Any) -> Any:
+    """A random lighting that keeps to `EVERYTHING`, by its words alone.
+
+    Of a range of white, on the straight piece on which the answer is: the range is no convex set.
+    """
+    whites = white_range(2700, 5000)
+    [place] = np.floor(whites.places(answer[[2]]) - 1e-9).clip(0)
     now, w = _present(basis), rng.exponential(1, (7, 3))
     w[0] = now[0]
     w[1] = rng.exponential() * kelvin_to_rgb(3200)
     w[1] *= min(1, 0.3 / (w[1] @ LUMINANCE))
-    w[2] = rng.exponential(1, 2) @ np.array([kelvin_to_rgb(2700), kelvin_to_rgb(5000)])
+    w[2] = rng.exponential() * whites.at(place + rng.random(1))
     w[3:5] = rng.exponential() * now[3:5]
     w[5] = np.minimum(w[5], 0.5 * w[5] / (w[5] @ LUMINANCE))
     w[6] = rng.uniform(0, 0.8)
@@ -215,7 +238,7 @@ def test_no_feasible_lighting_is_better_than_all_constraints_at_once(
     gradient = A.T @ (A @ w.ravel() - y)
     rng = np.random.default_rng(seed)
     for _ in range(200):
-        way = (_feasible(rng, basis) - w).ravel()
+        way = (_feasible(rng, basis, w) - w).ravel()
         # A KKT residual of 1e-12 and its condition, beside the terms that cancel.
         assert gradient @ way >= -1e-8 * (y @ y)
 
@@ -229,16 +252,15 @@ def test_one_light_of_fixed_colour_in_closed_form(make_basis: Any) -> None:
     np.testing.assert_allclose(w[0], expected, rtol=1e-10)
 
 
-@pytest.mark.parametrize("mix", [(1, 0), (0, 1), (0.3, 2), (5, 5)])
-def test_a_bicolour_fixture_makes_every_mix_of_its_ends(make_basis: Any, mix: Any) -> None:
+@pytest.mark.parametrize("kelvin", [2700, 3100, 4321, 6500])
+def test_a_light_of_a_range_has_every_white_in_it(make_basis: Any, kelvin: float) -> None:
     basis, target = _problem(make_basis, 1, 2)
-    ends = np.array([kelvin_to_rgb(2700), kelvin_to_rgb(6500)])
-    truth = np.array([mix @ ends, [0.2, 0.3, 0.4]])
+    truth = np.array([1.7 * kelvin_to_rgb(kelvin), [0.2, 0.3, 0.4]])
     image = np.einsum("nhwc,nc->hwc", basis.images, truth).astype(np.float32)
     target = replace(target, image=image)
     w, _, _ = _solved(basis, target, light={"l0": {"kelvin": [2700, 6500]}})
-    # The picture is float32.
-    np.testing.assert_allclose(w, truth, atol=1e-5)
+    # The picture is float32, and a piece of the locus straight.
+    np.testing.assert_allclose(w, truth, atol=3e-4)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -1,0 +1,253 @@
+"""Lights that keep to a range of white: which two neighbouring whites each of them mixes.
+
+The whites of a range lie on a curve, so that the mixes of all of them are no convex set. Those of
+two neighbours are. Each step solves such a convex problem, certified as any other, and says which
+lights would gain by other neighbours: those that come to the end of theirs and go on from there,
+those that are off and would be on with another white, and at last single lights that would be
+better with a white elsewhere in their range. Windows over many whites, which get narrower, lead
+near the end at once. No step between neighbours raises the objective, and in the end none lowers
+it.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.colour.whites import WhiteRange
+from lightpaint.lighting.constraints.knobs import Knob
+from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
+from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.normal_equations import NormalEquations
+
+#: Pieces of the range that windows go over, before they go over one.
+WIDTHS = (8, 2)
+
+#: Steps between neighbours, at most.
+STEPS = 200
+
+#: Part of the largest slope, and of the objective, that is round-off.
+ROUND_OFF = 1e-9
+
+#: Ends of windows, by the places of their knobs.
+Windows = Mapping[int, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class _Lights:
+    """Lights of one range of white. knobs: (k,), places in the reduction; lights: (k,).
+
+    least, most: (k,), limits of their luminances.
+    """
+
+    whites: WhiteRange
+    knobs: Indices
+    lights: Indices
+    least: Doubles
+    most: Doubles
+
+
+def solve_on_locus(
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    steps: int = STEPS,
+    **how: Any,
+) -> tuple[Reduction, ReducedOptimum]:
+    """`solve_reduced`, and the reduction with the whites that lights came to.
+
+    start: (n, 3). A reduction whose lights may still mix the ends of their ranges is solved so
+    first; one that has come to some whites goes on from those nearest to the start. steps: between
+    neighbours, at most. how: as of `solve_reduced`.
+    """
+    if not reduction.white_knobs:
+        return reduction, solve_reduced(equations, reduction, start, **how)
+    groups, at = _groups(reduction), start
+    if all(_is_whole(reduction, k) for k in reduction.white_knobs):
+        at = solve_reduced(equations, reduction, _snapped(groups, start), **how).weights
+    for width in WIDTHS:
+        reduction = reduction.with_windows(_around(groups, at, width))
+        at = solve_reduced(equations, reduction, _snapped(groups, at), **how).weights
+    return next_whites(equations, around(reduction, at, 1), at, steps=steps, **how)
+
+
+def next_whites(
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    steps: int = STEPS,
+    only: Collection[int] | None = None,
+    **how: Any,
+) -> tuple[Reduction, ReducedOptimum]:
+    """The optimum of two whites for each light, and on from there to their neighbours.
+
+    only: the knobs that go on, if not all do. Other arguments and what is returned as of
+    `solve_on_locus`.
+    """
+    groups = _groups(reduction, only)
+    found = solve_reduced(equations, reduction, _snapped(groups, start), **how)
+    for _ in range(steps):
+        windows = _better(equations, reduction, groups, found)
+        if not windows:
+            break
+        reduction = reduction.with_windows(windows)
+        found = solve_reduced(equations, reduction, _snapped(groups, found.weights), **how)
+    return reduction, found
+
+
+def around(reduction: Reduction, weights: Doubles, width: int = 1) -> Reduction:
+    """The reduction with windows of so many pieces about the whites nearest to weights (n, 3)."""
+    return reduction.with_windows(_around(_groups(reduction), weights, width))
+
+
+def snapped(reduction: Reduction, weights: Doubles) -> Doubles:
+    """Weights (n, 3) with the nearest white of its range for each light that keeps to one.
+
+    Lights stay as bright as they are.
+    """
+    return _snapped(_groups(reduction), weights) if reduction.white_knobs else weights
+
+
+def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_Lights]:
+    """The lights by their ranges. only: of these knobs."""
+    by_range: dict[WhiteRange, list[int]] = {}
+    for k in reduction.white_knobs if only is None else only:
+        whites = reduction.knobs[k].whites
+        assert whites is not None
+        by_range.setdefault(whites, []).append(k)
+    made = []
+    for whites, places in by_range.items():
+        limits = [reduction.knobs[k].limit for k in places]
+        made.append(
+            _Lights(
+                whites,
+                np.array(places, dtype=np.intp),
+                np.array([reduction.knobs[k].lights[0] for k in places], dtype=np.intp),
+                np.array([0.0 if limit is None else limit[1] for limit in limits]),
+                np.array([np.inf if limit is None else limit[2] for limit in limits]),
+            )
+        )
+    return made
+
+
+def _is_whole(reduction: Reduction, k: int) -> bool:
+    knob = reduction.knobs[k]
+    assert knob.whites is not None
+    return knob.whites.last > 1 and knob.window == (0, knob.whites.last)
+
+
+def _around(groups: Sequence[_Lights], weights: Doubles, width: int) -> Windows:
+    windows = {}
+    for its in groups:
+        places = its.whites.places(weights[its.lights])
+        for k, place in zip(its.knobs.tolist(), places.tolist(), strict=True):
+            windows[k] = its.whites.window(place, width)
+    return windows
+
+
+def _snapped(groups: Sequence[_Lights], weights: Doubles) -> Doubles:
+    moved = weights.copy()
+    for its in groups:
+        moved[its.lights] = its.whites.nearest(weights[its.lights])
+    return moved
+
+
+def _better(
+    equations: NormalEquations,
+    reduction: Reduction,
+    groups: Sequence[_Lights],
+    found: ReducedOptimum,
+) -> Windows:
+    """The windows of lights that would gain by other whites; none where no light would.
+
+    First all that go on from where they are, none of which has to give up what it has; only then
+    the one light that gains most by leaving it.
+    """
+    gradient = equations.gradient(found.weights)
+    power = np.einsum("cii->ic", equations.M)
+    # By how much a light's slope may differ from 0, in units of its own picture.
+    root = np.sqrt(power.sum(axis=1))
+    size = np.abs(equations.b.T / np.sqrt(np.where(power > 0, power, 1))).max(initial=0)
+    little = ROUND_OFF * root * size
+    windows: dict[int, tuple[int, int]] = {}
+    for its in groups:
+        slopes = gradient[its.lights] @ its.whites.colors.T
+        for j, k in enumerate(its.knobs.tolist()):
+            window = reduction.knobs[k].window
+            x = found.x[list(reduction.places[k])]
+            to = _onward(slopes[j], window, x, float(little[its.lights[j]]))
+            if to != window:
+                windows[k] = to
+    return windows or _elsewhere(equations, reduction, groups, found, gradient)
+
+
+def _onward(slopes: Doubles, window: tuple[int, int], x: Doubles, little: float) -> tuple[int, int]:
+    """The window that a light of mix x, (2,), goes on to. slopes: (k,), of all whites."""
+    first, last = window
+    if not x.any():
+        best = int(np.argmin(slopes))
+        if slopes[best] >= -little or first <= best <= last:
+            return window
+        return (best, best + 1) if best < len(slopes) - 1 else (best - 1, best)
+    if x[1] == 0 and first > 0 and slopes[first - 1] < slopes[first] - little:
+        return first - 1, first
+    if x[0] == 0 and last < len(slopes) - 1 and slopes[last + 1] < slopes[last] - little:
+        return last, last + 1
+    return window
+
+
+def _elsewhere(
+    equations: NormalEquations,
+    reduction: Reduction,
+    groups: Sequence[_Lights],
+    found: ReducedOptimum,
+    gradient: Doubles,
+) -> Windows:
+    """The window of the one light that, moved alone, gains most by a white elsewhere."""
+    best, windows = ROUND_OFF * float(np.abs(equations.target_norm2).sum()), {}
+    for its in groups:
+        colors, w = its.whites.colors, found.weights[its.lights]
+        own = np.einsum("cii,cd->icd", equations.M, np.eye(3))[its.lights]
+        if equations.across is not None:
+            own = own + equations.across[its.lights]
+        right = np.einsum("icd,id->ic", own, w) - gradient[its.lights]
+        now = np.einsum("ic,icd,id->i", w, own, w) - 2 * (w * right).sum(axis=1)
+        q, r = np.einsum("kc,icd,kd->ik", colors, own, colors), right @ colors.T
+        lit = q > 0
+        Y = np.clip(
+            np.where(lit, r / np.where(lit, q, 1), 0), its.least[:, None], its.most[:, None]
+        )
+        gains = np.where(lit, now[:, None] - (np.square(Y) * q - 2 * Y * r), 0)
+        j, k = np.unravel_index(int(np.argmax(gains)), gains.shape)
+        knob, white = int(its.knobs[j]), int(k)
+        first, last = reduction.knobs[knob].window
+        if gains[j, k] > best and not first <= white <= last:
+            best = float(gains[j, k])
+            windows = {knob: its.whites.window(float(white), 1)}
+    return windows
+
+
+def tangent(reduction: Reduction, reach: float) -> Reduction:
+    """The reduction with each such light on the straight line that its two whites are on.
+
+    reach: mireds by which it may go on along that. What is asked about an answer, how firmly it is
+    known and what it is held by, is asked about the curve where it is, not about a piece of it.
+    """
+    if not reduction.white_knobs:
+        return reduction
+    knobs = [*reduction.knobs]
+    for k in reduction.white_knobs:
+        knobs[k] = knobs[k].along_tangent(reach)
+    return replace(reduction, knobs=tuple(knobs))
+
+
+def at_best_white(knob: Knob, gradient: Doubles) -> Knob:
+    """A knob that is off, at the white of its range that would help most. gradient: (n, 3)."""
+    if knob.whites is None:
+        return knob
+    best = int(np.argmin(knob.whites.colors @ gradient[knob.lights[0]]))
+    return knob.within(knob.whites.window(float(best), 1))
