@@ -17,7 +17,7 @@ SIZE = (12, 10)
 ASKED: list[dict[str, Any]] = [
     {},
     {"light": {"light 0": {"color": "3200K"}, "light 1": {"limits": {"max": [0.1, 0.2, 0.3]}}}},
-    {"light": {"light 0": {"limits": {"max": 0.1}}, "light 1": {"kelvin": [2700, 6500]}}},
+    {"light": {"light 0": {"limits": {"max": 0.1}}, "light 1": {"primaries": ["2700K", "6500K"]}}},
     {"light": {"light 2": {"off": True}}, "tie": ["light 0", "light 1"]},
     {"sparse": 2},
     {"prefer_current": 0.02},
