@@ -25,6 +25,7 @@ from lightpaint.placement.suggest import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
 from lightpaint.relit.budget import Budget, verification_budget
 from lightpaint.relit.export.exports import write_exports
+from lightpaint.relit.power import with_power
 from lightpaint.relit.relight import relight, settle
 from lightpaint.relit.rounds import refine_by_rendering
 from lightpaint.relit.verify import verify
@@ -228,6 +229,7 @@ def _finished(
         verification = verify(
             predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
         )
+        verification = with_power(verification, predicted, basis, solution.lighting)
         write_estimate(place / "verified.exr", verification.verified, {})
         listen.note(f"verified with {budget.spp} samples per pixel")
     if settings.suggest and scene is not None:

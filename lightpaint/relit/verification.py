@@ -5,11 +5,12 @@ from different samples. They differ by noise; if they differ by more, something 
 and the difference in units of the noise (z) tells.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.difference import delta_e
 from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import SizeError
@@ -23,6 +24,9 @@ BLOCK = 8
 #: Standard errors at which a difference counts as real: far enough out that sound renders
 #: pass thousands of times in a row.
 LIMIT = 5.0
+
+#: Power below which an error would rather not have been seen.
+LOW_POWER = 0.5
 
 #: Relative round-off of float32 sums, below which a difference is no news.
 PRECISION = 1e-5
@@ -46,6 +50,8 @@ class Verification(Shown):
         noise_rmse: What noise alone would give.
         delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
         delta_e_95: The same, 95th percentile.
+        power: By light that shines, the probability that this render would have disagreed, had the
+            light been 5 % off (power.py); None where nobody asked what each light does.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -64,6 +70,7 @@ class Verification(Shown):
     noise_rmse: float
     delta_e_mean: float
     delta_e_95: float
+    power: Mapping[str, float] | None = None
 
     def __repr__(self) -> str:
         (height, width), word = self.verified.size, "agrees" if self.agrees else "DISAGREES"
@@ -82,6 +89,12 @@ class Verification(Shown):
         """Whether the difference can be noise alone."""
         return self.difference <= LIMIT
 
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Lights in which an error of 5 % would rather not have been seen, the least seen first."""
+        power = self.power or {}
+        return tuple(sorted((x for x in power if power[x] < LOW_POWER), key=power.__getitem__))
+
 
 def compare(predicted: Estimate, verified: Estimate) -> Verification:
     """Judge the difference of two independent estimates of one picture.
@@ -98,17 +111,13 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
 
 def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     difference = predicted.image.astype(np.float64) - verified.image
-    squares = np.square(predicted.half_difference, dtype=np.float64)
-    squares += np.square(verified.half_difference, dtype=np.float64)
-    # Round-off is noise too; it keeps 0/0 out where nothing was ever lit.
-    magnitude = np.abs(predicted.image).astype(np.float64) + np.abs(verified.image)
-    squares += np.square(PRECISION * magnitude) + np.finfo(np.float32).tiny
+    squares, magnitude = noise_of(predicted, verified)
 
     pooled = predicted.variance() + verified.variance() + np.square(PRECISION * magnitude)
     z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
 
     # A block's mean difference, over the standard error that its own pixels show.
-    block_z = _block_sums(difference) / np.sqrt(_block_sums(squares))
+    block_z = block_sums(difference) / np.sqrt(block_sums(squares))
     z_mean = difference.sum(axis=(0, 1)) / np.sqrt(squares.sum(axis=(0, 1)))
 
     scale = 2.0 ** choose_exposure(verified.image)
@@ -126,6 +135,23 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     )
 
 
+def noise_of(predicted: Estimate, verified: Estimate) -> tuple[Doubles, Doubles]:
+    """Return the variance of the difference and the brightness of both, (h, w, 3) each."""
+    squares = np.square(predicted.half_difference, dtype=np.float64)
+    squares += np.square(verified.half_difference, dtype=np.float64)
+    # Round-off is noise too; it keeps 0/0 out where nothing was ever lit.
+    magnitude = np.abs(predicted.image).astype(np.float64) + np.abs(verified.image)
+    squares += np.square(PRECISION * magnitude) + np.finfo(np.float32).tiny
+    return squares, magnitude
+
+
+def brightness_weights(magnitude: Floats) -> Doubles:
+    """Return by how much each block counts in the pattern, (rows, columns): bright ones less."""
+    brightness = block_sums(magnitude.sum(axis=-1, dtype=np.float64))
+    typical = brightness.mean()
+    return np.square(typical / (brightness + typical)) if typical > 0 else np.ones_like(brightness)
+
+
 def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude: Floats) -> float:
     """Σ_blocks d_A d_B over its standard error, d_A and d_B the differences of the halves.
 
@@ -135,16 +161,14 @@ def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude
     """
     difference = predicted.image.astype(np.float64) - verified.image
     half = predicted.half_difference.astype(np.float64) - verified.half_difference
-    brightness = _block_sums(magnitude.sum(axis=-1, dtype=np.float64))
-    typical = brightness.mean()
-    weight = np.square(typical / (brightness + typical)) if typical > 0 else 1.0
-    products = (_block_sums(difference + half) * _block_sums(difference - half)).sum(axis=-1)
+    weight = brightness_weights(magnitude)
+    products = (block_sums(difference + half) * block_sums(difference - half)).sum(axis=-1)
     # A half has twice the variance of the mean; the channels may all go together.
-    spread = 2 * _block_sums(squares).sum(axis=-1)
+    spread = 2 * block_sums(squares).sum(axis=-1)
     return float((weight * products).sum() / np.sqrt(np.square(weight * spread).sum()))
 
 
-def _block_sums(image: Floats) -> Floats:
+def block_sums(image: Floats) -> Floats:
     """Sums over whole blocks of BLOCK x BLOCK pixels; the ragged border joins the last ones."""
     rows = np.arange(0, max(image.shape[0] - BLOCK + 1, 1), BLOCK)
     columns = np.arange(0, max(image.shape[1] - BLOCK + 1, 1), BLOCK)

@@ -21,6 +21,7 @@ from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.diagnosis import maps_limit
 from lightpaint.report.meant import meaning_of
@@ -236,6 +237,7 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
         "z_rms": v.z_rms,
         "delta_e_mean": v.delta_e_mean,
         "delta_e_95": v.delta_e_95,
+        "power": None if v.power is None else {"error": ERROR, "lights": dict(v.power)},
     }
 
 

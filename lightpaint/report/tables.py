@@ -12,6 +12,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.painting import left_out
 from lightpaint.lighting.software import Software, version
 from lightpaint.lighting.solution import Solution
+from lightpaint.relit.power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.html import facts, listed, row
 from lightpaint.report.measures import (
@@ -22,6 +23,7 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.sentences import partly_reached
+from lightpaint.screen import some_of
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
@@ -64,8 +66,18 @@ def verification_table(verification: Verification | None) -> str:
             ("z of the pattern", f"{v.z_pattern:+.2f}; limit {LIMIT:g}".replace("-", "−")),
             ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
             ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
+            *_power(v),
         ]
     )
+
+
+def _power(v: Verification) -> list[tuple[str, str]]:
+    """How likely an error in each light was to be seen, the least likely first."""
+    if not v.power:
+        return []
+    in_order = sorted(v.power.items(), key=lambda its: its[1])
+    told = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
+    return [(f"An error of {100 * ERROR:.0f} % would be seen", some_of(told, room=400))]
 
 
 def render_table(

@@ -8,9 +8,13 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.held_back import Held
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
+from lightpaint.relit.power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.sentences import spoken_difference, spoken_where
 from lightpaint.screen import some_names
+
+#: Lights that a sentence names.
+NAMED = 2
 
 #: What is asked beside the painting, as what holds the lights back.
 HOLDING: dict[Held, str] = {
@@ -49,6 +53,8 @@ def verdict(
         said.append("Not checked by a render.")
     elif verification.agrees:
         said.append("A render confirms it.")
+        if verification.unseen:
+            said.append(f"{spoken_blindness(verification)}.")
     else:
         said.append(f"A render does NOT confirm it: {agreement(verification)}.")
     return " ".join(said)
@@ -142,6 +148,19 @@ def spoken_delta_e(seen: Seen, *, known: bool) -> str:
     noise = f"noise explains {seen.noise:.1f}" if known else "noise included"
     now = f"{seen.asked:.1f} as the scene is now"
     return f"Mean ΔE {seen.delta_e:.1f} over what was painted ({now}; {noise})"
+
+
+def spoken_blindness(verification: Verification) -> str:
+    """`It would probably have missed an error of 5 % in bulb`: the lights that are seen least."""
+    unseen, power = verification.unseen, verification.power or {}
+    others, more = [name for name in power if name not in unseen], len(unseen) - NAMED
+    if more > 0 and len(others) <= NAMED:
+        names = "any light" + (f" but {some_names(others, joint=' and ')}" if others else "")
+    else:
+        least = [some_names([name]) for name in unseen[:NAMED]] + [f"{more} more"] * (more > 0)
+        *most, last = least
+        names = f"{', '.join(most)} and {last}" if most else last
+    return f"It would probably have missed an error of {100 * ERROR:.0f} % in {names}"
 
 
 def agreement(verification: Verification | None) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run
+from conftest import BasisFactory
 
 from lightpaint.basis.file import write_basis
 from lightpaint.images.estimate import Estimate
@@ -169,3 +170,20 @@ def test_one_number_everywhere(tmp_path: Path, make_basis: Any):
     for line in (done.stdout, page.split("</header>")[0]):
         assert "meets" not in line
         assert "RMS" not in line.split("missed of the painting")[0]
+
+
+def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
+    basis = make_basis()
+    solution = solve(basis, Target.of(basis.present_look))
+    predicted = combine(basis, solution.lighting)
+    checked = compare(predicted, predicted)
+    for power, said in (
+        ({"bulb": 0.49, "sun": 1.0}, "5 % in bulb."),
+        ({"bulb": 0.3, "sun": 0.1}, "5 % in sun and bulb."),
+        ({"a": 0.3, "b": 0.1, "c": 0.2, "d": 0.0}, "5 % in any light."),
+        ({"a": 0.3, "b": 0.1, "c": 0.2, "d": 0.9}, "5 % in any light but d."),
+        ({"a": 0.3, "b": 0.1, "c": 0.2, **dict.fromkeys("def", 1.0)}, "5 % in b, c and 1 more."),
+    ):
+        told = verdict(solution, predicted, replace(checked, power=power))
+        assert told.endswith(f"confirms it. It would probably have missed an error of {said}")
+    assert verdict(solution, predicted, replace(checked, power={"sun": 0.5})).endswith("it.")
