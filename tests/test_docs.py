@@ -14,7 +14,7 @@ from lightpaint.batch.cluster import LEAST_S, PATIENCE
 from lightpaint.cli.parser import command_parser
 from lightpaint.lighting.constraints.whites import WHITES
 from lightpaint.lighting.fit import HOLD
-from lightpaint.paint.server import PORT
+from lightpaint.paint.address import PORT
 from lightpaint.scene.alike import FEW
 from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import load_scene

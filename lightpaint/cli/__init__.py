@@ -3,7 +3,8 @@
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: done, but not as asked
 (`verify` found a disagreement, an answer is not close enough); 2: something the user can mend, said
-in one line; 130: interrupted, 143: told to end, 129: its terminal has closed.
+in one line; 70: a fault of
+lightpaint's own; 130: interrupted, 143: told to end, 129: its terminal has closed.
 """
 
 from collections.abc import Sequence
@@ -25,4 +26,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         sys.stderr.write("lightpaint: interrupted\n")
         code = 130
+    except Exception as error:  # before there was a command to answer for it
+        import sys
+
+        from lightpaint.cli.fault import report_fault
+
+        given = list(sys.argv[1:] if arguments is None else arguments)
+        code = report_fault("lightpaint", error, given)
     return 128 + came[0] if came and code == 130 else code

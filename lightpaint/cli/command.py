@@ -4,13 +4,13 @@ import gc
 import io
 import os
 import sys
-import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 
 from lightpaint.cli import lines
+from lightpaint.cli.fault import report_fault
 from lightpaint.cli.manner import Manner, Outcome, speaking
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import spoken
@@ -67,7 +67,7 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
     except Exception as error:
         # An interrupt in the middle of a library often surfaces as some error of its own.
         if not came:
-            return _failed(options.command, error)
+            return _failed(options.command, error, given)
     lines.err(f"lightpaint {options.command}: interrupted{how_to_go_on}")
     return 130
 
@@ -89,13 +89,10 @@ def _command(name: str) -> Callable[..., Outcome]:
     return getattr(module, name)  # type: ignore[no-any-return]
 
 
-def _failed(command: str, error: Exception) -> int:
+def _failed(command: str, error: Exception, given: Sequence[str]) -> int:
     """Say what went wrong, and return the exit code."""
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
             lines.err(f"lightpaint {command}: {spoken(line)}")
         return 2
-    # A mistake of lightpaint's own, told whole; its text may repeat what a file says.
-    for line in traceback.format_exception(error):
-        lines.err(line.rstrip("\n"))
-    return 1
+    return report_fault(f"lightpaint {command}", error, given)

@@ -37,7 +37,8 @@ from lightpaint.version import __version__
 #: What a script asks.
 EXIT_CODES = (
     "Exit codes: 0 done; 1 done, but not as asked (verify disagrees, --max-miss, --min-fit); "
-    "2 an error that you can mend, in one line; 130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
+    "2 an error that you can mend, in one line; 70 a fault of lightpaint's own; "
+    "130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
 )
 
 

@@ -312,6 +312,35 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
         raise SceneError(f"{lead}{path}: {text}{hint}") from error
 
 
+@contextmanager
+def render_errors(path: Path) -> Iterator[None]:
+    """Turn what Mitsuba throws while it renders into one line: the reason, and not what it led to.
+
+    Some scenes load, and cannot be rendered: a sensor that is never hit by particles, say.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        if not _is_native(error):
+            raise
+        first: BaseException = error
+        while first.__cause__ is not None:
+            first = first.__cause__
+        text = one_line(_without_places(str(first), path), limit=MAX_SAID)
+        raise SceneError(
+            f'Mitsuba cannot render {path}: {text}; integrator="path" renders most scenes'
+        ) from error
+
+
+def _is_native(error: BaseException) -> bool:
+    """Return whether Mitsuba threw it, and not a listener that heard of the progress."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    module = trace.tb_frame.f_globals.get("__name__", "") if trace is not None else ""
+    return str(module).partition(".")[0] in ("drjit", "lightpaint", "mitsuba")
+
+
 def _without_places(said: str, path: Path) -> str:
     """Mitsuba's words without places in its source, and without the file where that is `path`."""
     if "str_from_cstr" in said:  # the binding's word for it

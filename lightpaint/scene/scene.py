@@ -27,7 +27,7 @@ from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduc
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights_file import Asked, lights_file_beside, lights_file_for
-from lightpaint.scene.parsed import ParsedScene, mitsuba_errors
+from lightpaint.scene.parsed import ParsedScene, mitsuba_errors, render_errors
 from lightpaint.scene.shapes import shape_names
 from lightpaint.scene.turns import MITSUBA
 from lightpaint.scene.variant import use_variant
@@ -228,7 +228,8 @@ class Scene(Shown):
         """What `work` makes of what `load` returns, which is let go of afterwards."""
         loaded = self.load(emission)
         try:
-            return work(loaded)
+            with render_errors(self.path):
+                return work(loaded)
         finally:
             del loaded
             gc.collect()

@@ -16,6 +16,7 @@ from lightpaint.basis.render.separate import (
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
+from lightpaint.scene.parsed import render_errors
 from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_first_hits
@@ -81,7 +82,8 @@ def render_basis(
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
-    made = render_all(scene, budget, seed, start, Keeper(keep), progress)
+    with render_errors(scene.path):
+        made = render_all(scene, budget, seed, start, Keeper(keep), progress)
     if start is not None:
         made = replace(made, features=start.features, objects=start.objects)
     return with_first_hits(made, scene, seed)

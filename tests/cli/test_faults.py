@@ -1,0 +1,86 @@
+"""What nobody foresaw is one line and a code of its own; what Mitsuba cannot render is an error."""
+
+import re
+import stat
+from pathlib import Path
+
+import pytest
+from command import refused, run
+
+from lightpaint.cli import command
+from lightpaint.cli.fault import FAULT
+
+#: A camera that no particle hits: it loads, and Mitsuba throws in the middle of the render.
+SCENE = """<scene version="3.0.0">
+    <integrator type="ptracer"/>
+    <sensor type="orthographic"><film type="hdrfilm">
+        <integer name="width" value="8"/><integer name="height" value="8"/>
+    </film></sensor>
+    <shape type="rectangle"><transform name="to_world"><translate z="3"/></transform></shape>
+    <emitter type="point" id="lamp"/>
+</scene>"""
+
+
+@pytest.mark.parametrize("name", ["template", "basis"])
+def test_a_scene_that_mitsuba_cannot_render_is_one_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / "flat.xml").write_text(SCENE, encoding="utf-8")
+    line = refused(tmp_path, name, "flat.xml", "--spp", "2", "-o", "out.basis.exr", "-q")
+    assert line.startswith(f"lightpaint {name}: Mitsuba cannot render flat.xml: ")
+    assert "not implemented" in line
+    assert "--integrator path" in line
+
+
+def fails(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    def doctor(**_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(command, "_command", lambda name: doctor)
+
+
+def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fails(monkeypatch, KeyError("a\x1b[31m name\nof two lines"))
+    done = run(
+        tmp_path, "doctor", "--json", XDG_STATE_HOME=str(tmp_path / "state"), HOME=str(tmp_path)
+    )
+    assert done.returncode == FAULT == 70
+    assert done.stdout == ""
+    [line] = done.stderr.splitlines()
+    assert line.startswith("lightpaint doctor: a fault of lightpaint's own: KeyError: ")
+    assert "\x1b" not in line
+    found = re.search(r"the details are in (.*\.txt)$", line)
+    assert found is not None
+    file = Path(found[1])
+    assert tmp_path in file.parents
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
+    told = file.read_text(encoding="utf-8")
+    assert "Traceback" in told
+    assert "'doctor', '--json'" in told
+    assert "raise error" in told
+    assert "\x1b" not in told
+
+
+def test_where_nothing_can_be_written_it_is_one_line_still(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fails(monkeypatch, ZeroDivisionError())
+    monkeypatch.setattr("lightpaint.cli.fault._folders", lambda: [Path("/dev/null/logs")])
+    done = run(tmp_path, "doctor")
+    assert done.returncode == FAULT
+    [line] = done.stderr.splitlines()
+    assert line.endswith("own: ZeroDivisionError; the details could not be written")
+
+
+def test_a_fault_before_there_is_a_command_is_told_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken() -> None:
+        raise ImportError("half an installation")
+
+    monkeypatch.setattr(command, "command_parser", broken)
+    done = run(tmp_path, "doctor", XDG_STATE_HOME=str(tmp_path), HOME=str(tmp_path))
+    assert done.returncode == FAULT
+    assert "lightpaint: a fault of lightpaint's own: ImportError: half an inst" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
