@@ -11,12 +11,16 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
 from lightpaint.paint.protocol import VERSION, Hello, Paint, Said, TakeOver
 
-#: Messages of a page that wait to be answered, before no more are taken from its socket.
-MOST_HEARD = 64
+#: Messages of a page that wait to be answered, and bytes of them, before no more are taken from its
+#: socket.
+MOST_HEARD, MOST_HEARD_BYTES = 64, 2**27
 
 #: Messages that wait to be sent, and seconds that one may take: who is slower has gone, or comes
 #: back and is told the state anew.
 MOST_UNSENT, SLOWEST_S = 512, 60.0
+
+#: Bytes of pictures and the like that wait to be sent, before what the page asks for next is done.
+MOST_UNSENT_BYTES = 2**26
 
 
 class Socket(Protocol):
@@ -31,13 +35,14 @@ class Socket(Protocol):
 class Heard:
     """One message of a page, or why it is none.
 
-    replies: its number, and those of live paint that it has made superfluous.
+    replies: its number, and those of live paint that it has made superfluous. size: bytes.
     """
 
     replies: list[int] = field(default_factory=list)
     said: Said | None = None
     arrays: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
     refusal: Message | None = None
+    size: int = 0
 
     @property
     def asks_for_session(self) -> bool:
@@ -65,7 +70,7 @@ class Client:
         self._unsent: list[tuple[Message, int | None]] = []
         self._is_heard, self._is_taken = asyncio.Event(), asyncio.Event()
         self._is_to_send, self._is_sent = asyncio.Event(), asyncio.Event()
-        self._is_answered = asyncio.Event()
+        self._is_answered, self._is_to_take = asyncio.Event(), asyncio.Event()
         self._is_sent.set()
         self._is_answered.set()
         self._is_gone = False
@@ -78,9 +83,13 @@ class Client:
                 message = await self._socket.receive()
                 if message["type"] != "websocket.receive":
                     return
-                await self._takes(_heard(message.get("bytes")))
+                frame = message.get("bytes")
+                heard = _heard(frame)
+                heard.size = len(frame or b"")
+                await self._takes(heard)
         finally:
             self.has_left = True
+            self._is_to_take.set()
 
     async def _takes(self, heard: Heard) -> None:
         """Have it answered, in its turn."""
@@ -88,12 +97,20 @@ class Client:
             self._heard.append(heard)
         self._is_answered.clear()
         self._is_heard.set()
-        while len(self._heard) >= MOST_HEARD and not self._is_gone:
+        while self._hears_too_much and not self._is_gone:
             self._is_taken.clear()
             await self._is_taken.wait()
 
+    @property
+    def _hears_too_much(self) -> bool:
+        waiting = len(self._heard)
+        return waiting >= MOST_HEARD or sum(x.size for x in self._heard) > MOST_HEARD_BYTES
+
     async def next_heard(self) -> Heard:
-        """What is to be answered next; what was before it has been."""
+        """What is to be answered next; what was before it has been, and most of it was taken."""
+        while self._unsent_bytes > MOST_UNSENT_BYTES and not (self._is_gone or self.has_left):
+            self._is_to_take.clear()
+            await self._is_to_take.wait()
         while not self._heard:
             self._is_answered.set()
             self._is_heard.clear()
@@ -105,7 +122,7 @@ class Client:
         """Say no more to it, and take no more from it."""
         self._is_gone = True
         self._unsent.clear()
-        for event in (self._is_sent, self._is_to_send, self._is_taken):
+        for event in (self._is_sent, self._is_to_send, self._is_taken, self._is_to_take):
             event.set()
 
     def _covers_last(self, heard: Heard) -> bool:
@@ -151,12 +168,18 @@ class Client:
             if self._is_gone:
                 break
             message, reply = self._unsent.pop(0)
+            self._is_to_take.set()
             frame = to_frame(message.content(reply), message.buffers())
             try:
                 await asyncio.wait_for(self._socket.send_bytes(frame), SLOWEST_S)
             except Exception:  # whatever a socket says that has nobody at its end
                 self.give_up()
         await self.leave(1013)
+
+    @property
+    def _unsent_bytes(self) -> int:
+        arrays = [array for message, _ in self._unsent for array in message.arrays.values()]
+        return sum(array.nbytes for array in arrays)
 
     async def answered(self) -> None:
         """Wait until all that the page has said is answered."""

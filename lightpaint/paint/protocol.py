@@ -45,6 +45,10 @@ class Paint:
     label: str = "stroke"
     view: int = 0
 
+    def __post_init__(self) -> None:
+        if self.stroke >= 2**53:  # beyond which a page cannot count
+            raise ValueError("stroke is a number below 2**53")
+
 
 @dataclass(frozen=True)
 class Drop:

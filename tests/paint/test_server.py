@@ -403,6 +403,7 @@ SHORT = to_frame(
         (frame("paint", 5, NAN, stroke=1, region=[0, 1, 0, 1]), 5),
         (frame("paint", 5, stroke=1, region=[0, 1]), 5),
         (frame("ask", 5, light="0", asked={}), 5),
+        (paint(5, stroke=2**53), 5),  # from which on a page cannot count
         (SHORT, None),
     ],
 )
@@ -672,6 +673,95 @@ def test_of_what_nobody_asked_for_a_slow_page_gets_the_newest() -> None:
     assert [m.fields["done"] for m in unsent if m.kind == "progress"] == [999, 999]
     [renewed] = [m for m in unsent if m.kind == "renewed"]
     assert renewed.fields["resources"] == {"plane/0": 999, "plane/1": 997, "plane/2": 998}
+
+
+class Slow(Scripted):
+    """A socket whose other end asks for much, and takes one answer when it is let."""
+
+    def __init__(self, *frames: bytes) -> None:
+        super().__init__(*frames, leaves=False)
+        self.is_let = asyncio.Event()
+
+    async def send_bytes(self, data: bytes) -> None:
+        await self.is_let.wait()
+        await super().send_bytes(data)
+
+
+def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else pictures without number would wait for it in memory."""
+    monkeypatch.setattr(client, "MOST_UNSENT_BYTES", 1000)
+    count = 50
+    session, asked = FakeSession(), list[Any]()
+
+    def said(said: Any, arrays: Any) -> list[Message]:
+        asked.append(said)
+        return [Message("fetched", {"name": said.name}, {"picture": np.zeros(100, np.float64)})]
+
+    session.said = said  # type: ignore[method-assign]
+
+    async def trial() -> None:
+        its = Line(session, None)
+        its.begin()
+        socket = Slow(HELLO, *(frame("fetch", k, name="x") for k in range(1, count + 1)))
+        page = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
+        while len(asked) < 2:
+            await asyncio.sleep(0.001)
+        for _ in range(20):
+            await asyncio.sleep(0.005)
+        assert len(asked) <= 3
+        socket.is_let.set()
+        while len(socket.sent) <= count:
+            await asyncio.sleep(0.001)
+        page.cancel()
+        assert [one["reply"] for one in socket.sent] == list(range(count + 1))
+        await its.end()
+
+    in_a_loop(trial)
+
+
+def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    frames = [paint(k, stroke=k, done=True) for k in range(1, 20)]
+    monkeypatch.setattr(client, "MOST_HEARD_BYTES", 3 * len(frames[0]))
+
+    async def trial() -> None:
+        socket = Scripted(*frames, leaves=False)
+        page = client.Client(socket)
+        hearing = asyncio.ensure_future(page.keep_hearing())
+        for _ in range(50):
+            await asyncio.sleep(0)
+        assert len(frames) - len(socket.to_hear) == 4
+        for stroke in range(1, 20):  # none is lost
+            heard = await page.next_heard()
+            assert isinstance(heard.said, Paint)
+            assert heard.said.stroke == stroke
+        hearing.cancel()
+
+    in_a_loop(trial)
+
+
+def test_two_pages_that_fight_over_the_session_harm_nobody(served: Served) -> None:
+    with served.socket("a") as one, served.socket("b") as other:
+        greet(one)
+        pages = [one, other]
+        for turn in range(40):
+            page, loser = pages[turn % 2], pages[1 - turn % 2]
+            page.send_bytes(frame("take_over", 2 * turn))
+            page.send_bytes(paint(2 * turn + 1, stroke=turn, done=True))
+            kinds = list[str]()
+            while kinds[-1:] != ["answer"]:
+                told = heard(page)
+                kinds.append(told["kind"])
+                assert told["kind"] in ("state", "answer", "closed")
+                assert told["kind"] != "closed" or "reply" not in told
+            loser.send_bytes(paint(10_000 + turn, stroke=turn, done=True))
+            while (told := heard(loser)).get("reply") != 10_000 + turn:
+                assert told["kind"] == "closed"
+            assert told["reason"] == "taken"
+    assert [said.stroke for said in served.session.heard if isinstance(said, Paint)] == [*range(40)]
 
 
 def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_away() -> None:
