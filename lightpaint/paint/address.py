@@ -132,7 +132,7 @@ def _bound(host: str, family: socket.AddressFamily, number: str, port: int | Non
 
 def _outward_name(port: int) -> str:
     """How others on its network call this machine, where all of its addresses are listened to."""
-    for family, elsewhere in ((socket.AF_INET, "192.0.2.1"), (socket.AF_INET6, "2001:db8::1")):
+    for family, elsewhere in ((socket.AF_INET, "203.0.113.1"), (socket.AF_INET6, "2001:db8::1")):
         # No packet is sent: it asks by which address one would go.
         try:
             with socket.socket(family, socket.SOCK_DGRAM) as asking:

@@ -307,7 +307,7 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
     assert said.endswith("what was painted is kept in groups.paint\n")
 
 
-@pytest.mark.parametrize("host", ["", "no.such.name.invalid", "192.0.2.1"])
+@pytest.mark.parametrize("host", ["", "no.such.name.invalid", "203.0.113.7"])
 def test_a_host_that_this_machine_has_not_is_one_line(here: Path, host: str) -> None:
     said = refused(here, "paint", "room.basis.exr", "--no-browser", "--host", host)
     assert "give an address of this machine, 0.0.0.0 for all of them" in said

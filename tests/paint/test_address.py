@@ -90,7 +90,7 @@ def test_who_can_reach_it_is_known_and_its_address_leads_there(
         "http://127.0.0.1",
         "127.0.0.1:9000",
         "256.0.0.1",
-        "192.0.2.1",  # of no machine: RFC 5737
+        "203.0.113.7",  # of no machine: RFC 5737
         "255.255.255.255",
         "224.0.0.1",
         "fe80::1%lo",
