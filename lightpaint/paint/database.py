@@ -182,9 +182,13 @@ def _told(path: Path | None) -> Iterator[None]:
         raise damaged(path, error) from None
 
 
-def damaged(path: Path | None, error: Exception) -> PaintError:
+class DamagedError(PaintError):
+    """A session file that is not as it was written."""
+
+
+def damaged(path: Path | None, error: Exception) -> DamagedError:
     """A session that cannot be read, as it is said."""
-    return PaintError(f"{path} is damaged ({first_line(error)}): {AFRESH}")
+    return DamagedError(f"{path} is damaged ({first_line(error)}): {AFRESH}")
 
 
 def _spoken(path: Path | None, error: sqlite3.Error) -> LightpaintError:
@@ -229,6 +233,21 @@ def rewritten(
     return opened(path, identity)
 
 
+def free_name(path: Path) -> Path:
+    """Return the first name that no earlier session at `path` was kept under."""
+    number = 1
+    while (aside := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists():
+        number += 1
+    return aside
+
+
+def check_pages(database: sqlite3.Connection) -> None:
+    """Raise sqlite3.Error where pages of an open database are not as they were written."""
+    [(found,)] = database.execute("PRAGMA quick_check(1)")
+    if found != "ok":
+        raise sqlite3.DatabaseError(found)
+
+
 def set_aside(path: Path) -> Path | None:
     """Give the session at `path` another name. Returns it; None where there is no session.
 
@@ -241,9 +260,7 @@ def set_aside(path: Path) -> Path | None:
     except PaintError as error:
         if IN_USE in str(error):
             raise
-    number = 1
-    while (aside := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists():
-        number += 1
+    aside = free_name(path)
     try:
         for ending in ("-wal", "-journal", ""):  # of one that is damaged
             if os.path.exists(f"{path}{ending}"):

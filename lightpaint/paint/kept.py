@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
+from lightpaint.files import first_line
 from lightpaint.paint.packed import packed, unpacked
 from lightpaint.paint.pixels import Pixels, Region
 from lightpaint.paint.steps import Patch
@@ -66,7 +67,10 @@ class LookArrays(Mapping[str, npt.NDArray[Any]]):
         dtype, shape, data = self._file.look_array(self._number, name)
         if dtype not in DTYPES:
             raise PaintError(f"a damaged look: {dtype}")
-        return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
+        try:
+            return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
+        except (TypeError, ValueError) as error:
+            raise PaintError(f"a damaged look: {first_line(error)}") from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._file.look_names(self._number))

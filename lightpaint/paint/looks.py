@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.errors import PaintError
+from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.frames import Message
 from lightpaint.paint.pictures import Pictures, small_picture
 from lightpaint.paint.pixels import Pixels
@@ -31,6 +31,12 @@ class Looks:
 
     def __init__(self, session: Session, pictures: Pictures) -> None:
         self._session, self._pictures = session, pictures
+        try:
+            self.listed()
+        except (LightpaintError, LookupError, TypeError, ValueError):
+            if not session.store.is_kept:
+                raise
+            session.store.mend()
         for look in session.store.looks():
             self._offer(look)
 
@@ -136,11 +142,17 @@ class Looks:
 
     def _offer(self, look: KeptLook) -> None:
         views = len(self._session.views)
-        names = {"thumbnail"} if views == 1 else set(look.arrays)
         for k in range(views):
-            if (name := of_view("thumbnail", k)) in names:
-                make = partial(look.arrays.__getitem__, name)
-                self._pictures.offer(of_view(f"look/{look.id}", k), make)
+            make = partial(self._thumbnail, look, k)
+            self._pictures.offer(of_view(f"look/{look.id}", k), make)
+
+    def _thumbnail(self, look: KeptLook, k: int) -> npt.NDArray[Any]:
+        """Return the small picture of a view: as kept, or made anew of the look's lights."""
+        try:
+            return look.arrays[of_view("thumbnail", k)]
+        except (LightpaintError, LookupError):
+            weights = np.asarray(look.arrays["weights"])
+            return small_picture(self._session.views[k].basis.mix(weights), self._session.transform)
 
     def _free(self) -> int:
         return 1 + max((look.id for look in self._session.store.looks()), default=0)

@@ -25,6 +25,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.answering import Answering
 from lightpaint.paint.canvas import Canvases
+from lightpaint.paint.database import DamagedError
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.pixels import Pixels, Region
@@ -71,12 +72,16 @@ class Session:
     ) -> None:
         self.store, self.name, self.transform = store, name, transform
         self.version, self._stroke = 0, -1
-        done = store.steps[: store.position]
-        told = [step.fields["after"] for step in done if step.fields]
-        self.views = Canvases(bases, presents, done)
+        try:
+            self.views, wishes = _painted(bases, presents, store)
+        except (LightpaintError, ArithmeticError, LookupError, TypeError, ValueError):
+            if not store.is_kept:
+                raise
+            store.mend()
+            self.views, wishes = _painted(bases, presents, store)
         self.answering = Answering(
             self.views.live,
-            Wishes.of(told[-1]) if told else Wishes(),
+            wishes,
             settings=settings,
             constraints=constraints or Constraints(),
             transform=transform,
@@ -326,8 +331,13 @@ class Session:
         if not 0 <= position <= len(steps):
             raise PaintError(f"there is nothing to {'undo' if is_back else 'redo'}")
         step = steps[position] if is_back else steps[now]
+        try:
+            found = [patch.before if is_back else patch.after for patch in step.patches]
+        except DamagedError:
+            raise PaintError(self.store.mend()) from None
         self.store.move_to(position)
-        self.views.put(step.patches, is_back=is_back)
+        for patch, pixels in zip(step.patches, found, strict=True):
+            self.views[patch.view].put(patch.region, pixels)
         if step.fields:
             self.answering.ask(Wishes.of(step.fields["before" if is_back else "after"]))
         self._changed()
@@ -390,3 +400,14 @@ class Session:
             arrays |= self.weights_array
             made.append(Message("patch", fields, arrays))
         return made
+
+
+def _painted(
+    bases: Sequence[Basis], presents: Sequence[Floats], store: Store
+) -> tuple[Canvases, Wishes]:
+    """Return the canvases as the steps have made them, and what is asked."""
+    done = store.steps[: store.position]
+    told = [step.fields["after"] for step in done if step.fields]
+    wishes = Wishes.of(told[-1]) if told else Wishes()
+    wishes.constraints()
+    return Canvases(bases, presents, done), wishes

@@ -17,7 +17,8 @@ full disk ends nothing: what cannot be written stays in memory, in order, `unsav
 
 import json
 import sqlite3
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from threading import RLock
@@ -25,7 +26,16 @@ from typing import Any
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
-from lightpaint.paint.database import damaged, identify, opened, place_of, rewritten, transaction
+from lightpaint.paint.database import (
+    DamagedError,
+    check_pages,
+    damaged,
+    identify,
+    opened,
+    place_of,
+    rewritten,
+    transaction,
+)
 from lightpaint.paint.kept import (
     KeptPatch,
     LookArrays,
@@ -37,6 +47,9 @@ from lightpaint.paint.packed import is_marked, packed_patches, unpacked_patch
 from lightpaint.paint.pixels import Pixels, Region
 from lightpaint.paint.steps import Identity, KeptLook, Patch, Step
 from lightpaint.records import strict_json
+
+#: What comes of a value that is another than was written.
+DAMAGES = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 _Write = Callable[[sqlite3.Connection], object]
 
@@ -51,6 +64,7 @@ class Store:
             pixels are read from the file when they are asked for. To look at only.
         position: How many of them are done.
         unsaved: Why the last steps are in memory only, in one line; None if all is written.
+        remarks: What was worth saying of the file: what of it could not be read.
     """
 
     def __init__(self, path: Path | None, identity: Identity | None) -> None:
@@ -65,17 +79,14 @@ class Store:
         self._waiting: list[_Write] = []  # what is still to be written, in order
         self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
         self._arrays: dict[int, PackedArrays] = {}  # the same of looks
-        self._database = opened(path, identity)
-        self._file = None if path is None else path.absolute()  # also from another folder
-        self._place = place_of(self._file)
+        self.remarks: list[str] = []
         try:
-            self._read()
-        except (sqlite3.Error, ArithmeticError, KeyError, TypeError, ValueError) as error:
-            self._database.close()
-            raise damaged(path, error) from None
-        except BaseException:
-            self._database.close()
-            raise
+            self._begin()
+        except DamagedError as error:
+            if path is None or not path.is_file():
+                raise
+            self.remarks.append(_mended(path, identity, error))
+            self._begin()
 
     @classmethod
     def open(cls, path: Path, identity: Identity | None) -> "Store":
@@ -87,6 +98,41 @@ class Store:
         lights or another size; OutputError for a place that cannot be written.
         """
         return cls(path, identity)
+
+    def _begin(self) -> None:
+        """Open the file, and read all of it but pixels. Raises DamagedError, and others."""
+        self._database = opened(self.path, self.identity)
+        self._file = None if self.path is None else self.path.absolute()  # also from elsewhere
+        self._place = place_of(self._file)
+        self.steps.clear()
+        self._ids.clear()
+        self._looks.clear()
+        try:
+            check_pages(self._database)
+            self._read()
+        except (sqlite3.Error, *DAMAGES) as error:
+            self._database.close()
+            raise damaged(self.path, error) from None
+        except BaseException:
+            self._database.close()
+            raise
+
+    def mend(self) -> str:
+        """Go on with what can be read of the file, which turned out to be damaged.
+
+        Returns what was lost, in one line, which is also among the remarks. Raises PaintError where
+        that cannot be done.
+        """
+        with self._lock:
+            if self.path is None or self.flush() is not None:
+                raise PaintError(f"{self.path} is damaged")
+            self._database.close()
+            try:
+                said = _mended(self.path, self.identity, None)
+            finally:
+                self._begin()
+            self.remarks.append(said)
+            return said
 
     def becomes(self, identity: Identity) -> None:
         """It is of this, which was not known when it was opened. Raises PaintError if it is not."""
@@ -126,6 +172,11 @@ class Store:
                 raise PaintError(f"no step {position}: there are {len(self.steps)}")
             self.position = position
             self._write(lambda _: None)
+
+    @property
+    def is_kept(self) -> bool:
+        """Return whether there is a file."""
+        return self.path is not None
 
     def looks(self) -> list[KeptLook]:
         """All looks, the oldest first; their arrays are read when they are asked for."""
@@ -264,13 +315,20 @@ class Store:
         with self._lock:
             blobs = self._blobs.get(number)
             if blobs is None:
-                found = "SELECT before, change FROM pixels WHERE step = ?"
-                blobs = self._database.execute(found, (number,)).fetchone()
+                with self._readable():
+                    found = "SELECT before, change FROM pixels WHERE step = ?"
+                    blobs = self._database.execute(found, (number,)).fetchone()
         if blobs is None:
             raise PaintError(f"a step that was cut off: {number}")
-        try:
+        with self._readable():
             return unpacked_patch(places, k, *blobs)
-        except (PaintError, TypeError) as error:
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        """Say what cannot be read as a DamagedError."""
+        try:
+            yield
+        except (sqlite3.Error, PaintError, *DAMAGES) as error:
             raise damaged(self.path, error) from None
 
     def _look(self, number: int, fields: str) -> KeptLook:
@@ -282,7 +340,8 @@ class Store:
             if number in self._arrays:
                 return list(self._arrays[number])
             found = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
-            return [name for (name,) in self._database.execute(found, (number,))]
+            with self._readable():
+                return [name for (name,) in self._database.execute(found, (number,))]
 
     def look_array(self, number: int, name: str) -> PackedArray:
         """One of them, and no other is read. Raises KeyError if there is none."""
@@ -290,11 +349,22 @@ class Store:
             if number in self._arrays:
                 return self._arrays[number][name]
             found = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
-            row = self._database.execute(found, (number, name)).fetchone()
+            with self._readable():
+                row = self._database.execute(found, (number, name)).fetchone()
         if row is None:
             raise KeyError(name)
         dtype, shape, data = row
         return dtype, shape, data
+
+
+def _mended(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
+    from lightpaint.paint.mend import mended
+
+    try:
+        return mended(path, identity)
+    except OSError as reason:
+        said = f"cannot write beside {path}: {reason.strerror or reason}"
+        raise error or OutputError(said) from None
 
 
 class MemoryStore(Store):

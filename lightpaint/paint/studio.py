@@ -310,7 +310,10 @@ class Studio:
                 transform=transform_of(self.subjects, bases),
                 constraints=self.subjects[0].constraints,
             )
-            return session, Looks(session, self.pictures)
+            looks = Looks(session, self.pictures)
+            for remark in store.remarks:
+                self._tell_kept(remark, "warn")
+            return session, looks
         except BaseException:
             store.close()  # whoever tries again, as with other constraints, finds it free
             raise
