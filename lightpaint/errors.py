@@ -78,6 +78,10 @@ class PaintError(LightpaintError):
     """A message to the painter that means nothing, or a session that cannot be had."""
 
 
+class NothingToUndoError(PaintError):
+    """An undo where nothing was done, or a redo where nothing was undone: nobody's mistake."""
+
+
 class BatchError(LightpaintError):
     """A manifest of looks that cannot be done as it stands.
 

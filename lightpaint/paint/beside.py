@@ -9,7 +9,7 @@ from contextlib import suppress
 from threading import Condition, Event, Thread, current_thread, get_native_id
 from typing import Literal
 
-from lightpaint.errors import LightpaintError
+from lightpaint.errors import LightpaintError, NothingToUndoError
 from lightpaint.files import first_line
 from lightpaint.paint.frames import Message
 from lightpaint.paint.store import Store
@@ -142,6 +142,11 @@ class Threads:
             # Who is being started, as where Ctrl-C comes just then, cannot be waited for.
             if thread is not current_thread() and thread.is_alive():
                 thread.join(max(0.0, end_s - time.monotonic()))
+
+
+def tone_of(error: BaseException) -> Tone:
+    """Return how a page is told of what could not be done."""
+    return "info" if isinstance(error, NothingToUndoError) else "warn"
 
 
 def told(error: Exception, *, at_length: bool = True) -> str:

@@ -1,6 +1,8 @@
 """What somebody asks for that takes long: exports, the verifying render, why it is not closer."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
 from threading import Lock
 from typing import Any, Protocol
 
@@ -43,6 +45,11 @@ class Home(Protocol):
         """How far something is. Raises StoppedError once nobody wants it any more."""
 
 
+def _named(files: Iterable[Path]) -> list[str]:
+    """Files as a page is told of them."""
+    return [str(x.absolute()) for x in files]
+
+
 class Errands:
     """Those of one studio; one of them writes at a time, and one verifies.
 
@@ -54,6 +61,7 @@ class Errands:
         self._writes, self._renders = Lock(), Lock()
         self._seen: dict[int, tuple[int, dict[str, Any]]] = {}  # renders, by view: of which version
         self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
+        self._stops = 0  # how often somebody has stopped what is written
 
     def said(self, message: Asked) -> list[Message]:
         """Begin with it. Raises PaintError for what there is not."""
@@ -72,6 +80,11 @@ class Errands:
             self._wanted = message
         elif isinstance(message, protocol.Explain):
             self._subject(message.view)
+        elif not message.run:
+            self._stops += 1
+            return [Message("started", {"what": "stop"})]
+        else:
+            works[protocol.Export] = partial(self._export, stops=self._stops)
         what = type(message).__name__.lower()
         self._threads.later(lambda: works[type(message)](message), what)
         return [Message("started", {"what": what})]
@@ -101,23 +114,40 @@ class Errands:
             return moment, now
         return moment, with_findings(solution, analyse(solution)).lighting
 
-    def _export(self, message: protocol.Export) -> None:
+    def _export(self, message: protocol.Export, stops: int) -> None:
+        """Write what is asked for. stops: how often that had been stopped when it was asked."""
         # It brings all rooms, of which painting needs a few.
         from lightpaint.paint.exports import OF_PAINTING, export
 
-        moment, lighting = self._answer()
+        def check() -> None:
+            if self._stops != stops:
+                raise StoppedError
 
         def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label  # what it is at within an export is no news to a page
+            check()
             self._place.hears("export", done, total, unit)
 
-        with self._writes:
-            files = export(self._place.subjects, moment, lighting, message.what, hears)
+        files: list[Path] = []
+        try:
+            # Also the exact answer, which may take longer than somebody waits, is given up.
+            with while_wanted(check):
+                moment, lighting = self._answer()
+                with self._writes:
+                    check()
+                    subjects = self._place.subjects
+                    for file in export(subjects, moment, lighting, message.what, hears):
+                        files.append(file)  # one by one: those before a stop are there
+        except StoppedError:
+            if self._stops != stops:
+                told = {"files": _named(files), "command": "", "is_stopped": True}
+                self._place.tell(Message("exported", told))
+            return
         # It is of the paintings that were written now: those of before may be others.
         is_asked, is_painted = bool(OF_PAINTING & set(message.what)), bool(moment.painted)
         sensors = moment.painted_sensors if is_asked and is_painted else ()
         fields = {
-            "files": [str(x.absolute()) for x in files],
+            "files": _named(files),
             "command": self.command(sensors, moment.wishes),
             "is_unpainted": is_asked and not is_painted,
         }

@@ -1,7 +1,7 @@
 """What leaves a session: files that other programs read, and the verifying render."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -42,8 +42,8 @@ def export(
     lighting: Lighting,
     what: Sequence[str],
     progress: Progress,
-) -> list[Path]:
-    """Write what is asked for into the folder of the session; returns the files.
+) -> Iterator[Path]:
+    """Write what is asked for into the folder of the session; yields each file as it is there.
 
     subjects: of all views. Where nothing is painted, what is of a painting is left out. Raises
     PaintError for what there is not, OutputError for what cannot be written.
@@ -57,26 +57,24 @@ def export(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make {folder}: {error.strerror}") from None
-    written = []
     if set(what) & OF_PAINTING:
         for sensor, target in zip(moment.painted_sensors, moment.painted_targets, strict=True):
-            written.append(painting_of(folder, sensor))
-            write_painting(written[-1], target)
+            write_painting(painting_of(folder, sensor), target)
+            yield painting_of(folder, sensor)
     if "picture" in what:
         for sensor, basis in zip(moment.sensors, moment.bases, strict=True):
-            written.append(picture_of(folder, sensor))
-            write_bytes(written[-1], picture(basis, lighting, moment.transform))
+            write_bytes(picture_of(folder, sensor), picture(basis, lighting, moment.transform))
+            yield picture_of(folder, sensor)
     if "lighting" in what:
         write_lighting(folder / LIGHTING, lighting)
-        written.append(folder / LIGHTING)
+        yield folder / LIGHTING
     if "relit" in what:
         if first.scene is None:
             raise PaintError("there is no scene to relight: it was opened from a saved basis")
         relight(first.loaded, lighting, folder / RELIT)
-        written.append(folder / RELIT)
+        yield folder / RELIT
     if "report" in what:
-        written += _report(subjects, moment, progress)
-    return written
+        yield from _report(subjects, moment, progress)
 
 
 def picture(basis: Basis, lighting: Lighting, transform: ViewTransform) -> bytes:

@@ -19,7 +19,7 @@ from typing import Any, Protocol, TypeVar
 import numpy.typing as npt
 
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.paint.beside import told
+from lightpaint.paint.beside import told, tone_of
 from lightpaint.paint.client import Client, Heard
 from lightpaint.paint.frames import Message
 from lightpaint.paint.protocol import Said
@@ -169,7 +169,7 @@ class Line:
             assert heard.said is not None
             return await self._done(self.session.said, heard.said, heard.arrays)
         except LightpaintError as error:
-            return [Message("failed", {"text": str(error)})]
+            return [Message("failed", {"text": str(error), "tone": tone_of(error)})]
         except Exception as error:
             # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
             self.say("".join(traceback.format_exception(error)))

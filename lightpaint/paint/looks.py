@@ -80,7 +80,8 @@ class Looks:
         look = self._look(message.look)
         paintings = dict(enumerate(self._paintings(look)))
         wishes = Wishes.of(look.fields["wishes"])
-        return self._session.load(paintings, wishes, f"look {look.fields['name']}")
+        weights = np.asarray(look.arrays["weights"], np.float64)
+        return self._session.load(paintings, wishes, f"look {look.fields['name']}", weights)
 
     def _paintings(self, look: KeptLook) -> list[Pixels]:
         """What is painted in each view; of one that came later as before it was painted."""

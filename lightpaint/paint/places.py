@@ -4,7 +4,7 @@ from collections.abc import Callable
 from threading import RLock
 from typing import Any
 
-from lightpaint.paint.beside import told
+from lightpaint.paint.beside import told, tone_of
 from lightpaint.paint.frames import Message, said_of
 from lightpaint.paint.protocol import VERSION, Hello, Said, TakeOver
 from lightpaint.paint.studio import Studio
@@ -36,7 +36,7 @@ class Places:
                     self._tell_taken(page, seq)
                     return
         except Exception as error:  # of our own, too, which anywidget would say nothing of
-            answers = [Message("failed", {"text": told(error)})]
+            answers = [Message("failed", {"text": told(error), "tone": tone_of(error)})]
         for k, message in enumerate(answers):
             self.tell(message, seq if k == 0 else None)
 

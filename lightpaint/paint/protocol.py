@@ -157,12 +157,14 @@ class DropLook:
 
 @dataclass(frozen=True)
 class Export:
-    """Write results to the folder of the session. Answered by `started`, later by `exported`.
+    """Write results to the folder of the session, or stop that. Answered by `started`, later by
+    `exported`, which names what was written; of one that was stopped, too.
 
     what: target: a painting of each painted view; picture: the answer in each view, as it is seen.
     """
 
     what: tuple[Literal["target", "picture", "lighting", "relit", "report"], ...]
+    run: bool = True
 
 
 @dataclass(frozen=True)

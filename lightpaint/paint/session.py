@@ -19,7 +19,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.errors import LightpaintError, NothingToUndoError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
@@ -274,8 +274,18 @@ class Session:
         if self.answering.move_back():
             self._changed()
 
-    def load(self, paintings: Mapping[int, Pixels], wishes: Wishes, label: str) -> list[Message]:
-        """Go on from other paintings, by view, and what was asked with them: one step."""
+    def load(
+        self,
+        paintings: Mapping[int, Pixels],
+        wishes: Wishes,
+        label: str,
+        weights: Doubles | None = None,
+    ) -> list[Message]:
+        """Go on from other paintings, by view, and what was asked with them: one step.
+
+        weights: (n, 3), the answer that was kept with them. It is shown until the exact one is
+        there; else one that begins at the answer to what was painted before.
+        """
         self._leave_slider()
         self.answering.check(wishes)
         if self.views.is_open:
@@ -286,6 +296,8 @@ class Session:
         self.views.put(patches)
         self.answering.ask(wishes)
         self._changed()
+        if weights is not None:
+            self.answering.weights = weights.copy()
         return self._patched(*((patch.view, patch.region) for patch in patches))
 
     # Paint
@@ -329,7 +341,7 @@ class Session:
         steps, now = self.store.steps, self.store.position
         position, is_back = now + by, by < 0
         if not 0 <= position <= len(steps):
-            raise PaintError(f"there is nothing to {'undo' if is_back else 'redo'}")
+            raise NothingToUndoError(f"There is nothing to {'undo' if is_back else 'redo'}.")
         step = steps[position] if is_back else steps[now]
         try:
             found = [patch.before if is_back else patch.after for patch in step.patches]

@@ -102,7 +102,11 @@ class Subject:
         if settings.use_cache and settings.time_s is None:
             for spp in FIRST:
                 if has < spp < wanted:
-                    yield self._obtained(spp, progress)
+                    hears = in_samples(progress, has, spp, wanted, lights=len(scene.lights))
+                    yield self._obtained(spp, hears)
+                    has = spp
+            has = min(has, wanted)
+            progress = in_samples(progress, has, wanted, wanted, lights=len(scene.lights))
         basis = obtain(scene, settings, progress, views=self.among)
         if isinstance(self.scene, Opening):
             self.scene.remember(basis)
@@ -129,11 +133,50 @@ class Subject:
         return basis.asking(scene.asked)
 
 
+def in_samples(progress: Progress, has: int, spp: int, wanted: int, *, lights: int) -> Progress:
+    """A listener to passes, of which `progress` hears as samples per pixel of all that are wanted.
+
+    has: how many there are when the passes begin. spp: how many at their end. lights: of the scene;
+    where each is rendered alone, passes are those of one light, whose label is its own.
+    """
+    labels: dict[str, int] = {}
+
+    def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
+        before = labels.setdefault(label, len(labels))
+        if unit == "passes":
+            parts = lights if ":" in label else 1
+            share = min((before + done / max(total, 1)) / parts, 1)
+            progress("basis", has + round((spp - has) * share), wanted, "samples per pixel")
+        else:
+            progress(label, done, total, unit)
+
+    return hear
+
+
+def together(progress: Progress, count: int) -> list[Progress]:
+    """Listeners to parts of one work, of which `progress` hears as one.
+
+    A part that has said nothing yet is taken to be as large as those that have.
+    """
+    heard: dict[int, tuple[int, int]] = {}
+
+    def listener(part: int) -> Progress:
+        def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
+            heard[part] = done, total
+            sums = [sum(each) for each in zip(*heard.values(), strict=True)]
+            progress(label, sums[0], sums[1] * count // len(heard), unit)
+
+        return hear
+
+    return [listener(part) for part in range(count)]
+
+
 def bases_of(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
     """Bases of several views; where they are still to be rendered, all of few samples first."""
     for subject in subjects:
         subject.prepare()
-    each = [subject.bases(progress) for subject in subjects]
+    parts = together(progress, len(subjects))
+    each = [subject.bases(part) for subject, part in zip(subjects, parts, strict=True)]
     found = [next(bases) for bases in each]
     yield list(found)
     while True:

@@ -18,7 +18,7 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import cleaning, exports, protocol, store, studio
+from lightpaint.paint import cleaning, exports, protocol, store, studio, subject
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.session import Session
@@ -165,7 +165,7 @@ def test_one_export_is_written_at_a_time(heard: Heard, monkeypatch: pytest.Monke
         most = max(most, at_work)
         time.sleep(0.1)
         try:
-            return real(*given)
+            yield from real(*given)
         finally:
             at_work -= 1
 
@@ -176,6 +176,31 @@ def test_one_export_is_written_at_a_time(heard: Heard, monkeypatch: pytest.Monke
         heard.studio.said(protocol.Export(("target", "lighting")), {})
     heard.wait(lambda _: sum(m.kind == "exported" for m in heard.messages) == 3)
     assert most == 1
+
+
+def test_an_export_can_be_stopped(heard: Heard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What is there by then stays, and is named; one that begins later is not stopped with it."""
+    begun = threading.Event()
+
+    def report(_subjects: Any, _moment: Any, progress: Any) -> Iterator[Path]:
+        for k in range(10_000):
+            progress("verification", k, 10_000)
+            begun.set()
+            time.sleep(0.001)
+        yield tmp_path / "never.html"
+
+    monkeypatch.setattr(exports, "_report", report)
+    heard.paint(1, 0.8)
+    heard.exact()
+    heard.studio.said(protocol.Export(("lighting", "report")), {})
+    assert begun.wait(10)
+    heard.studio.said(protocol.Export((), run=False), {})
+    exported = heard.wait(lambda m: m.kind == "exported", seconds=5)
+    files = [str(tmp_path / name) for name in ("painting.exr", "lighting.json")]
+    assert exported.fields == {"files": files, "command": "", "is_stopped": True}
+    heard.messages.clear()
+    heard.studio.said(protocol.Export(("lighting",)), {})
+    assert "is_stopped" not in heard.wait(lambda m: m.kind == "exported").fields
 
 
 def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
@@ -347,6 +372,40 @@ def test_a_look_is_gone_back_to_and_undone(heard: Heard):
     assert [x["name"] for x in message.fields["looks"]] == ["bright day copy"]
     with pytest.raises(lp.LightpaintError, match="no look"):
         heard.studio.said(protocol.LoadLook(99), {})
+
+
+def test_a_look_that_is_gone_back_to_has_its_own_answer_at_once(heard: Heard):
+    """Not one that comes from that of another look, until the exact one is there."""
+    heard.paint(1, 0.8)
+    kept = heard.exact().arrays["weights"]
+    [looks] = heard.studio.said(protocol.SaveLook("day"), {})
+    heard.paint(2, 0.02, (0, 12, 0, 16))
+    other = heard.exact().arrays["weights"]
+    assert np.abs(other - kept).max() > 0.1 * kept.max()
+    [patch] = heard.studio.said(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
+    np.testing.assert_array_equal(patch.arrays["weights"], kept)
+    np.testing.assert_allclose(heard.exact().arrays["weights"], kept, rtol=1e-6)
+
+
+def test_rounds_of_samples_are_counted_as_one_work():
+    """In samples per pixel of those that are wanted, whatever the passes are of."""
+    heard: list[tuple[int, int, str]] = []
+    tell = lambda _, done, total, unit="passes": heard.append((done, total, unit))  # noqa: E731
+    one, other = subject.together(tell, 2)
+    for part in (one, other):
+        hear = subject.in_samples(part, 0, 8, 64, lights=3)
+        for k in range(5):
+            hear("basis", k, 4)
+    for part in (one, other):
+        hear = subject.in_samples(part, 8, 64, 64, lights=3)
+        for light in ("key", "fill", "rim"):  # rendered each alone
+            for k in range(3):
+                hear(f"basis: {light}", k, 2)
+    assert {unit for *_, unit in heard} == {"samples per pixel"}
+    assert {total for _, total, _ in heard} == {128}
+    shares = [done for done, *_ in heard[5:]]
+    assert shares == sorted(shares)
+    assert heard[-1][:2] == (128, 128)
 
 
 def test_what_lies_between_two_looks_is_kept(heard: Heard):
