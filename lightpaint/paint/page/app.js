@@ -137,7 +137,7 @@ function Painter({ hands, root }) {
       <div class="view"><${Stage} ui=${ui} hands=${hands} />
         <${Banner} ui=${ui} hands=${hands} />
         <${Toasts} ui=${ui} hands=${hands} /></div>
-      <div class="status"><${Here} ui=${ui} /><${Working} ui=${ui} /></div>
+      <div class="status"><${Here} ui=${ui} /><${Working} ui=${ui} hands=${hands} /></div>
       <${AnswerLine} ui=${ui} hands=${hands} />
       <${Looks} ui=${ui} hands=${hands} />
     </main>

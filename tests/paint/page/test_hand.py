@@ -693,7 +693,7 @@ def test_what_is_under_the_pointer_has_room_beside_what_goes_on(opened: Any, wid
     painter.page.mouse.move(*painter.place())
     here, working = painter.page.locator(".here"), painter.page.locator(".working")
     here.locator(".light-here").wait_for()
-    assert working.inner_text() == "128 of 1024"
+    assert working.inner_text() == "12 %"
     row, room = here.bounding_box(), working.bounding_box()
     assert room["x"] + room["width"] <= painter.page.locator(".status").bounding_box()["x"] + width
     assert row["x"] + row["width"] <= room["x"]

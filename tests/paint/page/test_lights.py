@@ -131,7 +131,9 @@ def test_what_is_asked_of_a_level_stands_in_one_row(opened: Any, size: tuple[int
             end = after["x"] if after else room["x"] + room["width"]
             assert box["x"] + box["width"] < end
 
-    in_a_row("At least", "At most", "Unit")
+    in_a_row("At least", "At most")
+    unit, least = panel.get_by_role("combobox", name="Unit"), panel.get_by_label("At least")
+    assert unit.bounding_box()["y"] > least.bounding_box()["y"]  # levels need all of the width
     painter.choose("Colour", "kelvin")
     in_a_row("From", "To", "Green")
     panel.get_by_role("button", name="Held", exact=True).click()
@@ -260,29 +262,29 @@ def test_names_that_differ_at_their_end_are_told_apart(opened: Any) -> None:
     )
     painter.still()
     row = painter.page.get_by_role("button", name="ceiling_window_12_3", exact=True)
-    box, (start, end) = row.bounding_box(), row.locator("span").all()
+    box, (start, end) = row.bounding_box(), row.locator(".its-name > span").all()
     assert (start.inner_text(), end.inner_text()) == ("ceiling_window", "_12_3")
     widths = start.evaluate("(its) => [its.clientWidth, its.scrollWidth]")
     assert 12 < widths[0] < widths[1]  # something is left out, and it is not all of it
     its = end.bounding_box()
     assert its["x"] + its["width"] <= box["x"] + box["width"] + 0.5
+    assert end.evaluate("(its) => its.scrollWidth <= its.clientWidth + 1")
     assert painter.page.get_by_role("button", name="key", exact=True).inner_text() == "key"
 
 
-def test_where_there_is_no_room_the_unit_of_a_light_goes_first(opened: Any) -> None:
+def test_a_light_says_its_unit_in_its_tip_and_keeps_its_height_while_it_is_sought(
+    opened: Any,
+) -> None:
     painter = opened(viewport={"width": 1280, "height": 720})
-    values = painter.page.locator(".light").first.locator(".values")
-    value, unit, error = values.locator("span").all()
-    whole = values.bounding_box()
-    for its in (value, error):
-        box = its.bounding_box()
-        assert its.inner_text().strip()
-        assert whole["x"] - 0.5 <= box["x"]
-        assert box["x"] + box["width"] <= whole["x"] + whole["width"] + 0.5
-        assert its.evaluate("(its) => its.scrollWidth <= its.clientWidth + 1")
-    assert unit.evaluate("(its) => its.scrollWidth > its.clientWidth")
-    said = [its.text_content().strip() for its in (value, unit, error)]
-    assert values.get_attribute("data-tip") == " ".join(said)
+    row = painter.page.locator(".light").first
+    value, error = row.locator(".values"), row.locator(".error")
+    said = value.inner_text(), "W/(m² sr)", error.inner_text()
+    assert all(said)
+    assert value.get_attribute("data-tip") == " ".join(said)
+    before = row.bounding_box()
+    painter.tell(kind="answer", version=100, exact=False)
+    assert not error.is_visible()
+    assert row.bounding_box() == before
 
 
 def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Painter) -> None:

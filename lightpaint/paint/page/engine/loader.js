@@ -16,7 +16,8 @@ const AGAIN = 2000;
 export class Loader {
   /** @param {import("./host.js").Host} host
    * @param {(slot: string, name: string, picture: Picture) => void} use a picture for its slot
-   * @param {(done: number, total: number) => void} tell */
+   * @param {(done: number, total: number, isFirst: boolean) => void} tell isFirst: some light has no
+   *   picture yet */
   constructor(host, use, tell) {
     this.host = host;
     this.use = use;
@@ -90,7 +91,8 @@ export class Loader {
     if (this.isOver || this.isHeld) return;
     const missing = this.missing();
     this.total = missing.length ? Math.max(this.total, missing.length) : 0;
-    this.tell(this.total - missing.length, this.total);
+    const isFirst = missing.some(([slot]) => slot.startsWith('plane ') && !this.there.has(slot));
+    this.tell(this.total - missing.length, this.total, isFirst);
     for (const [slot, name] of missing) {
       if (this.onTheWay.size >= AT_ONCE) return;
       if (!this.onTheWay.has(slot)) this.load(slot, name);

@@ -35,7 +35,7 @@ export class Work {
     this.loader = new Loader(
       host,
       (slot, name, picture) => this.loaded(slot, name, picture),
-      (done, total) => tell('loading', { done, total }),
+      (done, total, isFirst) => tell('loading', { done, total, isFirst }),
     );
     /** As the session said it last, and as it is of the view. @type {Message | null} */
     this.said = null;

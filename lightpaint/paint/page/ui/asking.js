@@ -161,7 +161,7 @@ function Limits({ k, light, hands, asked = {} }) {
     });
     hands.session.ask(k, { ...asked, limits: Object.fromEntries(turned) });
   };
-  return html`<div class="ask-fields">
+  return html`<div class="ask-fields is-levels">
     <${Number_} label="At least" value=${shown(limits.min)} least=${0} empty="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} figures=${FIGURES} />
     <${Number_} label="At most" value=${shown(limits.max)} least=${0} empty="–" step=${5}
@@ -288,7 +288,8 @@ function Words({ label, value, take }) {
     if (key === 'Enter') done();
     if (key === 'Escape') setTyped(null);
   };
-  return html`<label class="field words"><span class="name">${label}</span>
+  return html`<label class="field words" data-tip=${value.length > 16 ? value : undefined}
+    ><span class="name">${label}</span>
     <input type="text" value=${typed ?? value} spellcheck="false" autocomplete="off"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)} onBlur=${done}
       onKeyDown=${press} /></label>`;

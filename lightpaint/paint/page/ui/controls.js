@@ -60,13 +60,18 @@ export function Choice({ label, value, choices, change, icons }) {
   </div>`;
 }
 
+/** Characters that a field or a list has room for in any panel. */
+const FITS = 12;
+
 /**
- * One of many.
+ * One of many. What may have no room in it is in its tip as well.
  * @param {{label: string, value: string, choices: {value: string, label: string}[],
  *   change: (value: string) => void, hidden?: boolean, tip?: string}} props
  */
 export function Select({ label, value, choices, change, hidden, tip }) {
-  return html`<label class="field" data-tip=${tip}>
+  const chosen = choices.find((one) => one.value === value)?.label ?? '';
+  const whole = chosen.length > FITS && !tip?.includes(chosen) ? chosen : null;
+  return html`<label class="field" data-tip=${[tip, whole].filter(Boolean).join(': ') || undefined}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <select value=${value}
       onChange=${(/** @type {any} */ event) => change(event.currentTarget.value)}>
@@ -185,6 +190,17 @@ export function Slider(props) {
       change=${(/** @type {number} */ made) => change(made, true)} />`
     }
   </div>`;
+}
+
+/**
+ * Text that may have no room where it stands: where it is longer than so many characters all of it
+ * is in its tip, which the keyboard reaches.
+ * @param {{text: string, most: number, class?: string, tag?: string}} props
+ */
+export function Whole({ text, most, class: name, tag: Tag = 'span' }) {
+  const isLong = text.length > most;
+  return html`<${Tag} class=${name} data-tip=${isLong ? text : undefined}
+    tabindex=${isLong ? 0 : undefined}>${text}</${Tag}>`;
 }
 
 /**

@@ -3,6 +3,7 @@
 import { html, useState } from '../vendor/preact.js';
 import { Bar } from './bar.js';
 import { Button, Check, Dialog } from './controls.js';
+import { progressText, within } from './format.js';
 import { KEYS, MOD } from './keys.js';
 
 /** @typedef {import("./model.js").Ui} Ui */
@@ -53,10 +54,6 @@ function ExportDialog({ ui, hands, close }) {
   );
   const [what, setWhat] = useState(can.map(({ key }) => key));
   const isBusy = ui.isWriting;
-  const write = () => {
-    hands.store.set({ isWriting: true, exported: null });
-    hands.session.send('export', { what });
-  };
   const { exported } = ui;
   const folder = ui.state?.folder ?? '';
   return html`<${Dialog} title="Write files" close=${close} class="export">
@@ -68,13 +65,20 @@ function ExportDialog({ ui, hands, close }) {
     )}
     <div class="row"><span class="faint folder">into ${folder}</span>
       <${CopyButton} text=${folder} tip="Copy the folder's path" hands=${hands} />
-      ${isBusy && ui.writing && html`<${Bar} progress=${ui.writing} label="Writing" />`}
+      ${
+        isBusy &&
+        html`<${Bar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Writing" />
+        <span class="faint">${ui.writing && progressText(ui.writing)}</span>
+        <${Button} label="Stop" icon="close" act=${() => hands.session.write([])}
+          tip="What is written by now stays" />`
+      }
       <${Button} label=${isBusy ? 'Writing …' : 'Write'} primary disabled=${isBusy || !what.length}
-        act=${write} /></div>
+        act=${() => hands.session.write(what)} /></div>
+    ${isBusy && html`<p class="faint">It goes on when this window is closed.</p>`}
     ${
       exported &&
       html`<div class="exported" role="status">
-      <h3>Written</h3>
+      <h3>${exported.is_stopped ? 'Stopped; written until then' : 'Written'}</h3>
       <ul>${exported.files.map((file) => html`<li key=${file}><code>${within(file, folder)}</code></li>`)}</ul>
       ${exported.is_unpainted && html`<p>${UNPAINTED}</p>`}
       ${
@@ -85,11 +89,6 @@ function ExportDialog({ ui, hands, close }) {
     </div>`
     }
   </${Dialog}>`;
-}
-
-/** A file as it is called in its folder. @param {string} file @param {string} folder */
-function within(file, folder) {
-  return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
 }
 
 /** @param {{text: string, hands: Hands}} props */

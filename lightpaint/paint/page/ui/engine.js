@@ -94,7 +94,8 @@
  * @property {() => number} greatest importance that is painted; 1 at least
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, hear: (event: any) => void) => void} on "message": an answer to a
- *   stroke; "loading": {done, total} planes; "asking": {stops, mired} while a drag asks;
+ *   stroke; "loading": {done, total, isFirst} pictures, where some of
+ *   the lights have none yet; "asking": {stops, mired} while a drag asks;
  *   "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
  *   sent any more, since another page has painted meanwhile, or the session is there no more; "trouble": {text}
  * @property {() => void} close

@@ -32,6 +32,21 @@ export function stopsText(stops) {
   return Math.abs(stops) < 0.05 ? 'as now' : `${signed(stops)} st`;
 }
 
+/** How far something is, and how long it still takes: of all that goes on it is said so.
+ * @param {{done: number, total: number, left_s?: number}} progress */
+export function progressText({ done, total, left_s: left }) {
+  if (!total) return '';
+  const share = `${Math.floor((100 * Math.min(done, total)) / total)} %`;
+  return left === undefined ? share : `${share}, ${timeText(left)} left`;
+}
+
+/** No finer than it can be foretold. @param {number} seconds */
+function timeText(seconds) {
+  if (seconds < 60) return `${Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5))} s`;
+  if (seconds < 3600) return `${Math.round(seconds / 60)} min`;
+  return `${(seconds / 3600).toFixed(1)} h`;
+}
+
 /** @param {number} share 0 to 1 @returns {string} */
 export function percent(share) {
   const value = 100 * share;
@@ -74,5 +89,18 @@ function spoken(rgb, level) {
   return `${signed(Math.log2(level))} st${isWhite ? ` · ${whiteText(found.kelvin, found.green)}` : ''}`;
 }
 
+/** A name of at most so many characters, without its middle: names of many lights differ at their
+ * ends. @param {string} name @param {number} most */
+export function shortened(name, most) {
+  if (name.length <= most) return name;
+  const end = Math.ceil((most - 1) / 2);
+  return `${name.slice(0, most - 1 - end)}…${name.slice(-end)}`;
+}
+
 /** @param {number} count @param {string} one @param {string} [many] @returns {string} */
 export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
+
+/** A file as it is called in its folder. @param {string} file @param {string} folder */
+export function within(file, folder) {
+  return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
+}

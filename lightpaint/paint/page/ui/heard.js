@@ -206,10 +206,24 @@ export function answerOf(message, ui) {
   return made;
 }
 
-/** @param {any} message @returns {Partial<Ui>} */
-export function progressOf({ what, done, total, unit }) {
+/** @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+export function progressOf({ what, done, total, unit }, ui) {
   const made = { what, done, total, unit };
-  if (what === 'export') return { writing: made };
-  if (/verif/i.test(what)) return { verifying: made };
-  return { basis: total && done >= total ? null : made };
+  if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
+  if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };
+  return { basis: total && done >= total ? null : timed(made, ui.basis) };
+}
+
+/** Seconds of work after which is said how many more there will be. */
+const KNOWN_S = 2;
+
+/** What is left goes on as fast as what was heard of. @param {import('./model.js').Progress} now
+ * @param {import('./model.js').Progress | null} before @returns {import('./model.js').Progress} */
+function timed(now, before) {
+  const ms = performance.now();
+  const isSame = before?.since && before.total === now.total && before.done <= now.done;
+  const since = (isSame && before.since) || { ms, done: now.done };
+  const [seconds, done] = [(ms - since.ms) / 1000, now.done - since.done];
+  const left_s = seconds > KNOWN_S && done > 0 ? (seconds / done) * (now.total - now.done) : undefined;
+  return { ...now, since, left_s };
 }

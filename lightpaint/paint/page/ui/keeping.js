@@ -26,7 +26,11 @@ async function keep({ session, store }) {
 
 /** Go on from a look: a step that can be undone. @param {Hands} hands @param {number} look */
 export async function goOnFrom({ session, store }, look) {
+  const name = store.value.looks.find(({ id }) => id === look)?.name ?? null;
+  // Until it is there, the pictures are of what was there before.
+  store.set({ comingTo: name });
   const reply = await session.send('load_look', { look });
+  if (store.value.comingTo === name) store.set({ comingTo: null });
   if (reply?.kind === 'patch') mark(store, look);
 }
 

@@ -60,7 +60,7 @@ export class LightRow extends Component {
                 ? `${light.label}: ${light.members.join(', ')}`
                 : `${light.label}, ${light.plugin}`
             }>
-            <${Icon} name="fold" /><${Name} name=${light.label} /></button>
+            <${Icon} name="fold" /><span class="its-name"><${Name} name=${light.label} /></span></button>
           ${this.marks()}
         </div>
         ${this.numbers()}
@@ -104,16 +104,16 @@ export class LightRow extends Component {
     const kelvin = isLive || !lit ? found?.kelvin : lit.kelvin;
     const white = kelvin && whiteText(kelvin, found?.green ?? 0);
     const value = [white, number(level)].filter(Boolean).join(' · ');
-    const error = isLive ? '' : (lit?.error ?? '');
-    const whole = [value, light.unit, error].filter(Boolean).join(' ');
-    // Where there is no room for all, it is the unit that goes.
-    const told = html`<span>${value}</span><span class="its-unit">${light.unit && ` ${light.unit}`}</span
-      ><span>${error && ` ${error}`}</span>`;
-    return html`<div class="light-numbers">
+    const error = lit?.error ?? '';
+    const whole = [value, light.unit, isLive ? '' : error].filter(Boolean).join(' ');
+    // The error of the answer before keeps its room while the next one is sought.
+    return html`<div class=${`light-numbers ${this.props.hasSlider ? '' : 'is-two'}`}>
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
         style=${{ background: level > 0 ? toHex(atFull(rgb)) : 'none' }}></span>
       <span class="values" data-tip=${level > 0 ? whole : undefined}
-        >${level > 0 ? told : 'off'}</span>
+        >${level > 0 ? value : 'off'}</span>
+      <span class=${`error ${isLive ? 'is-old' : ''}`} aria-hidden=${isLive ? 'true' : undefined}
+        >${level > 0 || !this.props.hasSlider ? error : ''}</span>
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
     </div>`;
   }
@@ -138,14 +138,17 @@ export class LightRow extends Component {
   }
 }
 
-/** The end of a long name that is always seen, since there names of many lights differ: a word of up
- * to seven characters, or five. */
-const END = /[^\p{L}\p{N}][\p{L}\p{N}]{4,6}$|.{5}$/u;
+/** The end of a long name that is always seen, since there names of many lights differ: a space or the
+ * like, and what comes after it; of names without one there, so many characters. */
+const END = /[^\p{L}\p{N}].{4,8}$/u;
+const END_LENGTH = 9;
 
-/** What there is no room for is left out before the end. @param {{name: string}} props */
+/** On two lines, where one has no room for it; what has none on these is left out before the end.
+ * @param {{name: string}} props */
 function Name({ name }) {
   const line = name.replace(/\s+/g, ' ');
-  const at = line.length < 10 ? line.length : line.search(END);
+  const found = line.length < 14 ? line.length : line.search(END);
+  const at = found < 0 ? line.length - END_LENGTH : found;
   return html`<span class="name-start">${line.slice(0, at)}</span><span>${line.slice(at)}</span>`;
 }
 

@@ -3,7 +3,7 @@
 import { inView } from '../engine/protocol.js';
 import { html } from '../vendor/preact.js';
 import { luminance } from './colours.js';
-import { Button, Select } from './controls.js';
+import { Button, Select, Whole } from './controls.js';
 import { askedOf, heldOf, tieOf } from './dimmers.js';
 import { counted, percent } from './format.js';
 import { Icon } from './icons.js';
@@ -58,7 +58,7 @@ export function OfAll({ ui, hands }) {
   const isPart = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !isPart) {
     const whose = comparedAnswer(ui)?.name ?? 'the answer, not shown';
-    return html`<span class="whose">of ${whose}</span>`;
+    return html`<${Whole} class="whose" text=${`of ${whose}`} most=${20} />`;
   }
   const held = heldOf(ui).length;
   if (!isPart && held < 2) return null;

@@ -18,7 +18,10 @@ import { ofKelvin } from './colours.js';
  * @typedef {"hold" | "colors"} Help */
 /** @typedef {{headline: string, help: Help | null, delta_e: number, delta_e_asked: number,
  *   sentences: string[]}} Seen */
-/** @typedef {{what: string, done: number, total: number, unit: string}} Progress */
+/** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
+ * seconds are left, once that can be told.
+ * @typedef {{what: string, done: number, total: number, unit: string,
+ *   since?: {ms: number, done: number}, left_s?: number}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
 
 /**
@@ -55,11 +58,14 @@ import { ofKelvin } from './colours.js';
  *   gone on from last, with the version and the number of steps then
  * @property {Progress | null} basis
  * @property {Progress | null} verifying
- * @property {{done: number, total: number} | null} loading
+ * @property {{done: number, total: number, isFirst?: boolean} | null} loading pictures of the lights;
+ *   isFirst: some of the lights have none yet
+ * @property {string | null} comingTo name of the look that is gone on from, until it is there
  * @property {{agrees: boolean, text: string, isOld?: boolean} | null} verified
  * @property {string[]} explained
  * @property {boolean} explaining
- * @property {{files: string[], command: string, is_unpainted?: boolean} | null} exported
+ * @property {{files: string[], command: string, is_unpainted?: boolean,
+ *   is_stopped?: boolean} | null} exported
  * @property {"wait" | "open" | "lost" | "stale"} connection
  * @property {boolean} isSilent whether an answer is long in coming
  * @property {{reason: string, text: string} | null} closed
@@ -153,6 +159,7 @@ export function first() {
     basis: null,
     verifying: null,
     loading: null,
+    comingTo: null,
     verified: null,
     explained: [],
     explaining: false,

@@ -2,7 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
-import { counted } from './format.js';
+import { counted, progressText } from './format.js';
 import { Icon } from './icons.js';
 import { Bar } from './bar.js';
 
@@ -59,18 +59,51 @@ function WayOn({ ui, hands }) {
   return html`<${Button} label="Load the page anew" primary act=${() => location.reload()} />`;
 }
 
-/** A basis that still renders, pictures that still load; in short while the pointer is on a picture,
- * of which more is said beside it. @param {{ui: Ui}} props */
-export function Working({ ui }) {
-  const { basis, loading } = ui;
-  const work = basis ?? (loading && loading.done < loading.total ? loading : null);
-  if (!work || !ui.ready) return null;
-  const count = work.total ? ` ${work.done} of ${work.total}` : '';
-  const text = basis
-    ? `Rendering the lights:${count} ${basis.unit ?? ''}. You can paint already.`
-    : `Loading pictures of the lights:${count}`;
-  return html`<div class="working"><${Bar} progress=${work} label=${text} />
-    <span>${ui.pointed ? count.trim() : text}</span></div>`;
+/**
+ * What goes on: what somebody asked for, wherever that was; a basis that still renders; pictures that
+ * still load. In short while the pointer is on a picture, of which more is said beside it.
+ * @param {{ui: Ui, hands: Hands}} props
+ */
+export function Working({ ui, hands }) {
+  if (!ui.ready) return null;
+  return html`${worksOf(ui, hands).map(({ name, progress, text, stop }) => {
+    const far = progressText(progress);
+    const whole = [name, far].filter(Boolean).join(': ');
+    return html`<div class="working" key=${name}><${Bar} progress=${progress} label=${name} />
+      <span>${ui.pointed ? far || name : text ? `${whole}. ${text}` : whole}</span>
+      ${stop && html`<${Button} icon="close" tip=${`Stop: ${name.toLowerCase()}`} act=${stop} />`}</div>`;
+  })}`;
+}
+
+/** @typedef {{name: string, progress: {done: number, total: number, left_s?: number},
+ *   text?: string, stop?: () => void}} Work */
+
+/** Those that are seen nowhere else; of what comes by itself one only. @param {Ui} ui
+ * @param {Hands} hands @returns {Work[]} */
+function worksOf(ui, { session }) {
+  const { basis, loading, writing, verifying } = ui;
+  const isOpen = ui.side && !ui.panel && ui.open.truth;
+  const endless = { done: 0, total: 0 };
+  /** @type {Work[]} */
+  const works = [];
+  if ((ui.isWriting || writing) && ui.dialog !== 'export')
+    works.push({
+      name: 'Writing files',
+      progress: writing ?? endless,
+      stop: () => void session.write([]),
+    });
+  if (verifying && !isOpen)
+    works.push({
+      name: 'Verifying',
+      progress: verifying,
+      stop: () => void session.verify(false),
+    });
+  if (ui.explaining && !isOpen) works.push({ name: 'Seeking reasons', progress: endless });
+  if (basis)
+    works.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });
+  else if (loading && loading.done < loading.total)
+    works.push({ name: 'Loading pictures of the lights', progress: loading });
+  return works;
 }
 
 /** How long a pointer rests before a tip is shown. */

@@ -11,6 +11,7 @@ import {
   stateOf,
   verifiedOf,
 } from './heard.js';
+import { within } from './format.js';
 import { look } from './tools.js';
 
 /** @typedef {import("./engine.js").Host} Host */
@@ -97,12 +98,12 @@ export class Session {
       renewed: (/** @type {any} */ m) => ({
         resources: { ...this.store.value.resources, ...m.resources },
       }),
-      progress: progressOf,
+      progress: (/** @type {any} */ m) => progressOf(m, this.store.value),
       stopped: (/** @type {any} */ m) => this.ended(m.what),
       say: (/** @type {any} */ m) => this.say(m),
-      failed: (/** @type {any} */ m) => this.toast(m.text, 'warn'),
+      failed: (/** @type {any} */ m) => this.toast(m.text, m.tone ?? 'warn'),
       looks: (/** @type {any} */ m) => looksOf(m, this.store.value),
-      exported: (/** @type {any} */ m) => ({ exported: m, ...ENDED.export }),
+      exported: (/** @type {any} */ m) => this.exported(m),
       verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
       explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
@@ -158,6 +159,22 @@ export class Session {
   say({ text, tone, what }) {
     if (what) this.ended(what);
     this.toast(text, tone);
+  }
+
+  /** What was written; who has closed the window is told so. @param {any} message
+   * @returns {Partial<Ui>} */
+  exported(message) {
+    const { files, is_stopped: isStopped } = message;
+    const { dialog, state } = this.store.value;
+    const names = files.map((/** @type {string} */ file) => within(file, state?.folder ?? ''));
+    if (dialog !== 'export') this.toast(writtenText(names, Boolean(isStopped)));
+    return { exported: message, ...ENDED.export };
+  }
+
+  /** Write files, or stop that. @param {string[]} what none to stop */
+  write(what) {
+    if (what.length) this.store.set({ isWriting: true, exported: null });
+    return this.send('export', { what, run: what.length > 0 });
   }
 
   /** @param {string} text @param {'info' | 'warn'} [tone] */
@@ -306,6 +323,12 @@ export class Session {
     });
     return this.send('verify', { run, view: this.store.value.view });
   }
+}
+
+/** What was written, in a sentence. @param {string[]} names @param {boolean} isStopped */
+function writtenText(names, isStopped) {
+  const written = names.length ? `Written: ${names.join(', ')}.` : 'Nothing was written.';
+  return isStopped ? `Stopped. ${written}` : written;
 }
 
 /** @param {Asked} asked @returns {Asked} */

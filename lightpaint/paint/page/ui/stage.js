@@ -44,9 +44,19 @@ function nameOf(ui, kind) {
   if (kind === 'solution' && ui.show.instead && ui.mix) {
     return ui.looks.find((one) => one.id === ui.mix?.a)?.name ?? NAMES.solution;
   }
+  const waits = kind === 'solution' || kind === 'painting' ? waitingFor(ui, kind) : null;
+  if (waits) return `${NAMES[kind]}: ${waits}`;
   if (isPartly(ui, kind)) return `${NAMES.solution}: ${partOf(ui)}`;
   if (kind === 'verified' && ui.verified?.isOld) return 'Render of an earlier answer';
   return NAMES[kind] ?? kind;
+}
+
+/** What a picture does not show yet; null where it is what it is called. @param {Ui} ui
+ * @param {'solution' | 'painting'} kind */
+function waitingFor({ comingTo, loading }, kind) {
+  if (comingTo !== null) return `${comingTo} is coming …`;
+  const isShort = loading?.isFirst && loading.done < loading.total;
+  return kind === 'solution' && isShort ? 'some of its lights are still loading …' : null;
 }
 
 /** Whether a picture shows some of the lights only. @param {Ui} ui @param {string} kind */
@@ -165,6 +175,7 @@ function Tag({ ui, hands, pane, panes }) {
     top: `${Math.min(Math.max(pane.y, pane.top), pane.y + pane.height - 30) + 8}px`,
     left: `${(isRight ? right : Math.max(pane.x, pane.left)) + (isRight ? -8 : 8)}px`,
     transform: isRight ? 'translateX(-100%)' : '',
+    maxWidth: `${Math.max(74, pane.width - 16)}px`,
   };
   const isPart = isPartly(ui, pane.kind);
   const all = () => hands.store.set({ solo: [], mute: [] });

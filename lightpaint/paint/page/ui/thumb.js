@@ -10,16 +10,22 @@ import { html, useEffect, useRef } from '../vendor/preact.js';
  */
 export function Thumb({ name, generation, hands }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  const drawn = useRef(/** @type {string | null} */ (null));
   useEffect(() => {
     if (generation === undefined) return undefined;
     const { session, store } = hands;
     let isGone = false;
     let isThere = false;
+    // A picture of something else is not shown for it.
+    if (ref.current && drawn.current !== null && drawn.current !== name) clear(ref.current);
+    drawn.current = null;
     const fetch = () =>
       session.host.fetch(name).then(
         (picture) => {
           isThere = true;
-          if (!isGone && ref.current) put(ref.current, picture);
+          if (isGone || !ref.current) return;
+          put(ref.current, picture);
+          drawn.current = name;
         },
         () => undefined, // A thumbnail is not worth an error.
       );
@@ -38,6 +44,11 @@ export function Thumb({ name, generation, hands }) {
   }, [name, generation]);
   return html`<canvas class="thumb" ref=${ref} width="1" height="1"
     aria-hidden="true"></canvas>`;
+}
+
+/** @param {HTMLCanvasElement} canvas */
+function clear(canvas) {
+  canvas.getContext('2d')?.clearRect(0, 0, canvas.width, canvas.height);
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./engine.js").Picture} picture (h, w, 3) */

@@ -1,7 +1,7 @@
 /** Above the pictures: what is open, undo, how the pictures are looked at. */
 
 import { html } from '../vendor/preact.js';
-import { Button, Check, Choice, Select, Slider } from './controls.js';
+import { Button, Check, Choice, Select, Slider, Whole } from './controls.js';
 import { signed } from './format.js';
 import { showPixels } from './keys.js';
 import { fold, look } from './tools.js';
@@ -21,8 +21,9 @@ export function TopBar({ ui, hands }) {
   const { show, history } = ui;
   const undo = history.undo.at(-1);
   const redo = history.redo.at(-1);
+  const title = ui.state?.scene || 'lightpaint';
   return html`<header class="top">
-    <div class="title"><strong>${ui.state?.scene || 'lightpaint'}</strong></div>
+    <div class="title"><${Whole} text=${title} most=${16} tag="strong" /></div>
     <div class="group" role="group" aria-label="History">
       <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : 'Undo'} keys="Control+Z"
         disabled=${!undo} act=${() => session.send('undo')} />

@@ -2,8 +2,8 @@
 
 import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
 import { Bar } from './bar.js';
-import { Button, Choice, comeInto } from './controls.js';
-import { lightText, number } from './format.js';
+import { Button, Choice, Whole, comeInto } from './controls.js';
+import { lightText, number, progressText, shortened } from './format.js';
 import { Icon } from './icons.js';
 import { isUnseen, keepLook } from './keeping.js';
 import { exposureOf, overlayOf } from './model.js';
@@ -35,21 +35,37 @@ const MEANINGS = {
 export function TruthPanel({ ui, hands }) {
   const { session, store } = hands;
   const choose = (/** @type {any} */ overlay) => look(store, { overlay });
+  const frame = useRef(/** @type {HTMLElement | null} */ (null));
+  // Reasons take more room than what was there before them.
+  useLayoutEffect(() => {
+    const panel = /** @type {HTMLElement | null | undefined} */ (frame.current?.closest('.fold'));
+    if (panel && ui.explained.length && isInSight(panel)) panel.scrollIntoView({ block: 'nearest' });
+  }, [ui.explained]);
   // The first of them stands below the pictures, too.
   const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
     (text) => text !== ui.headline,
   );
-  return html`<div class="truth">
+  return html`<div class="truth" ref=${frame}>
     <${Choice} label="Over the pictures" value=${ui.show.overlay} choices=${OVERLAYS}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
     <div class="row">
-      <${Button} label="Why not closer?" act=${() => session.explain()}
+      <${Button} label=${ui.explaining ? 'Seeking reasons …' : 'Why not closer?'}
+        disabled=${ui.explaining} act=${() => session.explain()}
         tip="What keeps the lights from what was painted" />
+      ${ui.explaining && html`<${Bar} progress=${{ done: 0, total: 0 }} label="Seeking reasons" />`}
       ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
     </div>
     ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
   </div>`;
+}
+
+/** Whether somebody sees some of a panel among those at the side. @param {HTMLElement} panel */
+function isInSight(panel) {
+  const [its, room] = [panel, /** @type {HTMLElement} */ (panel.parentElement)].map((one) =>
+    one.getBoundingClientRect(),
+  );
+  return its.top < room.bottom - 60 && its.bottom > room.top + 60;
 }
 
 /** CSS pixels of a legend, of one on a single line, and between it and its picture. */
@@ -115,7 +131,8 @@ function Verify({ ui, hands }) {
       tip="Render the scene with this lighting, and compare" />`;
   }
   return html`<${Button} label="Stop the render" icon="close" act=${() => session.verify(false)} />
-    <${Bar} progress=${ui.verifying} label="Verifying" />`;
+    <${Bar} progress=${ui.verifying} label="Verifying" />
+    <span class="faint">${progressText(ui.verifying)}</span>`;
 }
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -194,7 +211,7 @@ export function AnswerLine({ ui, hands }) {
   };
   return html`<div class="answer">
     <p class=${`headline ${isOld || isApart ? 'is-old' : ''}`} role="status">
-      <span class="said" data-tip=${text.length > 100 ? text : undefined}>${text}</span>
+      <${Whole} class="said" text=${text} most=${100} />
       ${
         // In one place, so that the sentence keeps its lines.
         state && html`<span class="live" data-tip=${STATES[state]}><b>${state}</b></span>`
@@ -235,12 +252,12 @@ export function Here({ ui }) {
     .filter(({ share }) => share >= 0.01)
     .sort((a, b) => b.share - a.share)
     .slice(0, 5);
-  return html`<p class="here" id="lp-status">${object && html`<span class="object">${object}</span>`}
+  return html`<p class="here" id="lp-status">${object && html`<span class="object">${shortened(object, 40)}</span>`}
     <span class="light-here">${lightText(exposed)}${
       ui.tool === 'pick' && html` · RGB ${exposed.map((x) => number(x, 3)).join(' ')}`
     }</span>
     ${most.map(
-      ({ share, k }) => html`<span key=${k}>${ui.lights[k]?.label}
+      ({ share, k }) => html`<span key=${k}>${shortened(ui.lights[k]?.label ?? '', 24)}
       <b>${Math.round(100 * share)} %</b></span>`,
     )}</p>`;
 }

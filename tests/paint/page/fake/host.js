@@ -220,7 +220,8 @@ export class FakeHost {
   }
   undo() {
     const step = this.steps.pop();
-    if (step) this.undone.push(step);
+    if (!step) return { kind: 'failed', text: 'There is nothing to undo.', tone: 'info' };
+    this.undone.push(step);
     return this.patch();
   }
   redo() {
@@ -290,7 +291,8 @@ export class FakeHost {
     this.looks = this.looks.filter(({ id }) => id !== look);
     return this.kept();
   }
-  export({ what }) {
+  export({ what, run = true }) {
+    if (this.isWriting) return { kind: 'started', what: run ? 'export' : 'stop' };
     const files = this.unpainted ? what.filter((one) => !['target', 'report'].includes(one)) : what;
     return {
       kind: 'exported',

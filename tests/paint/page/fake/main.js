@@ -1,9 +1,10 @@
 /** The interface over a session and an engine that are made up: `?lights=N`, `?shadow`, `?first`,
- * `?elsewhere`;
+ * `?elsewhere`; `?crowd`: as much of everything as there may be, and as long;
  * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
 import { mount } from '../app.js';
 import { ModelHost } from '../engine/model_host.js';
+import { crowd } from './crowd.js';
 import { FakeEngine } from './engine.js';
 import { FakeHost } from './host.js';
 import { FakeModel } from './model.js';
@@ -15,6 +16,7 @@ const host = new FakeHost(room, {
   isFirst: asked.has('first'),
   isElsewhere: asked.has('elsewhere'),
 });
+if (asked.has('crowd')) crowd(host);
 let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
 if (asked.has('shadow')) {
   const shadow = element.attachShadow({ mode: 'open' });

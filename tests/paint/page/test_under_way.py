@@ -1,0 +1,146 @@
+"""What goes on is seen wherever somebody is, can be stopped, and is counted alike.
+
+And no picture is called what it does not show yet.
+"""
+
+from typing import Any
+
+import pytest
+from interface import Painter
+
+
+def progress(painter: Painter, what: str, done: int, total: int = 16) -> None:
+    painter.tell(kind="progress", what=what, done=done, total=total, unit="passes")
+
+
+def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Painter) -> None:
+    page = painter.page
+    page.evaluate("() => { host.isWriting = true; }")
+    painter.button("Write files").click()
+    painter.button("Write", exact=True).click()
+    progress(painter, "export", 4)
+    dialog = page.get_by_role("dialog")
+    assert "25 %" in dialog.inner_text()
+    assert dialog.get_by_text("It goes on when this window is closed").is_visible()
+    assert page.locator(".working").count() == 0  # it is seen once
+    page.keyboard.press("Escape")
+    chip = page.locator(".working")
+    chip.get_by_text("Writing files: 25 %").wait_for()
+    page.get_by_role("button", name="Stop: writing files").click()
+    assert painter.said("export")[-1] == {"kind": "export", "what": [], "run": False}
+    painter.tell(
+        kind="exported", files=["/shows/gallery-evening/lighting.json"], command="", is_stopped=True
+    )
+    page.get_by_text("Stopped. Written: lighting.json.").wait_for()
+    assert chip.count() == 0
+    # A page that was loaded anew hears of it, too.
+    progress(painter, "export", 8)
+    chip.get_by_text("Writing files: 50 %").wait_for()
+    files = [f"/shows/gallery-evening/{name}" for name in ("painting.exr", "answer/report.html")]
+    painter.tell(kind="exported", files=files, command="")
+    page.get_by_text("Written: painting.exr, answer/report.html.", exact=True).wait_for()
+    painter.button("Write files").click()
+    assert page.get_by_role("dialog").get_by_text("answer/report.html").is_visible()
+
+
+def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
+    painter.page.evaluate("() => { host.explain = () => ({ kind: 'started', what: 'explain' }); }")
+    painter.button("How true?").click()
+    painter.button("Why not closer?").click()
+    sought = painter.page.get_by_role("button", name="Seeking reasons …")
+    sought.wait_for()
+    assert sought.is_disabled()
+    assert painter.page.get_by_role("progressbar", name="Seeking reasons").is_visible()
+    painter.button("How true?").click()  # its panel closes
+    painter.page.locator(".working").get_by_text("Seeking reasons").wait_for()
+    painter.tell(kind="explained", sentences=["It is so."])
+    assert painter.page.locator(".working").count() == 0
+    painter.button("How true?").click()
+    assert painter.button("Why not closer?").is_enabled()
+
+
+def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
+    """In percent, and after a while with the time that is left."""
+    page = painter.page
+    for what, name in (
+        ("basis", "Rendering the lights"),
+        ("verification", "Verifying"),
+        ("export", "Writing files"),
+    ):
+        progress(painter, what, 2)
+        page.locator(".working").get_by_text(f"{name}: 12 %").wait_for()
+    page.evaluate(
+        """() => {
+          const now = performance.now();
+          performance.now = () => now + 10000;  // ten seconds later
+          host.tell({ kind: 'progress', what: 'basis', done: 7, total: 16, unit: 'passes' });
+        }"""
+    )
+    page.locator(".working").get_by_text("Rendering the lights: 43 %, 20 s left").wait_for()
+    page.evaluate("() => window.painter.store.set({ basis: null })")
+    page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: true })")
+    page.locator(".working").get_by_text("Loading pictures of the lights: 25 %").wait_for()
+
+
+def test_nothing_to_undo_is_no_mistake(painter: Painter) -> None:
+    painter.page.locator(".stage").focus()
+    painter.page.keyboard.press("Control+z")
+    toast = painter.page.locator(".toast")
+    toast.get_by_text("There is nothing to undo.").wait_for()
+    assert "is-warn" not in toast.get_attribute("class")
+
+
+@pytest.mark.parametrize("picture", ["Painting", "Answer"])
+def test_until_a_look_is_there_no_picture_is_called_its_own(painter: Painter, picture: str) -> None:
+    painter.page.keyboard.press("Control+s")
+    painter.page.evaluate(
+        """() => {
+          const load = host.load_look.bind(host);
+          const { send } = host;
+          host.send = async (kind, ...rest) => {
+            if (kind === 'load_look') await new Promise((go) => { window.go = go; });
+            return send.call(host, kind, ...rest);
+          };
+        }"""
+    )
+    tag = painter.page.locator(".tag", has_text=picture)
+    painter.button("Go on from Look 1").click()
+    tag.get_by_text(f"{picture}: Look 1 is coming …").wait_for()
+    painter.page.evaluate("() => window.go()")
+    painter.still()
+    assert tag.inner_text() == picture
+
+
+def test_an_answer_without_some_of_its_lights_says_so(opened: Any) -> None:
+    painter = opened()
+    tag = painter.page.locator(".tag").last
+    painter.page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: true })")
+    tag.get_by_text("Answer: some of its lights are still loading …").wait_for()
+    painter.page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: false })")
+    painter.still()
+    assert tag.inner_text() == "Answer"  # they are there, and get cleaner
+
+
+def test_a_small_picture_is_of_what_it_stands_for(painter: Painter) -> None:
+    """Not of what stood there before, while its own is on its way."""
+    page = painter.page
+    page.keyboard.press("Control+s")
+    page.locator(".look-picture canvas").wait_for()
+    painter.still()
+    filled = """() => {
+      const one = document.querySelector('.look-picture canvas');
+      const copy = new OffscreenCanvas(one.width, one.height).getContext('2d');
+      copy.drawImage(one, 0, 0);
+      const { data } = copy.getImageData(0, 0, one.width, one.height);
+      return data.some((code) => code > 0);
+    }"""
+    assert page.evaluate(filled)
+    page.evaluate(
+        """() => {
+          host.fetch = () => new Promise(() => {});
+          window.painter.store.set(({ looks }) => ({
+            looks: looks.map((one) => ({ ...one, thumbnail: 'look/99' })) }));
+        }"""
+    )
+    painter.still()
+    assert not page.evaluate(filled)

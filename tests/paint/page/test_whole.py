@@ -1,0 +1,195 @@
+"""Nothing on a painter's page is cut: not with 69 lights of long names, 40 looks, and the longest
+sentences of each kind. What has no room is whole in a tip that keyboard and pointer reach.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from interface import Painter
+
+SIZES = ((1280, 720), (1440, 900))
+
+CUT = """async (where) => {
+  const { cutOff } = await import('/cut.js');
+  return cutOff(document.querySelector(where));
+}"""
+
+
+@pytest.fixture(scope="module", params=SIZES, ids=["1280x720", "1440x900"])
+def crowded(request: pytest.FixtureRequest, browser: Any, site: Any) -> Iterator[Painter]:
+    """One page for all panels of one size; each of them is brought to how it begins."""
+    width, height = request.param
+    page = browser.new_page(viewport={"width": width, "height": height})
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.goto(f"{site.url}/fake/index.html?crowd&lights=69&size=48x27")
+    page.wait_for_selector(".lightpaint .tag")
+    page.evaluate("() => { window.first = window.painter.store.value; }")
+    yield Painter(page)
+    page.close()
+    assert not wrong
+
+
+@pytest.fixture
+def painter(crowded: Painter) -> Painter:
+    crowded.page.evaluate(
+        "() => window.painter.store.set({ ...window.first, toasts: [], dialog: null })"
+    )
+    crowded.page.mouse.move(5, 5)
+    crowded.still()
+    return crowded
+
+
+def cut_off(painter: Painter, where: str = ".lightpaint") -> list[str]:
+    painter.still()
+    found: list[str] = painter.page.evaluate(CUT, where)
+    return found
+
+
+def how_true(painter: Painter) -> None:
+    painter.button("How true?").click()
+    painter.button("Why not closer?").click()
+    painter.page.get_by_text("Of what is missed").wait_for()
+
+
+def verified(painter: Painter) -> None:
+    how_true(painter)
+    painter.button("Verify").click()
+    painter.page.locator(".verified").wait_for()
+
+
+def numbers(painter: Painter) -> None:
+    painter.page.keyboard.press("a")
+    painter.button("In numbers", exact=True).click()
+    objects = painter.ui("state")["objects"]
+    painter.choose("Where", max(objects, key=len))
+
+
+def importance(painter: Painter) -> None:
+    painter.page.keyboard.press("w")
+
+
+def over_the_picture(painter: Painter) -> None:
+    painter.page.keyboard.press("i")
+    painter.page.mouse.move(*painter.place())
+
+
+def longest(painter: Painter) -> None:
+    painter.page.evaluate(
+        """async () => {
+          const { LONGEST } = await import('/fake/crowd.js');
+          window.painter.store.set({ headline: LONGEST, help: 'colors' });
+        }"""
+    )
+
+
+def comparing(painter: Painter) -> None:
+    painter.button("Compare looks").click()
+
+
+def some_only(painter: Painter) -> None:
+    painter.page.evaluate("() => window.painter.store.set({ solo: [3, 4] })")
+
+
+def settings(painter: Painter) -> None:
+    painter.button("How the painting is answered").click()
+    painter.button("Hold", exact=True).click()
+    painter.button("Stay", exact=True).click()
+
+
+def files(painter: Painter) -> None:
+    painter.button("Write files").click()
+    painter.button("Write", exact=True).click()
+    painter.page.get_by_text("The same on the command line").wait_for()
+
+
+def keys(painter: Painter) -> None:
+    painter.page.keyboard.press("?")
+
+
+def messages(painter: Painter) -> None:
+    painter.page.evaluate(
+        """async () => {
+          const { TOAST } = await import('/fake/crowd.js');
+          const basis = { what: 'basis', done: 128, total: 1024, unit: 'samples per pixel' };
+          const toasts = [{ id: 1, text: TOAST, tone: 'warn' }];
+          const closed = { reason: 'taken', text: `${TOAST} ${TOAST}` };
+          window.painter.store.set({ basis, toasts, closed });
+        }"""
+    )
+
+
+def agx(painter: Painter) -> None:
+    painter.choose("View", "ocio:sRGB - Display/ACES 1.0 - SDR Video")
+
+
+PANELS: tuple[Callable[[Painter], None], ...] = (
+    how_true,
+    verified,
+    numbers,
+    importance,
+    over_the_picture,
+    longest,
+    comparing,
+    some_only,
+    settings,
+    files,
+    keys,
+    messages,
+    agx,
+)
+
+
+def test_it_begins_with_nothing_cut(painter: Painter) -> None:
+    assert cut_off(painter) == []
+
+
+@pytest.mark.parametrize("panel", PANELS, ids=lambda panel: panel.__name__)
+def test_no_panel_has_anything_cut(painter: Painter, panel: Callable[[Painter], None]) -> None:
+    panel(painter)
+    assert cut_off(painter) == []
+
+
+def test_no_light_has_anything_cut(painter: Painter) -> None:
+    """Folded, and with all that can be asked of it."""
+    for k in (*range(7), 40):
+        painter.page.evaluate(
+            """(k) => {
+              const open = { colour: false, ask: false, lights: true, truth: false };
+              window.painter.store.set({ unfolded: [k], open });
+            }""",
+            k,
+        )
+        painter.still()
+        row = painter.page.locator(".light.is-open")
+        row.evaluate("(one) => one.scrollIntoView({ block: 'center' })")
+        assert (k, cut_off(painter, ".lightpaint .side")) == (k, [])
+
+
+def test_all_that_is_said_of_an_answer_comes_into_sight(painter: Painter) -> None:
+    """As it comes, and not what there is room for below what was there before."""
+    how_true(painter)
+    painter.still()
+    side, panel = (painter.page.locator(x).bounding_box() for x in (".side", ".fold.is-truth"))
+    assert panel["y"] >= side["y"] - 1
+    assert panel["y"] + panel["height"] <= side["y"] + side["height"] + 1
+
+
+def test_what_has_no_room_is_read_by_keyboard(painter: Painter) -> None:
+    longest(painter)
+    painter.still()
+    said = painter.page.locator(".answer .said")
+    # Tab leads there.
+    painter.page.locator(".stage").focus()
+    painter.page.keyboard.press("Tab")
+    for _ in range(30):
+        if said.evaluate("(one) => one === document.activeElement"):
+            break
+        painter.page.keyboard.press("Tab")
+    tip = painter.page.locator(".tip")
+    tip.wait_for()
+    assert tip.inner_text().strip() == said.inner_text().strip()
+    box = tip.bounding_box()
+    assert box["x"] >= 0
+    assert box["y"] >= 0
