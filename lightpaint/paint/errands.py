@@ -66,7 +66,7 @@ class Errands:
     def said(self, message: Asked) -> list[Message]:
         """Begin with it. Raises PaintError for what there is not."""
         works: dict[type, Callable[[Any], None]] = {
-            protocol.Export: self._export,
+            protocol.Export: partial(self._export, stops=self._stops),
             protocol.Verify: self._verified,
             protocol.Explain: self._explain,
         }
@@ -83,8 +83,6 @@ class Errands:
         elif not message.run:
             self._stops += 1
             return [Message("started", {"what": "stop"})]
-        else:
-            works[protocol.Export] = partial(self._export, stops=self._stops)
         what = type(message).__name__.lower()
         self._threads.later(lambda: works[type(message)](message), what)
         return [Message("started", {"what": what})]
