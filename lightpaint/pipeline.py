@@ -197,7 +197,12 @@ def _loaded_anew(look: Look) -> Look:
     """`look` with its relit scene as it is written by now."""
     assert look.relit is not None
     path, sensor = look.relit.path, look.relit.sensor
-    return replace(look, relit=load_scene(path, sensor=sensor, use_lights_file=False))
+    return replace(look, relit=_through(look.relit, path, sensor))
+
+
+def _through(relit: Scene, path: Path, sensor: int) -> Scene:
+    """Load a relit scene anew from `path`, with the parameters that it has."""
+    return load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
 
 
 def _finished(
@@ -218,12 +223,17 @@ def _finished(
     verification, suggestions, budget = None, None, None
     if relit is not None and scene is not None:
         if relit.sensor != scene.sensor:
-            relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False)
+            relit = _through(relit, relit.path, scene.sensor)
         budget = _budget(settings, basis, relit)
+        if relit.parameters and view is job.views[0]:
+            given = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
+            listen.say(f"relit.xml has the scene's own defaults: give Mitsuba {given} with it, too")
     spp, size = basis.origin.spp, basis.size
     if budget is not None:
         spp, size = budget.spp, budget.scene.size
-    write_predicted(place / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size)
+    write_predicted(
+        place / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
+    )
     if budget is not None and settings.verify:
         listen.say(_spoken(budget, basis))
         verification = verify(

@@ -1,7 +1,7 @@
 """What a solve leaves in its folder, and what is read back from there."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -154,15 +154,22 @@ def view_names(scenes: Sequence[Scene]) -> list[str]:
 
 
 def write_predicted(
-    path: Path, predicted: Estimate, *, origin: Origin, spp: int, size: Size | None = None
+    path: Path,
+    predicted: Estimate,
+    *,
+    origin: Origin,
+    spp: int,
+    size: Size | None = None,
+    scene: Scene | None = None,
 ) -> None:
-    """predicted.exr, with a note of how to see the relit scene as the basis saw it.
+    """Write predicted.exr, with a note of how to see the relit scene as the basis saw it.
 
     origin: of the basis. spp, size: samples per pixel of the verification, and (height, width) of
-    its film, the whole one by default.
+    its film, the whole one by default. scene: whose parameters the relit scene needs again.
     """
     film = {} if size is None else {"width": size[1], "height": size[0]}
-    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film}
+    given = {} if scene is None or not scene.parameters else {"parameters": scene.parameters}
+    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film, **given}
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
 
 
@@ -255,7 +262,9 @@ def verify_result(
     path = folder / "predicted.exr"
     predicted, attributes = read_estimate(path)
     seen = _read_view(path, attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(relit_xml, sensor=seen.sensor, use_lights_file=False)
+    relit = load_scene(
+        relit_xml, sensor=seen.sensor, parameters=seen.parameters, use_lights_file=False
+    )
     if seen.width is not None and seen.height is not None:
         film = (seen.height, seen.width)
         # A scene that was changed by hand has another film, which `verify` refuses by name.
@@ -276,12 +285,14 @@ class _Seen:
     """What stands under VIEW_KEY; None where nothing does.
 
     spp: samples per pixel. width, height: of the verification; of the whole film if not there.
+    parameters: values of `$name` parameters that the scene was loaded with.
     """
 
     sensor: str | None = None
     spp: int | None = None
     width: int | None = None
     height: int | None = None
+    parameters: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
         if self.spp == 0:

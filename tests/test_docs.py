@@ -160,7 +160,7 @@ def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
 
 def test_the_corridor_is_quoted_as_it_stands():
     text = (ROOT / "docs" / "architecture.md").read_text()
-    [quoted] = re.findall(r"```python\n(def run.*?)```", text, re.DOTALL)
+    [quoted] = re.findall(r"```python\n((?:@\w+\(\)\n)?def run.*?)```", text, re.DOTALL)
     module = ast.parse((ROOT / "lightpaint" / "pipeline.py").read_text())
     [run] = (x for x in module.body if isinstance(x, ast.FunctionDef) and x.name == "run")
     del run.body[0]  # the docstring

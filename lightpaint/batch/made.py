@@ -58,15 +58,17 @@ def leave_made(
     results.check()
     with results.filled() as folder:
         write_lighting(folder / "lighting.json", lighting)
+        relit = None
+        if scene is not None:
+            relit = relight(scene, lighting, folder / "relit.xml")
         for basis, view in zip(bases, views, strict=True):
             (folder / view).mkdir(exist_ok=True)
             predicted, origin = combine(basis, lighting), basis.origin
             its = folder / view / "predicted.exr"
-            write_predicted(its, predicted, origin=origin, spp=spp or origin.spp)
+            write_predicted(its, predicted, origin=origin, spp=spp or origin.spp, scene=relit)
         if groups is not None:
             write_exports(folder, groups, lighting)
         if scene is not None:
-            relight(scene, lighting, folder / "relit.xml")
             settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")
 
 

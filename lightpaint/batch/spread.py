@@ -28,16 +28,22 @@ def rendered_by(
     def rendered(relit: Scene) -> Estimate:
         # As the answer has left it, which comes out the same when it is written anew.
         path = str(Path(task.writes) / "relit.xml")
-        file = SceneFile(path, relit.sensor, variant=variant, use_lights_file=False)
-        files = tuple(map(str, file.content.read_files))
+        scene = SceneFile(
+            path,
+            relit.sensor,
+            parameters=dict(relit.parameters),
+            variant=variant,
+            use_lights_file=False,
+        )
+        files = tuple(map(str, scene.content.read_files))
         height, width = relit.size
         passes = passes_of(relit, task.final.spp)
         errands = []
         for some in ranges_of(relit, passes):
             samples = height * width * sum(passes[k][1] for k in some)
             name, expected_s = f"{task.look} {some.start}", samples * SAMPLE_S
-            its = SceneFile(path, relit.sensor, variant=variant, use_lights_file=False)
-            errands.append(Passes(name, its, task.final, some.start, some.stop, files, expected_s))
+            which = some.start, some.stop
+            errands.append(Passes(name, scene, task.final, *which, files, expected_s))
         came = {}
         sums, following = np.zeros((2, height, width, 3), np.float64), 0
         for count, done in enumerate(engine.run(errands)):

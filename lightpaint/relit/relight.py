@@ -5,6 +5,7 @@ survive and a diff shows the lights and nothing else.
 """
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,14 +25,20 @@ from lightpaint.scene.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
 
+#: A parameter in Mitsuba's list of those that nothing uses.
+UNUSED = re.compile(r"- \$(\w+)=")
+
 
 @keywords()
 def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     """Write `scene` with the emissions of `lighting` to `path`, and load it back.
 
-    The file refers to the original folder by relative path, so it loads in plain Mitsuba from where
-    it lies. Included files that hold lights are copied beside it, and so are scaled images of
-    lights that emit one. A light that is off keeps its emitter, is black and is never sampled.
+    Only the lights change in it: values of `$name` parameters that the scene was loaded with are
+    not written, and are given again whenever it is loaded, as to the scene itself (the scene
+    returned has those that it still asks for). The file refers to the original folder by relative
+    path, so it loads in plain Mitsuba from where it lies. Included files that hold lights are
+    copied beside it, and so are scaled images of lights that emit one. A light that is off keeps
+    its emitter, is black and is never sampled.
 
     Which emitters make up each light is what `lighting` says, however `scene` ties them; those it
     keeps are not touched. In the scene returned every emitter is a light.
@@ -59,7 +66,7 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
             write_bytes(file, content)
         else:
             write_rgb(file, content)
-    relit = load_scene(path, sensor=scene.sensor, use_lights_file=False)
+    relit = _loaded(path, scene)
     taken = {emitter.name: emitter.emission for emitter in relit.emitters}
     for emitter, wanted in settings_of(scene, lighting.emission):
         if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
@@ -69,6 +76,22 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
         ):
             raise SceneError(f"{path} did not take the emission of light {emitter.name!r}")
     return relit
+
+
+def _loaded(path: Path, scene: Scene) -> Scene:
+    """Load what was written of `scene`, with those of its parameters that something asks for.
+
+    What lights alone asked for nothing does now, and Mitsuba refuses a value that is not used.
+    """
+    left = dict(scene.parameters)
+    while True:
+        try:
+            return load_scene(path, sensor=scene.sensor, parameters=left, use_lights_file=False)
+        except SceneError as error:
+            unused = set(left) & set(UNUSED.findall(str(error)))
+            if not unused:
+                raise
+            left = {name: value for name, value in left.items() if name not in unused}
 
 
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
@@ -181,8 +204,7 @@ def relit_files(
     for edit in edits.values():
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
-        defaults = scene.parameters if is_root else {}
-        content, images = _edit(edit, target.parent, scene, path.stem, defaults)
+        content, images = _edit(edit, target.parent, scene, path.stem)
         # Mitsuba looks for images beside the scene, also for those of an included file.
         written |= {path.parent / name: image for name, image in images.items()}
         written[target] = content
@@ -235,19 +257,16 @@ def _place_of_include(file: Path, root: Path) -> Path:
         ) from None
 
 
-def _edit(
-    edit: _Edits, folder: Path, scene: Scene, stem: str, defaults: Mapping[str, str]
-) -> tuple[bytes, dict[str, Floats]]:
+def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, dict[str, Floats]]:
     """The edited XML, to be written into `folder`, and the images it refers to, by name.
 
     stem: what the names of the images begin with.
     """
     xml = XmlFile(edit.original)
     if xml.root.tag == "scene":
-        # Assets and includes lie where the original lies; the first default wins.
+        # Assets and includes lie where the original lies.
         origin = os.path.relpath(edit.original.resolve().parent, folder.resolve())
         lines = [tag("path", value=Path(origin).as_posix())]
-        lines += [tag("default", name=k, value=v) for k, v in defaults.items()]
         lines += [text for at, text in edit.integrators.items() if at is None]
         xml.insert_first(xml.root, lines)
     for at, text in edit.integrators.items():

@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import succeed
 from renderer import CORNELL, LIGHTS, REPOSITORY, mitsuba_render, one_pass, write_room
 
 from lightpaint.errors import LightingError, OutputError, SceneError
+from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting, LightSetting, combine
+from lightpaint.relit.patch import scene_patch
 from lightpaint.relit.relight import check_relightable, relight
 from lightpaint.relit.verify import verify
 from lightpaint.scene.scene import Scene, load_scene
@@ -89,6 +92,35 @@ def test_nothing_but_emissions_and_the_path_changes(tmp_path: Path) -> None:
     assert all("<rgb" in line for line in removed)
     assert sum("<path" in line for line in added) == 1
     assert "<!--" in relit.read_text(encoding="utf-8")
+
+
+def test_values_given_to_the_scene_change_no_text_and_hold_when_it_is_rendered(
+    tmp_path: Path,
+) -> None:
+    lights = LIGHTS["bulb"].replace("0.5 0.6 0.7", "$level $level $level")
+    lights = f'<default name="level" value="7"/>{lights}'
+    path = write_room(tmp_path, lights=lights)
+    scene = load_scene(path, parameters={"width": 12, "level": "2"})
+    lighting = random_lighting(scene, 5)
+    relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
+    assert relit.parameters == {"width": "12"}  # nothing asks for the level any more
+    assert relit.size == scene.size == (20, 12)
+    written = tmp_path / "out" / "relit.xml"
+    for name in ("width", "level"):
+        assert written.read_text(encoding="utf-8").count(f'<default name="{name}"') == 1
+    assert all("default" not in line for line in changed_lines(path, written))
+    changed = [x for x in scene_patch(scene, lighting).splitlines() if x[:1] in "+-"]
+    assert not any("default" in line for line in changed)
+    assert any("intensity" in line for line in changed)
+    assert load_scene(written).size == (20, 24)  # the scene's own
+
+
+def test_a_result_remembers_what_was_given_to_its_scene(tmp_path: Path) -> None:
+    write_room(tmp_path, lights=LIGHTS["bulb"])
+    given = ("-D", "width=12", "--spp", "8", "-q")
+    write_rgb(tmp_path / "p.exr", np.full((20, 12, 3), 0.1, np.float32))
+    succeed(tmp_path, "solve", "room.xml", "p.exr", "-o", "out", *given)
+    succeed(tmp_path, "verify", "out", "--spp", "8", "-q")
 
 
 def test_same_lighting_changes_only_the_numbers_spelling(tmp_path: Path, small_room: Scene) -> None:
