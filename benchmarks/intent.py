@@ -2,6 +2,7 @@
 
     python benchmarks/intent.py [--scenes gallery stage cornell] [--styles spot blob all full]
                                 [--cases 12] [--first 0] [--settings literal default ...] [--clean]
+                                [--few 2 4]
 
 A case means a lighting: the present one with one to three lights changed by 1 to 2.5 stops, up or
 down, most of them warmer or cooler, in a quarter of the cases everything else dimmed by 1 to 3
@@ -11,13 +12,16 @@ in 8 bits. Styles: `spot`, only the strongest part of the strongest region; `blo
 `all`, whatever changes clearly; `full`, the whole picture. Judged is the whole picture, painted or
 not: mean CIEDE2000 between the answer and what was meant, at the exposure of the painting.
 
+The last rows are of bases of few samples, as the painter has at first: painted over the denoised
+look of that basis, judged by the one of many.
+
 Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports 12 to 23.
 """
 
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +68,17 @@ class Case:
         shown = (transform.decode(transform.encode(x)) for x in (image, self.meant))
         return float(delta_e(*(x * 2**transform.stops for x in shown)).mean())
 
+    def over(self, few: lp.Basis) -> "Case":
+        """The same strokes over the look of a basis of few samples, without its grain."""
+        transform = self.target.transform
+        assert transform is not None
+        dark = 0.01 * self.current.mean()
+        ratio = (self.target.image.astype(np.float64) + dark) / (self.current + dark)
+        look = denoised(few.present_look, few.features) * ratio
+        codes = np.round(255 * transform.encode(look)) / 255
+        image = transform.decode(codes).astype(np.float32)
+        return replace(self, target=replace(self.target, image=image, at_least=codes >= 1))
+
 
 def main() -> None:
     """Print a table for each scene."""
@@ -75,6 +90,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
     parser.add_argument(
         "--clean", action="store_true", help="painted over the denoised look, as in template.png"
+    )
+    parser.add_argument(
+        "--few", nargs="*", type=int, default=[2, 4], metavar="N", help="samples of noisy bases"
     )
     options = parser.parse_args()
     for name in options.scenes:
@@ -106,6 +124,13 @@ def main() -> None:
             }
             taken_s = time.perf_counter() - start_s
             row(setting, found, nothing, taken_s / (options.cases * len(cases)))
+        for spp in options.few:
+            few = obtain_basis(scene, spp=spp, seed=1, use_cache=False)
+            found = {
+                style: [x.judged(basis.mix(weights(few, x.over(few), {}))) for x in its]
+                for style, its in cases.items()
+            }
+            row(f"default, {spp} spp", found, nothing)
 
 
 def row(
@@ -124,10 +149,15 @@ def row(
 
 def answer(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
     """What the solve makes of the painting, noise taken out as the command line does."""
+    return basis.mix(weights(basis, case, settings))
+
+
+def weights(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
+    """The same as weights of the lights, (n, 3)."""
     solution = lp.solve(basis, case.target, **settings)
     if not settings.get("literal"):
         solution = lp.correct_noise(solution)
-    return basis.mix(solution.weights)
+    return solution.weights
 
 
 def painted(

@@ -20,6 +20,7 @@ from typing import Any
 
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.binning import block_side
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.on_locus import around, next_whites, snapped
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
@@ -98,7 +99,9 @@ class Live:
             return best(reduce(add, (x.tiles().equations(rest_weight) for x in views)), start)
         films = self._films_of(views)
         pixels = films.pixels(rest_weight, self._fit.transform)
-        return films.nearer(pixels, start, best, pull, self._on_locus)
+        # A painting that another hand has changed may leave the answer before worse than none.
+        starts = start, untouched(self._views, self._reduction)
+        return films.nearer(pixels, starts, best, pull, self._on_locus)
 
     def _on_locus(self, weights: Doubles) -> Doubles:
         """Weights (n, 3), a mix of answers, as lights can have them that keep to whites."""
@@ -144,8 +147,10 @@ class Live:
         return self._films[1]
 
     def _film_of(self, view: LiveView) -> SmallFilm:
-        """All films together have as many pixels as that of one view."""
-        return view.film(self._fit.transform, max(1, FILM // len(self._views)))
+        """All films together have as many pixels as that of one view, or fewer of less noise."""
+        side = block_side([one.basis for one in self._views], self._fit.transform)
+        most = min(FILM // len(self._views), view.pixels // side**2)
+        return view.film(self._fit.transform, max(1, most))
 
 
 def _power(views: Sequence[LiveView]) -> Doubles:

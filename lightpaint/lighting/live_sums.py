@@ -166,22 +166,26 @@ class Films:
     def nearer(
         self,
         pixels: Pixels,
-        start: Doubles,
+        starts: Sequence[Doubles],
         best: Callable[[NormalEquations, Doubles], Doubles],
         pull: NormalEquations | None,
         allowed: Callable[[Doubles], Doubles],
     ) -> Doubles:
-        """One round of reweighting: weights (n, 3) that miss no more than those before.
+        """One round of reweighting: weights (n, 3) that miss no more than any of `starts`.
 
-        As of `reweighted.rounds`, but for singles, and for a step that is halved a few times only.
-        allowed: from weights between two that are allowed to such.
+        As of `reweighted.rounds`, but for singles, and for a step that is halved a few times only:
+        as long as less of it misses less. allowed: from weights between two that are allowed to
+        such.
         """
 
         def missed(w: Doubles, x: Doubles) -> float:
             value = float(pixels.objective(x).sum())
             return value if pull is None else value + float(pull.objective(w).sum())
 
-        before = self._mixed(start)
+        mixed = [self._mixed(start) for start in starts]
+        values = [missed(w, x) for w, x in zip(starts, mixed, strict=True)]
+        k = int(np.argmin(values))
+        start, before, value = starts[k], mixed[k], values[k]
         squares = pixels.squares(before, from_clipping=False)
         image, weight = (x.astype(np.float32) for x in squares)
         # Threads of BLAS would wait for each other at few lights.
@@ -192,12 +196,15 @@ class Films:
         equations = NormalEquations(
             M.astype(np.float64), b.astype(np.float64), norm2.sum(axis=1, dtype=np.float64)
         )
-        found, value = best(equations, start), missed(start, before)
+        found, nearest = best(equations, start), start
         for part in PARTS:
-            nearer = allowed(between(start, found, part))
-            if missed(nearer, self._mixed(nearer)) <= value:
-                return nearer
-        return start
+            step = allowed(between(start, found, part))
+            reached = missed(step, self._mixed(step))
+            if reached > value and nearest is not start:
+                break
+            if reached <= value:
+                nearest, value = step, reached
+        return nearest
 
     def _mixed(self, weights: Doubles) -> Doubles:
         """The picture of these weights, (3, p)."""

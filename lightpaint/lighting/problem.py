@@ -77,6 +77,7 @@ class Problem:
         noise_removed: The part of the noise in `equations` that is not in `corrected`, where some
             was taken out.
         refinement: The last step by which an answer was improved, if one was.
+        block_side: Pixels along the side of the blocks that `corrected` is of; 1 for single pixels.
         painting: Where strokes go, once there are some.
         strokes: How many there had been.
 
@@ -102,6 +103,7 @@ class Problem:
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     refinement: Refinement | None = None
+    block_side: int = 1
     painting: Painting | None = None
     strokes: int = 0
 
@@ -297,6 +299,7 @@ class Problem:
             corrected=None,
             noise_removed=0.0,
             refinement=None,
+            block_side=1,
             painting=painting,
             strokes=painting.strokes,
         )

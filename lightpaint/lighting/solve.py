@@ -10,6 +10,7 @@ from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.approach import near_optimum
+from lightpaint.lighting.binning import binned_pixels, block_side
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.on_locus import next_whites, solve_on_locus
@@ -22,10 +23,13 @@ from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.constraints.sparse import best_knobs
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.lit_pixels import LitPixels
+from lightpaint.lighting.loss import PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.pixels import image_of
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.reweighted import descend
+from lightpaint.lighting.pull import to_present
+from lightpaint.lighting.reweighted import Asked, Descent, descend, value_of
 from lightpaint.lighting.software import Software
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.traces import without_traces
@@ -174,7 +178,7 @@ def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
     count, value = solution.certificate.rounds, _missed(solution)
     for _ in range(WHITES_TRIED):
         at = solution.problem
-        equations = at.pulled(at.equations)
+        equations = at.pulled(at.solved)
         reduction, optimum = next_whites(equations, at.reduction, solution.weights)
         if all(reduction.knobs[k] is at.reduction.knobs[k] for k in reduction.white_knobs):
             break
@@ -198,28 +202,76 @@ def _descended_between(
 ) -> Solution:
     """The least of the loss over what the reduction is. is_near: whether the start is near it."""
 
+    basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
+    assert isinstance(loss, PaintingLoss)
+    side = block_side(problem.views.bases, loss.transform)
+    if side > 1:
+        blocks = binned_pixels(problem.views, loss, side)
+        basis, loss = blocks.basis, blocks.loss
+        equations = NormalEquations.of(basis, loss.painted, loss.importance[..., None])
+        pull = blocks.prior if pull is None else pull + blocks.prior
+
     def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
-        asked = problem.pulled(equations)
+        asked = equations if pull is None else equations + pull
         return solve_reduced(asked, problem.reduction, begin, method=problem.fit.method)
 
     def weights_of(equations: NormalEquations, begin: Doubles) -> Doubles:
         return best_of(equations, begin).weights
 
-    basis, loss, pull = problem.basis, problem.loss, problem.pull
-    assert isinstance(loss, PaintingLoss)
-    near = None
-    if not is_near:
-        near = near_optimum(basis, loss, problem.equations, start, weights_of, pull=pull)
-    begin = start if near is None else near
-    from_clipping = near is None and not is_near
-    found = descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
-    solved = replace(problem, squares=found.squares, equations=found.equations)
+    def led_from(begin: Doubles) -> Descent:
+        near = None
+        if not is_near:
+            near = near_optimum(basis, loss, equations, begin, weights_of, pull=pull)
+        begin, from_clipping = (begin, not is_near) if near is None else (near, False)
+        return descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
+
+    def missed(weights: Doubles) -> float:
+        lit = LitPixels.of(basis, loss)
+        return value_of(lit.pixels, Asked(pull), weights, lit.predicted(weights))
+
+    found = led_from(start)
+    present = nearest_to_present(problem)
+    if missed(found.weights) > missed(present):
+        # Another valley: from the present every step leads downhill.
+        found = led_from(present)
     optimum = best_of(found.equations, found.reweighting.at)
-    equations = problem.pulled(found.equations)
+    if side > 1:
+        solved = _of_blocks(problem, found, blocks.prior, side)
+    else:
+        solved = replace(problem, squares=found.squares, equations=found.equations)
+    equations = solved.pulled(solved.solved)
     solution = _solution(solved, optimum, found.weights, equations, reached)
     converged = optimum.converged and found.reweighting.converged
     told = solution.told(converged=converged, rounds=1 + found.reweighting.rounds)
     return replace(told, reweighting=found.reweighting)
+
+
+def nearest_to_present(problem: Problem) -> Doubles:
+    """The weights (n, 3) nearest to the present ones, of what is asked of the lights."""
+    present = problem.basis.present_weights
+    pull = to_present(problem.basis.power, present)
+    return solve_reduced(pull, problem.reduction, present).weights
+
+
+def _of_blocks(problem: Problem, found: Descent, prior: NormalEquations, side: int) -> Problem:
+    """The problem of all pixels with squares that stand for its loss where blocks of them led.
+
+    What is solved are the equations of the blocks, and their prior: without most of the noise.
+    """
+    at, loss = found.reweighting.at, problem.loss
+    assert isinstance(loss, PaintingLoss)
+    x = LitPixels.whole(problem.basis, loss).predicted(at)
+    image, weight = loss.pixels.squares(x, from_clipping=False)
+    parts = (image, weight, loss.pixels.shares(x, weight))
+    squares = Squares(*(image_of(part, problem.basis.size) for part in parts))
+    return replace(
+        problem,
+        squares=squares,
+        equations=NormalEquations.of(problem.basis, squares.image, squares.weight),
+        corrected=found.equations + prior,
+        noise_removed=1 - 1 / side**2,
+        block_side=side,
+    )
 
 
 def _solution(

@@ -218,6 +218,10 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """The solution of the equations without that share of the noise power in M and b.
 
+    Where blocks of pixels were fitted, most of the noise is averaged out already, and the solution
+    stays as it is. Where squares stand for another loss, less is taken out until that says, too,
+    that the step is a good one: far from the answer they say nothing.
+
     Args:
         solution: What was solved before; it starts there.
         share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
@@ -237,15 +241,32 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
             f"{basis.origin.scene} says nothing of its noise, so that none can be corrected: "
             "use noise_correction=False, and denoise the layers or render them with more samples"
         )
+    if solution.problem.block_side > 1:
+        return solution
     noise = noise_sums(solution)
     e = solution.equations
     least = without_noise(e, noise.power)
     if share is None:
         share = _best_share(solution, noise, least)
-    corrected = NormalEquations(
-        (1 - share) * e.M + share * least, e.b - share * noise.drawn, e.target_norm2
-    )
-    return again(solution, replace(solution.problem, corrected=corrected, noise_removed=share))
+    while True:
+        corrected = NormalEquations(
+            (1 - share) * e.M + share * least, e.b - share * noise.drawn, e.target_norm2
+        )
+        problem = replace(solution.problem, corrected=corrected, noise_removed=share)
+        found = again(solution, problem)
+        taken = NormalEquations(share * (e.M - least), share * noise.drawn, np.zeros(3))
+        if problem.is_linear or share == 0 or _loss(found, taken) <= _loss(solution, taken):
+            return found
+        share = share / 2 if share > 1 / SHARES else 0.0
+
+
+def _loss(solution: Solution, taken: NormalEquations) -> float:
+    """What a solution misses and what pulls at it, less the noise that is taken out."""
+    pull, weights = solution.problem.pull, solution.weights
+    pulled = 0.0 if pull is None else float(pull.objective(weights).sum())
+    # As of `NormalEquations.objective`, which knows of no squares below zero.
+    noise = np.einsum("ic,cij,jc->", weights, taken.M, weights) - 2 * (taken.b.T * weights).sum()
+    return sum(solution.certificate.objective) + pulled - float(noise)
 
 
 def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:

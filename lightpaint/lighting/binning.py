@@ -1,0 +1,166 @@
+"""Pixels averaged in blocks, where single ones are mostly noise.
+
+What a display shows of a noisy pixel is not, on average, what it shows of the light there: its
+curve is bent, and steepest in the dark. A fit of noisy pixels makes up for that with light that
+nobody painted, and a lamp of which the samples show little but stray pixels may become anything.
+The remedy is the average of a block: as many more samples of nearly the same light. How large
+blocks have to be follows from the noise of the present look, as the display shows it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.lighting.lit_pixels import LitPixels
+from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.pull import to_present
+from lightpaint.lighting.views import Views
+
+#: Noise of the present look beside the display's range, root mean square, up to which single pixels
+#: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
+NOISY_DISPLAY = 0.035
+
+#: Sides of blocks that are tried, and blocks along the shorter side of a picture, at least.
+SIDES, FEWEST_BLOCKS = (1, 2, 3, 4, 6, 8), 16
+
+#: Strength of the pull to the present by what is noise of a light.
+PRIOR = 0.1
+
+
+@dataclass(frozen=True)
+class BinnedPixels:
+    """Blocks of all views behind each other, as a picture of one row.
+
+    Attributes:
+        basis: (n, 1, p, 3) images of the lights, means over each block of what counts in it.
+        loss: What a picture of these blocks costs; one counts as much as all its pixels.
+    """
+
+    basis: Basis
+    loss: PaintingLoss
+
+    @cached_property
+    def prior(self) -> NormalEquations:
+        """s Σᵢ Nᵢ (wᵢ − presentᵢ)², Nᵢ the noise's power in the blocks of light i, s `PRIOR`.
+
+        What the samples show of a light is what they show beside its noise: of which that is all,
+        the present is the best guess. N is part of M anyway, where it pulls towards no light.
+        """
+        present = self.basis.present_weights
+        at = LitPixels.whole(self.basis, self.loss).predicted(present)
+        _, weight = self.loss.pixels.squares(at, from_clipping=False)
+        halves = self.basis.half_differences[:, 0].astype(np.float64)
+        power = np.einsum("cp,npc->nc", weight, np.square(halves))
+        return to_present(PRIOR * power, present)
+
+
+def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
+    """Return the side, in pixels, of blocks whose noise is small on a display: 1 for no blocks.
+
+    Noise is that of the present look: what is painted has no say in it, so that no stroke changes
+    what is solved elsewhere. Where nothing is known of noise it is 1, as in linear light, whose
+    noise is taken out of the equations.
+    """
+    if transform is None or not all(basis.knows_noise for basis in bases):
+        return 1
+    shortest = min(min(basis.size) for basis in bases)
+    sides = [side for side in SIDES if shortest >= FEWEST_BLOCKS * side]
+    if len(sides) < 2:
+        return 1
+    halves = [
+        (basis.present_look, mix(basis.half_differences, basis.present_weights)) for basis in bases
+    ]
+    for side in sides:
+        noise = [
+            _display_noise(look, half, basis, transform, side)
+            for (look, half), basis in zip(halves, bases, strict=True)
+        ]
+        if np.sqrt(np.mean(np.concatenate(noise))) <= NOISY_DISPLAY:
+            return side
+    return sides[-1]
+
+
+def _display_noise(
+    look: Floats, half: Floats, basis: Basis, transform: ViewTransform, side: int
+) -> Doubles:
+    """Return squared half differences of what a display shows of blocks, (k,), without emitters."""
+    unseen = (~basis.emitters_seen).astype(np.float64)
+    counts = block_sums(unseen, side)
+    safe = np.where(counts > 0, counts, 1)[..., None]
+    light, its = (block_sums(x * unseen[..., None], side) / safe for x in (look, half))
+    ends = (transform.encode(np.maximum(light + sign * its, 0)) for sign in (1, -1))
+    return np.asarray(np.square(np.subtract(*ends, dtype=np.float64) / 2)[counts > 0].ravel())
+
+
+def binned_pixels(views: Views, loss: PaintingLoss, side: int) -> BinnedPixels:
+    """Return the blocks of a loss over all `views`, each pixel weighed by how much it counts."""
+    planes: list[list[Doubles]] = [[], []]
+    parts = []
+    for k, basis in enumerate(views.bases):
+        its = loss.cut(lambda joint, k=k: views.part(joint, k))  # type: ignore[misc]
+        counts = its.importance.astype(np.float64)
+        total = block_sums(counts, side)
+        safe = np.where(total > 0, total, 1)
+        for made, images in zip(planes, (basis.images, basis.half_differences), strict=True):
+            means = [block_sums(x * counts[..., None], side) / safe[..., None] for x in images]
+            made.append(np.stack(means).reshape(len(means), -1, 3))
+        parts.append(_binned_loss(its, total, safe, side))
+    images, halves = (np.concatenate(x, axis=1)[:, None].astype(np.float32) for x in planes)
+    basis = replace(
+        views.bases[0],
+        images=images,
+        half_differences=halves,
+        emitters_seen=np.zeros(images.shape[1:3], bool),
+        learned=None,
+        features=None,
+        objects=None,
+    )
+    return BinnedPixels(basis, _joined(parts))
+
+
+def _binned_loss(loss: PaintingLoss, total: Doubles, safe: Doubles, side: int) -> PaintingLoss:
+    """Return that of one view. total: (h', w'), importance of blocks; safe: the same, never 0."""
+    painted, held = (1 - loss.share) * loss.importance, loss.share * loss.importance
+
+    def mean(image: Floats, weight: Floats) -> Doubles:
+        some = block_sums(weight.astype(np.float64), side)
+        its = block_sums(image * weight[..., None].astype(np.float64), side)
+        return np.asarray(its / np.where(some > 0, some, 1)[..., None])
+
+    return replace(
+        loss,
+        painted=mean(loss.painted, painted),
+        importance=total,
+        share=block_sums(held.astype(np.float64), side) / safe,
+        current=mean(loss.current, held),
+        at_least=mean(loss.at_least.astype(np.float64), painted) > 0.5,
+    )
+
+
+def _joined(parts: list[PaintingLoss]) -> PaintingLoss:
+    """Return one row of all."""
+
+    def row(name: str) -> npt.NDArray[np.generic]:
+        arrays = [getattr(part, name) for part in parts]
+        return np.concatenate([x.reshape(-1, *x.shape[2:]) for x in arrays])[None]
+
+    names = ("painted", "importance", "share", "current", "at_least")
+    rows: dict[str, Any] = {name: row(name) for name in names}
+    return replace(parts[0], **rows)
+
+
+def block_sums(values: npt.NDArray[np.floating], side: int) -> Doubles:
+    """Return sums over blocks, (h', w', …) float64; at the border of what there is."""
+    if side == 1:
+        return np.asarray(values, np.float64)
+    rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
+    along = np.add.reduceat(np.asarray(values, np.float64), rows, axis=0)
+    return np.asarray(np.add.reduceat(along, columns, axis=1))
