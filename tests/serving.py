@@ -90,6 +90,10 @@ class Page:
         self.protocol.send_binary(to_frame(Message(kind, {"seq": 1, **fields}).content(), []))
         self._sent()
 
+    def sends(self, data: bytes) -> None:
+        """Whatever it is."""
+        self.connection.sendall(data)
+
     def says_goodbye(self) -> None:
         self.protocol.send_close(1001)
         self._sent()

@@ -24,6 +24,15 @@ PATIENCE_S = 2.0
 class PageSocket(WebSocketsSansIOProtocol):
     """A page's socket, which may be at its own goodbye when the server says its."""
 
+    def send_receive_event_to_app(self) -> None:
+        """Pass a message on; text, which no page sends, as one that says nothing.
+
+        uvicorn would show at the terminal where it could not read the text.
+        """
+        if self.curr_msg_data_type == "text":
+            self.curr_msg_data_type, self.frames = "bytes", [b""]
+        super().send_receive_event_to_app()
+
     def shutdown(self) -> None:
         """Say goodbye, unless the page has: uvicorn then ends in an error of `websockets`."""
         if self.transport.is_closing():

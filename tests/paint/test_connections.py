@@ -138,3 +138,46 @@ def test_junk_of_strangers_is_no_news(serving: Serving, capfd: pytest.CaptureFix
             one.recv(1 << 16)
     assert status(serving, "/data/present", serving.key) == 200
     assert capfd.readouterr() == ("", "")
+
+
+def websocket_frame(head: int, payload: bytes, *, length: int | None = None) -> bytes:
+    """One of a page (RFC 6455, 5.2), masked by zeros. head: its first byte."""
+    size = len(payload) if length is None else length
+    if size < 126:
+        return bytes([head, 0x80 | size]) + bytes(4) + payload
+    return bytes([head, 0xFF]) + size.to_bytes(8, "big") + bytes(4) + payload
+
+
+FINAL, TEXT, BINARY, CONTINUED, CLOSE, PING = 0x80, 1, 2, 0, 8, 9
+LAST = websocket_frame(FINAL | CONTINUED, b"x")
+
+
+def test_malformed_frames_cost_their_page_its_connection_at_most(
+    serving: Serving, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for junk in (
+        websocket_frame(FINAL | TEXT, b"\xff\xfe"),
+        websocket_frame(TEXT, b"\xff") + websocket_frame(FINAL | CONTINUED, b"\xfe"),
+        websocket_frame(FINAL | 0x40 | BINARY, b"x"),
+        websocket_frame(FINAL | 3, b"x"),
+        websocket_frame(FINAL | PING, bytes(126)),
+        websocket_frame(FINAL | CONTINUED, b"x"),
+        websocket_frame(FINAL | CLOSE, b"\x03"),
+        websocket_frame(FINAL | CLOSE, b"\x03\xe8\xff"),
+        websocket_frame(FINAL | BINARY, b"x", length=2**63 - 1),
+        websocket_frame(FINAL | BINARY, b"x", length=2**64 - 1),
+        websocket_frame(BINARY, bytes(9)) + 500 * websocket_frame(CONTINUED, bytes(9)) + LAST,
+        200 * websocket_frame(FINAL | PING, b"x"),
+        bytes(100),
+    ):
+        page = Page(serving)
+        page.says("hello", version=VERSION)
+        assert page.hears()[0]["kind"] in ("state", "closed")
+        with suppress(OSError):
+            page.sends(junk)
+            page.connection.recv(1 << 16)
+        page.connection.close()
+    last = Page(serving)
+    last.says("hello", version=VERSION)
+    assert last.hears()[0]["kind"] in ("state", "closed")
+    assert capfd.readouterr() == ("", "")
