@@ -30,6 +30,7 @@ class Opening:
     _key: str = ""
     _scene: Scene | None = None
     _began_s: float = 0.0
+    _clock_s: float = 0.0
     _lock: Any = field(default_factory=Lock)
 
     def __post_init__(self) -> None:
@@ -65,7 +66,7 @@ class Opening:
         # The renderer, and what goes with it, comes with the first scene.
         from lightpaint.scene.quality import on_film
 
-        self._began_s = time.time()
+        self._began_s, self._clock_s = time.time(), _clock_s()
         scene = on_film(self.file.content, self.settings.quality, self.settings.resolution)
         if self.known is not None and self.known.identity != scene.identity:
             raise PaintError(
@@ -78,7 +79,14 @@ class Opening:
 
     def remember(self, basis: Basis) -> None:
         """Let the next session of this scene begin without loading it. basis: its kept one."""
+        if abs(_clock_s() - self._clock_s) > known.COARSE_S / 2:
+            return  # the clock was set: what a file's times say of its last change is not known
         if self.known is None and self._scene is not None and self.settings.use_cache:
             known.remember(
                 self._key, self._scene, basis, remarks=self.remarks, began_s=self._began_s
             )
+
+
+def _clock_s() -> float:
+    """By how much the clock is ahead of one that nobody sets."""
+    return time.time() - time.monotonic()

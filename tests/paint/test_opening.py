@@ -1,6 +1,7 @@
 """A scene that is painted: open before it is loaded, and told apart from what it was."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -43,8 +44,11 @@ def opened(path: Path, **settings: Any) -> Subject:
     return subject_of(SceneFile(str(path)), path.parent / "s", settings=Settings(**settings))
 
 
-def kept(path: Path, make_basis: Any) -> lp.Basis:
-    """A made-up basis, kept as a first session leaves it, and what was known then."""
+def kept(path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: None) -> lp.Basis:
+    """A made-up basis, kept as a first session leaves it, and what was known then.
+
+    meanwhile: happens between the two.
+    """
     first = opened(path)
     assert identity_of([first]) is None
     scene, opening = first.loaded, first.scene
@@ -68,8 +72,20 @@ def kept(path: Path, make_basis: Any) -> lp.Basis:
     assert cache.keep(basis)
     opening._began_s = time.time() + 60  # as if its files were older
     opening.remarks = ("a remark",)
+    meanwhile()
     opening.remember(basis)
     return basis
+
+
+@pytest.mark.parametrize("set_by", [-3600.0, 3600.0])
+def test_nothing_is_known_of_a_scene_where_the_clock_was_set_meanwhile(
+    path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, set_by: float
+) -> None:
+    """A file that was written since it was read could then look older."""
+    now = time.time
+    kept(path, make_basis, lambda: monkeypatch.setattr(time, "time", lambda: now() + set_by))
+    monkeypatch.setattr(time, "time", now)
+    assert identity_of([opened(path)]) is None
 
 
 def test_a_known_scene_is_painted_without_being_loaded(
