@@ -8,6 +8,7 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     render_basis, read_basis    Scene → Basis                        what does each do alone?
     read_light_groups           another renderer's EXR → LightGroups the same
     render_template             Scene → a folder to paint on
+    template_of_basis           Basis → the same, without a renderer
     read_target                 painting → Target                    what is wanted, and where?
     solve                       Basis, Target → Solution             which lighting is closest?
     analyse                     Solution → Analysis of each view     how sure, and why not closer?
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from lightpaint.relit.verification import Verification as Verification
     from lightpaint.relit.verify import verify as verify
     from lightpaint.renders import render_template as render_template
+    from lightpaint.renders import template_of_basis as template_of_basis
     from lightpaint.report.verdict import verdict as verdict
     from lightpaint.results import Look as Look
     from lightpaint.scene.scene import Scene as Scene
@@ -133,6 +135,7 @@ _HOMES = {
     "relight": "relit.relight",
     "render_basis": "basis.render.render",
     "render_template": "renders",
+    "template_of_basis": "renders",
     "run": "pipeline",
     "solve": "lighting.solve",
     "suggest_lights": "placement.suggest",

@@ -119,6 +119,9 @@ class Job:
         # A painting is read beside the basis, and a mistake in it is said first.
         *targets, basis = side_by_side(content, [*self.targets, self.basis])
         basis = basis.basis if isinstance(basis, LightGroups) else basis
+        if basis is not None:
+            pairs = zip(self.targets, targets, strict=True)
+            targets = [_over_look(given, target, basis) for given, target in pairs]
         scenes = [content(scene) for scene in self.scenes]
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
@@ -277,6 +280,13 @@ class Job:
         for scene in rendered:
             remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
         return remarks + remarks_of_pictures()
+
+
+def _over_look(given: Target | Painting, target: Target, basis: Basis) -> Target:
+    """Return `target`, as it was painted over what `basis` shows, where it was."""
+    if not isinstance(given, Painting):
+        return target
+    return given.over(basis.present_look, f"the look of {basis.origin.scene}") or target
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:

@@ -1,5 +1,6 @@
 """What is rendered to be painted on or looked at: templates, and scenes as they were relit."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,60 @@ def render_template(
             LIGHTS: how_denoised(features, raw="the basis of the scene"),
         },
     )
+
+
+def template_of_basis(
+    basis: Basis, folder: str | Path, *, transform: ViewTransform | None = None
+) -> list[Path]:
+    """Write something to paint on into `folder`, of a saved basis or light groups.
+
+    Nothing is rendered: the look is their sum, and what only a scene knows is not there. Where the
+    noise is known, template.png shows the look without it.
+
+    Args:
+        basis: What will be solved with.
+        folder: Receives the files, which it returns.
+        transform: How the look becomes a picture; sRGB by default, at an exposure that shows
+            something.
+
+    Examples:
+        >>> files = lp.template_of_basis(basis, "over the basis")
+        >>> [file.name for file in files[:2]]
+        ['template.exr', 'template.png']
+    """
+    look, clean, features = _look_of_basis(basis)
+    template = Template(
+        look,
+        transform or ViewTransform("srgb", meter_exposure(look, basis)),
+        scene=basis.origin.scene,
+        sensor=basis.origin.sensor if basis.knows_noise else "",
+        clean=clean,
+    )
+    height, width = basis.size
+    factor = max(1, math.isqrt(max(height * width - 1, 0) // (THUMBNAIL.pixels or 1)) + 1)
+    texts = {}
+    if clean is not None:
+        raw = how_denoised(features, raw="template.exr")
+        texts = {SHOWN: raw, LIGHTS: how_denoised(features, raw="the basis")}
+    return write_template(
+        Path(folder), template, lights=_small_planes(basis, min(factor, height, width)), texts=texts
+    )
+
+
+def look_of_basis(basis: Basis, path: Path, *, transform: ViewTransform | None = None) -> Path:
+    """Write only the look of a basis, as EXR at `path`; returns the PNG beside it."""
+    look, clean, features = _look_of_basis(basis)
+    shown = transform or ViewTransform("srgb", meter_exposure(look, basis))
+    texts = {} if clean is None else how_denoised(features, raw=path.name)
+    return write_look(path, look, shown, clean=clean, texts=texts)
+
+
+def _look_of_basis(basis: Basis) -> tuple[Floats, Floats | None, Features | None]:
+    """The sum as it is; without its noise, where that is known; and what that was taken out by."""
+    look = basis.present_look
+    if not basis.knows_noise:
+        return look, None, None
+    return look, denoised(look, basis.features, quality="high"), basis.features
 
 
 def render_look(
@@ -236,11 +291,19 @@ def _thumbnails(
         small = scene.reduced(f"1/{factor}")
         basis = render_basis(small, spp=THUMBNAIL.spp, seed=settings.seed, progress=progress)
         factor = 1
-    features = None if basis.features is None else basis.features.reduced(factor)
-    return {
-        name: denoised(block_mean(image, factor), features)
+    return _small_planes(basis, factor)
+
+
+def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
+    """By name, what each light does alone, in means over blocks; denoised, where there is noise."""
+    small = {
+        name: block_mean(image, factor)
         for name, image in zip(basis.names, basis.images, strict=True)
     }
+    if not basis.knows_noise:
+        return small
+    features = None if basis.features is None else basis.features.reduced(factor)
+    return {name: denoised(image, features) for name, image in small.items()}
 
 
 def relit_folder(

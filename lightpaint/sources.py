@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
@@ -21,7 +22,7 @@ from lightpaint.records import strict_json
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
 from lightpaint.settings import Settings
-from lightpaint.target.read import Paint, read_target
+from lightpaint.target.read import Paint, read_over_look, read_target
 from lightpaint.target.target import Target
 
 FORMAT = "lightpaint-job 1"
@@ -103,6 +104,18 @@ class Painting:
     def content(self) -> Target:
         """The target, as it is when it is first asked for."""
         return read_target(**vars_of(self))
+
+    def over(self, look: Floats, name: str) -> Target | None:
+        """The target, if it was painted over that look and nothing else says what counts.
+
+        look: (h, w, 3) linear, what a basis or light groups called `name` show as they are.
+        """
+        target = self.content
+        if not (self.find and target.everything) or self.template or self.paint != "look":
+            return None
+        return read_over_look(
+            Path(self.path), look, name, layer=self.layer, transform=self.transform
+        )
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import documents, tables, terminal
 from lightpaint.cli.listing import note_scene
@@ -22,10 +23,12 @@ from lightpaint.pipeline import obtain
 from lightpaint.relit.relight import scene_of
 from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.renders import (
+    look_of_basis,
     relight_look,
     relit_folder,
     render_look,
     render_template,
+    template_of_basis,
 )
 from lightpaint.result_folder import ResultFolder
 from lightpaint.results import result_folders, verify_result
@@ -33,7 +36,7 @@ from lightpaint.scene.quality import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.variant import use_variant
 from lightpaint.settings import Settings
-from lightpaint.sources import Painting, SceneFile
+from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_nothing_idle
 from lightpaint.staging import finish
 from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
 
@@ -60,20 +63,19 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
 
 def template(
     *,
-    scene: SceneFile,
+    source: SceneFile | BasisFile | GroupsFile,
     output: Path,
     transform: ViewTransform | None,
     settings: Settings,
     force: bool,
 ) -> Outcome:
-    """`lightpaint template SCENE -o DIR`"""
+    """`lightpaint template SCENE|BASIS|LIGHTS -o DIR`"""
     _check_template(output, force=force)
-    loaded = on_film(scene.content, settings.quality, settings.resolution)
+    if not isinstance(source, SceneFile):
+        return _template_of_basis(source, output, transform, settings)
+    loaded = on_film(source.content, settings.quality, settings.resolution)
     note_scene(loaded)
-    replaced = (
-        files_in_the_way(output) if is_folder(output) else [output, output.with_suffix(".png")]
-    )
-    check_files(replaced, loaded.read_files)
+    check_files(_replaced(output), loaded.read_files)
     for remark in remarks_of_film(loaded, settings):
         terminal.say(remark)
     how: dict[str, Any] = {
@@ -83,22 +85,56 @@ def template(
         "seed": settings.seed,
         "use_cache": settings.use_cache,
     }
-    linear, picture = output / LIGHT, output / SHOWN
     with terminal.Listener() as listen:
         for remark in remarks_of_scene(loaded, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
             files = render_template(loaded, output, progress=listen, **how)
         else:
-            linear, picture = output, render_look(loaded, output, progress=listen, **how)
-            files = [linear, picture]
-    terminal.write(f"{picture}: paint over it, in any program, and save as PNG; it is denoised")
+            files = [output, render_look(loaded, output, progress=listen, **how)]
+    return _shown_template(output, files)
+
+
+def _template_of_basis(
+    source: BasisFile | GroupsFile,
+    output: Path,
+    transform: ViewTransform | None,
+    settings: Settings,
+) -> Outcome:
+    """A template of what is rendered already."""
+    check_nothing_idle(settings, source)
+    found = source.content
+    made = found if isinstance(found, Basis) else found.basis
+    check_files(_replaced(output), [Path(source.path)] if isinstance(found, Basis) else found.files)
+    if not isinstance(found, Basis):
+        for remark in found.remarks:
+            terminal.say(remark)
     if is_folder(output):
+        files = template_of_basis(made, output, transform=transform)
+    else:
+        files = [output, look_of_basis(made, output, transform=transform)]
+    return _shown_template(output, files, is_denoised=made.knows_noise)
+
+
+def _shown_template(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> Outcome:
+    """What to do with the files of a template."""
+    is_tree = is_folder(output)
+    picture = output / SHOWN if is_tree else output.with_suffix(".png")
+    linear = output / LIGHT if is_tree else output
+    names = {file.name for file in files}
+    told = "; it is denoised" if is_denoised else ""
+    terminal.write(f"{picture}: paint over it, in any program, and save as PNG{told}")
+    if CLEAN in names:
         terminal.write(f"{output / CLEAN}: the same in linear light, for programs that know EXR")
-    terminal.write(f"{linear}: as it was rendered, with its grain")
-    if is_folder(output):
-        terminal.write(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
-    folder = output if is_folder(output) else output.parent
+    its = "as it was rendered, with its grain" if is_denoised else "the same in linear light"
+    terminal.write(f"{linear}: {its}")
+    if is_tree:
+        if (output / MATTES) in {file.parent for file in files}:
+            its = f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do"
+        else:
+            its = f"{output}/{LIGHTS}: what lights do"
+        terminal.write(its)
+    folder = output if is_tree else output.parent
     shown = {"picture": str(picture), "light": str(linear)}
     return Outcome(lambda: documents.files_document(folder, files, **shown))
 

@@ -53,7 +53,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
         case "template":
             output, transform = output or Path("template"), transform_of(options)
             return {
-                "scene": scene_of(options),
+                "source": _source_of_template(options),
                 "output": output,
                 "transform": None if transform.is_open else transform.over(None),
                 "settings": settings,
@@ -89,6 +89,20 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             return {"action": options.action, "names": options.names}
         case _:
             return {"variant": options.variant}
+
+
+def _source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
+    """What `template` shows: a scene, a saved basis, or light groups, also those of --lights."""
+    given = ",".join(options.lights or ())
+    if options.scene is None:
+        if not given:
+            raise BasisError("nothing to paint on: give a scene, a basis, or light groups")
+        _check_light_groups(given)
+        options.scene, options.lights = given, None
+    elif given and _is_file_to_be(given, Path(options.scene)):
+        raise BasisError(f"{options.scene} and --lights {given} at once: give one to paint on")
+    options.source, options.targets, options.masks, options.views = options.scene, [], [], []
+    return basis_of(options) or scene_of(options)
 
 
 def is_folder(output: Path) -> bool:

@@ -83,8 +83,16 @@ def _basis(parser: argparse.ArgumentParser) -> None:
 
 
 def _template(parser: argparse.ArgumentParser) -> None:
-    add_scene(parser)
+    parser.add_argument(
+        "scene",
+        metavar="SCENE|BASIS|LIGHTS",
+        nargs="?",
+        help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR or a folder of "
+        "them, which --lights may name as well",
+    )
+    add_view(parser)
     add_lights(parser)
+    add_pattern(parser)
     add_budget(parser)
     add_cache(parser)
     add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")

@@ -83,11 +83,7 @@ def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
     assert transform is not None  # That of a file of integers is known.
     mine, its = transform.encode(picture.image), transform.encode(look)
     if picture.lossy:
-        rough = np.asarray(mine - _compressed_like(path, its), np.float64)
-        near, wide = (
-            largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
-        )
-        return np.asarray(np.minimum(near, wide))
+        return lossy_difference(mine, compressed_like(path, its))
     return np.asarray(largest(np.abs(mine - its)), np.float64)
 
 
@@ -100,7 +96,16 @@ def _difference_of_light(picture: Picture, look: Floats, template: Template) -> 
     return np.asarray(largest(np.maximum(shown, relative)), np.float64)
 
 
-def _compressed_like(path: Path, display: Floats) -> Floats:
+def lossy_difference(mine: Floats, its: Floats) -> Floats:
+    """(h, w), by how much display values (h, w, 3) differ beyond what compressing them does."""
+    rough = np.asarray(mine - its, np.float64)
+    near, wide = (
+        largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
+    )
+    return np.asarray(np.minimum(near, wide))
+
+
+def compressed_like(path: Path, display: Floats) -> Floats:
     """`display` after the compression that the JPEG at `path` has gone through."""
     from PIL import Image, JpegImagePlugin
 

@@ -13,6 +13,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.keywords import keywords
+from lightpaint.target.over_look import view_of_look
 from lightpaint.target.own import painted_of
 from lightpaint.target.painted import SHARP_RADIUS, painted_where
 from lightpaint.target.target import Target, share_of, spoken_share
@@ -43,6 +44,7 @@ class _Reading:
     """What is known on the way.
 
     template, folder: what it was painted on, if that is known. transform: what it was seen through.
+    look: what messages call a template that has no folder.
     """
 
     path: Path
@@ -51,10 +53,13 @@ class _Reading:
     folder: Path | None
     transform: ViewTransform | None
     notes: tuple[str, ...]
+    look: str = ""
 
     @property
     def painted_on(self) -> str:
         """How messages call the template: by the file in it that the painting is like."""
+        if self.look:
+            return self.look
         name = LIGHT if self.picture.codes is None else SHOWN
         return name if self.folder is None else str(self.folder / name)
 
@@ -96,7 +101,35 @@ def read_target(
         >>> lp.read_target("painting.exr").size
         (16, 16)
     """
-    reading = _opened(Path(path), layer, transform, template, find=find)
+    return _target_of(_opened(Path(path), layer, transform, template, find=find), mask, paint)
+
+
+def read_over_look(
+    path: Path, look: Floats, name: str, *, layer: str | None, transform: TransformChoice
+) -> Target | None:
+    """Return the painting at `path` if it was painted over `look`; None if it was not.
+
+    Only for a painting that does not say itself what counts, and of which no template is known.
+
+    look: (h, w, 3) linear, what a basis or light groups show as they are. name: what messages call
+    it. layer, transform: as of `read_target`.
+    """
+    picture = read_picture(path, layer=layer, transform=transform)
+    view = view_of_look(path, picture, look, transform)
+    if view is None:
+        return None
+    if picture.transform is not None:
+        picture = read_picture(path, layer=layer, transform=view)
+    template = Template(look, view)
+    if not painted_where(path, picture, template).any():
+        return None  # the look itself, of which all counts
+    shown = None if picture.transform is None else view
+    through = "" if shown is None else f" through {shown.spoken}"
+    return _target_of(_Reading(path, picture, template, None, shown, (), f"{name}{through}"))
+
+
+def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
+    """What was painted, and where. Arguments as of `read_target`."""
     picture, made = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever a mask says.

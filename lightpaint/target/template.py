@@ -99,24 +99,29 @@ def write_template(
     folder: Path,
     template: Template,
     *,
-    normals: Floats,
-    depth: Floats,
-    mattes: Mapping[str, Floats],
+    normals: Floats | None = None,
+    depth: Floats | None = None,
+    mattes: Mapping[str, Floats] | None = None,
     lights: Mapping[str, Floats],
     texts: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[Path]:
     """Write a template into `folder`, in place of an earlier one, wholly or not at all.
 
     Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
-    [0, 1]; lights: by name, (h', w', 3) linear, what each does alone. texts: what pictures
-    say of themselves, under SHOWN and LIGHTS.
+    [0, 1]; what is not known is not written. lights: by name, (h', w', 3) linear, what each does
+    alone. texts: what pictures say of themselves, under SHOWN and LIGHTS.
     """
-    said = texts or {}
+    said, mattes = texts or {}, mattes or {}
     matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
     light_files = [f"{LIGHTS}/{name}.png" for name in file_names(lights)]
-    given = {ALBEDO: template.albedo, CLEAN: template.clean}
+    given = {
+        ALBEDO: template.albedo,
+        CLEAN: template.clean,
+        NORMALS: normals,
+        DEPTH: depth,
+    }
     optional = [name for name, image in given.items() if image is not None]
-    written = [LIGHT, SHOWN, *optional, NORMALS, DEPTH, ABOUT, *matte_files, *light_files]
+    written = [LIGHT, SHOWN, *optional, ABOUT, *matte_files, *light_files]
     with staged(folder, earlier_files(folder)) as stage:
         write_look(
             stage / LIGHT,
@@ -129,8 +134,10 @@ def write_template(
             write_rgb(stage / CLEAN, template.clean, attributes=said.get(SHOWN))
         if template.albedo is not None:
             write_rgb(stage / ALBEDO, template.albedo)
-        write_rgb(stage / NORMALS, normals)
-        write_parts(stage / DEPTH, [Part("depth", {"Y": depth.astype(np.float32)})])
+        if normals is not None:
+            write_rgb(stage / NORMALS, normals)
+        if depth is not None:
+            write_parts(stage / DEPTH, [Part("depth", {"Y": depth.astype(np.float32)})])
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(stage / file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
