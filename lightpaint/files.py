@@ -160,8 +160,8 @@ def _first_piece(path: Path) -> tuple[BinaryIO, bytes]:
     return file, file.read(PIECE)
 
 
-def _in_time(work: Callable[[], _Made]) -> _Made:
-    """What `work` returns or raises; TimeoutError if the system does not let it end in time.
+def in_time(work: Callable[[], _Made], patience_s: float, reason: str) -> _Made:
+    """Return what `work` returns, or raise what it raises; TimeoutError if it does not end in time.
 
     It goes on in a thread of its own, which no one waits for at the end of the process.
     """
@@ -175,13 +175,17 @@ def _in_time(work: Callable[[], _Made]) -> _Made:
 
     threading.Thread(target=answer, daemon=True).start()
     try:
-        made, failure = answers.get(timeout=PATIENCE_S)
+        made, failure = answers.get(timeout=patience_s)
     except Empty:
-        reason = f"no answer within {PATIENCE_S:g} s; is it on a drive that is away?"
-        raise TimeoutError(errno.ETIMEDOUT, reason) from None
+        raise TimeoutError(errno.ETIMEDOUT, f"no answer within {patience_s:g} s{reason}") from None
     if failure is not None:
         raise failure
     return cast(_Made, made)
+
+
+def _in_time(work: Callable[[], _Made]) -> _Made:
+    """`in_time`, for files."""
+    return in_time(work, PATIENCE_S, "; is it on a drive that is away?")
 
 
 def read_bytes(

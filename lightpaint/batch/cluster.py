@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from lightpaint.batch.cluster_workers import ANSWER_S, ClusterWorkers
+from lightpaint.batch.cluster_workers import ANSWER_S, GOING, ClusterWorkers
 from lightpaint.batch.engine import LOST, TRIES
 from lightpaint.batch.errands import Done, Errand, spoken
 from lightpaint.batch.parcels import Contents, Parcel, packed, unpack
@@ -118,7 +118,7 @@ class Cluster:
     def _recall(self) -> None:
         """Have nothing more done."""
         for sent in self._sent:
-            with suppress(Exception):
+            with suppress(*GOING):
                 sent.future.cancel(force=True)
         self._sent = []
 
@@ -165,6 +165,8 @@ class Cluster:
         """What workers say that they have begun."""
         while self._at.events:
             event = self._at.events.popleft()
+            if not _is_event(event):  # of whoever else knows the scheduler
+                continue
             self.begun.append((event["errand"], event["worker"]))
             for sent in self._sent:
                 if (spoken(sent.errand), sent.worker) == self.begun[-1]:
@@ -209,8 +211,11 @@ class Cluster:
         errand = sent.errand
         try:
             came: Done | list[str] = sent.future.result(timeout=ANSWER_S)
+            if not _is_answer(came, errand):
+                said = f"worker {sent.worker} answers with something else"
+                return Done(errand.name, errand.kind, said)
             return came
-        except Exception as error:
+        except GOING as error:
             if isinstance(error, OSError) or not self._at.is_there(sent.worker):
                 return None
             if sent.future.status != "error" or type(error).__name__ == "KilledWorker":
@@ -225,7 +230,7 @@ class Cluster:
     def _lose(self, some: Sequence[_Sent], waiting: deque[Errand], tries: Counter[str]) -> None:
         """Take back what workers had."""
         for sent in some:
-            with suppress(Exception):
+            with suppress(*GOING):
                 sent.future.cancel(force=True)
             self._sent.remove(sent)
             self._rests(sent.worker)
@@ -253,6 +258,25 @@ class Cluster:
             self._lose([x for x in self._sent if x.worker == sent.worker], waiting, tries)
             self._at.end(sent.worker, "it took too long")
             return
+
+
+def _is_event(event: Any) -> bool:
+    """Return whether it says what a worker has begun."""
+    return isinstance(event, dict) and all(
+        isinstance(event.get(key), str) for key in ("errand", "worker")
+    )
+
+
+def _is_answer(came: Any, errand: Errand) -> bool:
+    """Return whether it is what a worker answers to an errand."""
+    if isinstance(came, list):
+        return all(isinstance(its, str) for its in came)
+    if not isinstance(came, Done) or (came.look, came.kind) != (errand.name, errand.kind):
+        return False
+    files = came.files or {}
+    return isinstance(files, dict) and all(
+        isinstance(name, str) and isinstance(data, bytes) for name, data in files.items()
+    )
 
 
 def _unpacked(errand: Errand, came: Done) -> Done:

@@ -1,23 +1,37 @@
 """The workers of a Dask cluster: who is there, what each has, and what it says."""
 
+import asyncio
+import logging
 import os
 import socket
 import time
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
-from typing import Any
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
 
 from lightpaint.batch import cluster_worker
 from lightpaint.batch.cluster_tls import check_trust
 from lightpaint.batch.cluster_worker import versions as own_versions
 from lightpaint.batch.parcels import Parcel, pieces, sent_files
-from lightpaint.errors import BatchError
-from lightpaint.files import first_line
+from lightpaint.errors import BatchError, LightpaintError
+from lightpaint.files import first_line, in_time
 from lightpaint.progress import Listener
 
-#: Seconds for the scheduler to answer, and between looks at who is there.
-ANSWER_S, LOOK_S = 15.0, 1.0
+#: Seconds for the scheduler to answer, to be found again, and between looks at who is there.
+ANSWER_S, GONE_S, LOOK_S = 15.0, 3.0, 1.0
+#: Seconds after which one that is at an answer, as while much is sent, is given up.
+SILENT_S = 60.0
+
+#: What Dask raises where a scheduler ends in the middle of something.
+GOING = (Exception, asyncio.CancelledError)
+
+#: Whose words on a connection stand here, in a line; they have last ones after the end, too.
+SPOKEN_FOR = ("distributed.client", "distributed.comm", "distributed.core", "distributed.utils")
+
+_Made = TypeVar("_Made")
 
 INSTALL = "pip install 'lightpaint[cluster]'"
 
@@ -38,12 +52,17 @@ class ClusterWorkers:
         self._has: dict[str, set[str]] = {}
         self._looked_s = 0.0
         self._is_told = False
-        self._client.subscribe_topic(topic, lambda event: self.events.append(event[1]))
-        self.look_around()
+        try:
+            hear = self._client.subscribe_topic
+            self._asked(lambda: hear(topic, lambda event: self.events.append(event[1])))
+            self.look_around()
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Leave them alone."""
-        with suppress(Exception):
+        with suppress(*GOING):
             self._client.close(timeout=2)
 
     def is_there(self, worker: str) -> bool:
@@ -53,7 +72,7 @@ class ClusterWorkers:
     def submit(self, parcel: Parcel, worker: str, key: str) -> Any:
         """Give a worker an errand, whose files it has; a future of what comes of it."""
         how: dict[str, Any] = {"key": key, "workers": [worker], "pure": False}
-        return self._client.submit(cluster_worker.do_parcel, parcel, **how)
+        return self._asked(lambda: self._client.submit(cluster_worker.do_parcel, parcel, **how))
 
     def lacks(self, worker: str, sums: Collection[str]) -> None:
         """It says that it does not have those files any more."""
@@ -76,13 +95,20 @@ class ClusterWorkers:
 
     def _known(self) -> list[str]:
         """Addresses of all workers. Raises BatchError where the scheduler is gone."""
-        try:
-            if self._client.status == "running":
-                return list(self._client.nthreads())
-        except Exception as error:
-            said = first_line(error)
-        else:
-            said = self._client.status
+        return list(self._asked(self._client.nthreads))
+
+    def _asked(self, work: Callable[[], _Made]) -> _Made:
+        """What comes of asking the scheduler. Raises BatchError where it is gone."""
+        import dask
+
+        said = self._client.status
+        if said == "running":
+            try:
+                # Dask would try to reach one that has ended for 30 s.
+                with dask.config.set({"distributed.comm.timeouts.connect": f"{GONE_S}s"}):
+                    return in_time(work, SILENT_S, "")
+            except GOING as error:
+                said = first_line(error)
         self.is_gone = True
         raise BatchError(
             f"the scheduler at {self._address} is gone ({said}); the same command goes on once it "
@@ -93,7 +119,8 @@ class ClusterWorkers:
         """Which of those that have come are of no use, and why."""
         if not workers:
             return {}
-        found = self._client.run(cluster_worker.versions, workers=workers, on_error="return")
+        ask = partial(self._client.run, cluster_worker.versions, workers=workers)
+        found = self._asked(partial(ask, on_error="return"))
         mine, unfit = own_versions(), {}
         for worker, its in found.items():
             if isinstance(its, Exception):
@@ -112,10 +139,13 @@ class ClusterWorkers:
             to = [worker]
             if file in common:
                 to += [x for x in self.there if x != worker and its not in self._has[x]]
-            with open(file, "rb") as opened:
-                data = opened.read()
+            try:
+                data = Path(file).read_bytes()
+            except OSError as error:
+                raise BatchError(f"cannot read {file}: {error.strerror or error}") from None
             for piece in pieces(data):
-                self._client.run(cluster_worker.put, its, *piece, workers=to, on_error="ignore")
+                put = partial(self._client.run, cluster_worker.put, its, *piece, workers=to)
+                self._asked(partial(put, on_error="ignore"))
             for one in to:
                 self._has.setdefault(one, set()).add(its)
 
@@ -126,8 +156,8 @@ class ClusterWorkers:
             self.there.remove(worker)
         try:
             self._client.restart_workers([worker], timeout=ANSWER_S, raise_for_error=False)
-        except Exception:  # it has no nanny
-            with suppress(Exception):
+        except GOING:  # it has no nanny
+            with suppress(*GOING):
                 self._client.run(os._exit, 1, workers=[worker], wait=False, on_error="ignore")
 
 
@@ -138,13 +168,19 @@ def _connected(address: str) -> Any:
         from distributed.comm import get_address_host_port
     except ImportError as error:
         raise BatchError(f"a cluster needs Dask's distributed: {INSTALL}") from error
+    for name in SPOKEN_FOR:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         # A client that finds nobody, or is not let in, takes its time, and has last words.
         place = get_address_host_port(address, strict=True)
         with socket.create_connection(place, timeout=ANSWER_S) as connection:
             check_trust(address, connection)
-        return Client(address, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
+        # One that takes the connection and says nothing would be waited for without end.
+        make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
+        return in_time(make, ANSWER_S + GONE_S, "")
+    except LightpaintError:
+        raise
+    except GOING as error:
         raise BatchError(
             f"no scheduler answers at {address}: {first_line(error) or 'none is there'}; give its "
             "address, like tcp://host:8786 or tls://host:8786 (dask scheduler tells it)"

@@ -15,6 +15,7 @@ from pathlib import Path
 from lightpaint.batch.errands import Done, Errand
 from lightpaint.batch.task import Task
 from lightpaint.errors import BatchError, OutputError
+from lightpaint.files import first_line
 from lightpaint.records import strict_json
 from lightpaint.result_folder import RECORD, ResultFolder
 from lightpaint.screen import some_names
@@ -194,6 +195,17 @@ def _from_here(data: bytes, root: Path) -> bytes:
     return data if b"\0" in data else data.replace(os.fsencode(root), b"")
 
 
+def _answers(record: bytes) -> tuple[str, ...]:
+    """Names of the answers that a worker's record speaks of. Raises OutputError."""
+    try:
+        answers = strict_json(record.decode())["answers"]
+        if not (isinstance(answers, list) and all(isinstance(x, str) for x in answers)):
+            raise TypeError("answers is no list of names")
+    except (LookupError, TypeError, ValueError) as error:
+        raise OutputError(f"a worker's {RECORD} is damaged: {first_line(error)}") from None
+    return tuple(answers)
+
+
 def _whole(parcel: Parcel, path: str) -> str:
     return os.path.normpath(os.path.join(parcel.place, path))
 
@@ -213,13 +225,13 @@ def unpack(errand: Errand, files: dict[str, bytes]) -> None:
     folder = Path(errand.writes)
     if odd := [name for name in files if not is_below(name)]:
         raise OutputError(f"a worker would write {some_names(odd)} beside {folder}")
-    record = strict_json(files[RECORD].decode()) if RECORD in files else {"answers": []}
+    answers = _answers(files[RECORD]) if RECORD in files else ()
     adds_to = folder / "lighting.json" if errand.kind == "render" else None
     results = ResultFolder(
         folder,
         tuple(folder / name for name in files if name != RECORD),
         (),
-        tuple(folder / answer for answer in record["answers"]),
+        tuple(folder / answer for answer in answers),
         adds_to,
         force=isinstance(errand, Task) and errand.force,
     )

@@ -1,0 +1,146 @@
+"""A scheduler that ends, while it is being reached or later: one line, and soon."""
+
+import contextlib
+import logging
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from lightpaint.batch import cluster_workers
+from lightpaint.batch.cluster import Cluster
+from lightpaint.batch.cluster_workers import ClusterWorkers
+from lightpaint.batch.errands import Done
+from lightpaint.batch.parcels import unpack
+from lightpaint.errors import BatchError, OutputError
+
+distributed = pytest.importorskip("distributed", reason="Dask's distributed")
+
+#: Seconds in which it is said: of a busy machine, too.
+SOON_S = 25.0
+
+
+class Listens:
+    """Hears nothing that matters here."""
+
+    def __call__(self, *_: Any) -> None: ...
+
+    def say(self, text: str) -> None: ...
+
+    note = say
+
+    def at_work(self, worker: str, what: str | None) -> None: ...
+
+
+@contextlib.contextmanager
+def answering(with_bytes: bytes | None) -> Iterator[str]:
+    """A server that says that much to each who comes, and ends; None: never anything."""
+    server = socket.create_server(("127.0.0.1", 0))
+    held = []
+
+    def serve() -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                connection, _ = server.accept()
+                if with_bytes is None:
+                    held.append(connection)
+                    continue
+                with connection, contextlib.suppress(OSError):
+                    connection.sendall(with_bytes)
+
+    threading.Thread(target=serve, daemon=True).start()
+    try:
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+    finally:
+        server.close()
+        for connection in held:
+            connection.close()
+
+
+@pytest.mark.parametrize("said", [b"", b"\0" * 7, b"\1" + b"\0" * 30, b"GET / HTTP/1.1\r\n", None])
+def test_one_that_ends_while_it_is_reached(
+    said: bytes | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(cluster_workers, "ANSWER_S", 1.0)
+    monkeypatch.setattr(cluster_workers, "GONE_S", 0.5)
+    began_s = time.monotonic()
+    with answering(said) as address, pytest.raises(BatchError) as refusal:
+        ClusterWorkers(address, Listens(), "topic")  # type: ignore[arg-type]
+    assert time.monotonic() - began_s < SOON_S
+    assert f"no scheduler answers at {address}" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert [x for x in caplog.records if x.levelno >= logging.WARNING] == []
+
+
+LATER: dict[str, Callable[[ClusterWorkers], object]] = {
+    "look_around": lambda at: (setattr(at, "_looked_s", -1e9), at.look_around()),
+    "is_there": lambda at: at.is_there("tcp://127.0.0.1:1"),
+    "submit": lambda at: at.submit(None, "tcp://127.0.0.1:1", "key"),  # type: ignore[arg-type]
+    "unfit": lambda at: at._unfit(["tcp://127.0.0.1:1"]),
+}
+
+
+@pytest.mark.parametrize("call", LATER)
+def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> None:
+    how = {"n_workers": 0, "processes": False, "protocol": "tcp://", "dashboard_address": None}
+    with distributed.LocalCluster(**how) as cluster:
+        at = ClusterWorkers(cluster.scheduler_address, Listens(), "topic")  # type: ignore[arg-type]
+    caplog.clear()
+    began_s = time.monotonic()
+
+    def ask() -> None:
+        while time.monotonic() - began_s < SOON_S:  # it may take a moment to be heard of
+            LATER[call](at)
+
+    with pytest.raises(BatchError, match=r"is gone .*the same command goes on") as refusal:
+        ask()
+    assert time.monotonic() - began_s < SOON_S
+    assert "\n" not in str(refusal.value)
+    assert at.is_gone
+    at.close()
+    assert [x for x in caplog.records if x.levelno >= logging.WARNING] == []
+
+
+def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
+    cluster = Cluster("tcp://127.0.0.1:1", Listens())  # type: ignore[arg-type]
+    errand: Any = SimpleNamespace(name="look", kind="answer")
+    for came, is_told in (
+        (Done("look", "answer", ""), False),
+        (["0" * 64], False),
+        ([1], True),
+        (None, True),
+        (Done("other", "answer", ""), True),
+        (Done("look", "answer", "", files={"a": "text"}), True),  # type: ignore[dict-item]
+    ):
+
+        def result(timeout: float, its: Any = came) -> Any:
+            return its
+
+        sent: Any = SimpleNamespace(
+            errand=errand, worker="w", future=SimpleNamespace(result=result, status="finished")
+        )
+        found = cluster._came(sent)
+        told = isinstance(found, Done) and "answers with something else" in found.failure
+        assert told is is_told
+
+
+def test_what_others_say_under_our_topic_is_passed_over() -> None:
+    cluster = Cluster("tcp://127.0.0.1:1", Listens())  # type: ignore[arg-type]
+    events = [{"errand": "a", "worker": "w"}, {}, None, {"errand": 1, "worker": "w"}, "text"]
+    cluster._at = SimpleNamespace(events=deque(events))  # type: ignore[assignment]
+    cluster._hear()
+    assert cluster.begun == [("a", "w")]
+
+
+@pytest.mark.parametrize("record", [b"{}", b"junk", b"\xff", b'{"answers": 3}', b"[1]", b"[]"])
+def test_a_record_that_is_none_is_one_line(tmp_path: Path, record: bytes) -> None:
+    errand: Any = SimpleNamespace(writes=str(tmp_path / "look"), kind="answer")
+    with pytest.raises(OutputError, match=r"a worker's result.json is damaged"):
+        unpack(errand, {"result.json": record, "lighting.json": b"{}"})
+    assert not (tmp_path / "look").exists()
