@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,13 @@ class Fox:
             awaitPromise=True,
         )
         return json.loads(found["result"]["value"]) if found["type"] == "success" else None
+
+    def new_tab(self) -> None:
+        self.tab = self.ask("browsingContext.create", type="tab")["context"]
+
+    def reads(self, text: str) -> bool:
+        """Whether the page shows it."""
+        return bool(self.look(f"return document.body.innerText.includes({json.dumps(text)})"))
 
     def errors(self) -> list[str]:
         """What the console has shown."""
@@ -194,3 +202,8 @@ def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_pa
         fox.open(painter)
         until(lambda: fox.look("return work.isReady && screen.width > 0"), "it does not go on")
         until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not there")
+        # The address alone opens nothing; with its token it opens a second tab.
+        fox.new_tab()
+        for address, said in ((painter, "does not know this page"), (url, "open in another tab")):
+            fox.open(address)
+            until(partial(fox.reads, said), f"it does not say: {said}")

@@ -25,7 +25,8 @@ export class Entry {
   /** Where the page came from. @param {string | URL} base */
   constructor(base) {
     this.url = new URL('key', new URL('.', base));
-    this.token = takenToken();
+    /** Until it is exchanged, or refused. @type {string | null} */
+    this.token = tokenIn(location.hash);
     // Who is given a new address in the same tab stays on the page: only its fragment changes.
     addEventListener('hashchange', () => {
       if (tokenIn(location.hash)) location.reload();
@@ -38,8 +39,10 @@ export class Entry {
     const answer = await fetch(this.url, { ...shown(this.token), cache: 'no-store' });
     if (!answer.ok && !REFUSALS.includes(answer.status)) throw new Error(await answer.text());
     const key = answer.ok ? await answer.text() : kept();
-    this.token = null;
     if (key !== null) keep(key);
+    this.token = null;
+    // Nobody who looks at the page, or at what its browser remembers, is to see it.
+    history.replaceState(history.state, '', location.pathname + location.search);
     return key;
   }
 }
@@ -47,13 +50,6 @@ export class Entry {
 /** @param {string} fragment of an address */
 function tokenIn(fragment) {
   return new URLSearchParams(fragment.slice(1)).get('token');
-}
-
-/** The token of this page, which its address has no longer. */
-function takenToken() {
-  const token = tokenIn(location.hash);
-  if (token) history.replaceState(history.state, '', location.pathname + location.search);
-  return token;
 }
 
 function kept() {
