@@ -8,12 +8,14 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.progress import Listener
+from lightpaint.relit.export.colors import with_own_colors
 from lightpaint.relit.export.exports import blender_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
 from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.patch import emitters_of, scene_patch
+from lightpaint.relit.relight import scene_of
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
@@ -72,6 +74,24 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
     if source.stage is not None and "usd" not in names:
         raise LightpaintError("stage=... is of the form usd: leave it out, or add that")
     return names
+
+
+def exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
+    """Return the lighting as other programs get it: what cannot be told keeps its own colour.
+
+    And what is to be said of that; "" where nothing is. Raises LightingError for a lighting of
+    another scene.
+    """
+    if source.scene is None:
+        return lighting, ""
+    tied = scene_of(source.scene, lighting)
+    made, names = with_own_colors(lighting, {light.name: light.emission for light in tied.lights})
+    if not names:
+        return made, ""
+    return made, (
+        f"the painting does not tell the colour of {some_names(names)}: other programs get the "
+        "one in the scene"
+    )
 
 
 def writer_of(

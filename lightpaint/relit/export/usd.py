@@ -66,9 +66,6 @@ def usd_overrides(
     layer = Sdf.Layer.CreateAnonymous(".usda")
     over = Usd.Stage.Open(layer)
     layer.comment = about
-    if stage is not None:
-        layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
-        _like(layer, stage)
     left = []
     for name, parameter, emission in emitters:
         identifier = Tf.MakeValidIdentifier(name)
@@ -80,6 +77,11 @@ def usd_overrides(
             continue
         [(path, kind)] = places.items()
         _override(over.OverridePrim(path), kind, parameter, emission)
+    if stage is not None:
+        # As soon as it is there, an open stage would look for it, from a layer that is nowhere yet.
+        del over
+        layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
+        _like(layer, stage)
     return Overrides(layer.ExportToString(), tuple(left))
 
 

@@ -137,3 +137,16 @@ def test_without_a_stage_lights_are_in_one_place(tmp_path: Path) -> None:
     found = layer.GetPrimAtPath("/lights/key_light")
     np.testing.assert_allclose(shine(found) / 4, RGB, rtol=FLOAT32)
     assert layer.GetPrimAtPath("/lights/panel")
+
+
+def test_a_layer_over_a_stage_elsewhere_warns_of_nothing(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    made_stage(tmp_path / "hall.usda")
+    made = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path / "looks" / "evening")
+    assert capfd.readouterr() == ("", "")
+    (tmp_path / "looks" / "evening").mkdir(parents=True)
+    (tmp_path / "looks" / "evening" / "lights.usda").write_text(made.text, encoding="utf-8")
+    opened = Usd.Stage.Open(str(tmp_path / "looks" / "evening" / "lights.usda"))
+    assert opened.GetPrimAtPath("/hall/wall").IsA(UsdGeom.Mesh)
+    assert capfd.readouterr() == ("", "")
