@@ -52,7 +52,8 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
 def test_snippets_of_python_run_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    pytest.importorskip("anywidget", reason="anywidget")
+    for library in ("anywidget", "pandas", "xarray"):
+        pytest.importorskip(library, reason=library)
     text = (ROOT / "docs" / "python.md").read_text()
     snippets = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len(snippets) > 5

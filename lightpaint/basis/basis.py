@@ -3,12 +3,13 @@
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats
+from lightpaint.colour.color import luminance
 from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import BasisError
 from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
@@ -17,6 +18,7 @@ from lightpaint.images.objects import Objects
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights_file import Asked
 from lightpaint.screen import Listed, Shown, some_names, some_of
+from lightpaint.tables import CHANNELS, by_channel, pandas, xarray
 from lightpaint.version import __version__
 
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -175,6 +177,53 @@ class Basis(Shown):
         samples = f"{origin.spp} spp" if self.knows_noise else "noise unknown"
         about = f"{len(self.lights)} lights, {width}x{height}, {samples}, of {origin.scene}"
         return f"Basis({about}: {some_of(self.names, room=400)})"
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas.DataFrame with a row for each light, by its name.
+
+        red, green, blue: its present emission, linear Rec.709 in `unit`. mean: luminance of its
+        image at that emission, over all pixels. Raises LightpaintError without pandas.
+        """
+        means = self.images.mean(axis=(1, 2), dtype=np.float64) * self.present_weights
+        rows = [
+            {
+                "plugin": light.plugin,
+                "parameter": light.parameter,
+                "unit": light.unit,
+                **by_channel("", light.emission),
+                "mean": float(luminance(mean)),
+                "form": light.form,
+                "is_fixed": light.is_fixed,
+                "is_scalar": light.is_scalar,
+                "members": ", ".join(light.members),
+            }
+            for light, mean in zip(self.lights, means, strict=True)
+        ]
+        return pandas().DataFrame(rows, index=pandas().Index(self.names, name="light"))
+
+    def to_xarray(self) -> Any:
+        """Return an xarray.Dataset of the images and their noise, with lights by name.
+
+        images, half_differences: (light, y, x, channel), as of the attributes, and not copied.
+        present: (light, channel), weights of the present look. emitters_seen: (y, x). Raises
+        LightpaintError without xarray.
+        """
+        planes = ("light", "y", "x", "channel")
+        return xarray().Dataset(
+            {
+                "images": (planes, self.images),
+                "half_differences": (planes, self.half_differences),
+                "present": (("light", "channel"), self.present_weights),
+                "emitters_seen": (("y", "x"), self.emitters_seen),
+            },
+            coords={"light": list(self.names), "channel": list(CHANNELS)},
+            attrs={
+                "scene": self.origin.scene,
+                "sensor": self.origin.sensor,
+                "spp": self.origin.spp,
+                "seed": self.origin.seed,
+            },
+        )
 
     @cached_property
     def names(self) -> tuple[str, ...]:

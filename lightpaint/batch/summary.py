@@ -52,6 +52,9 @@ COLUMNS = (
     "why",
 )
 
+#: What stands behind its name in the columns of a light: luminance, emission, kelvin.
+LIGHT_COLUMNS = ("", " R", " G", " B", " K")
+
 State = Literal["done", "failed", "waiting"]
 
 
@@ -243,16 +246,28 @@ def summary_json(rows: Iterable[Row]) -> str:
 
 
 def summary_csv(rows: list[Row]) -> str:
-    """summary.csv: a line for each row, and a column for the luminance of each light."""
+    """Return summary.csv: a line for each row, and five columns for each light.
+
+    These are the luminance of its emission, under its name, that in R, G and B, and its colour
+    temperature in kelvin, where it has one.
+    """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow([*COLUMNS, *map(plain_cell, names)])
+    columns = [f"{name}{ending}" for name in names for ending in LIGHT_COLUMNS]
+    table.writerow([*COLUMNS, *map(plain_cell, columns)])
     for row in rows:
-        lights = {light.name: f"{light.y:.6g}" for light in row.lights}
+        lights = {light.name: _light_cells(light) for light in row.lights}
         cells = [_cell(getattr(row, column)) for column in COLUMNS]
-        table.writerow([*cells, *(lights.get(name, "") for name in names)])
+        none = [""] * len(LIGHT_COLUMNS)
+        table.writerow([*cells, *(x for name in names for x in lights.get(name, none))])
     return text.getvalue()
+
+
+def _light_cells(light: LightRow) -> list[str]:
+    rgb = light.emission or ("", "", "")
+    kelvin = "" if light.kelvin is None else f"{light.kelvin:.0f}"
+    return [f"{light.y:.6g}", *(x if x == "" else f"{x:.6g}" for x in rgb), kelvin]
 
 
 def _cell(value: Any) -> str:

@@ -1,5 +1,6 @@
 """The answer: named lights with their emissions."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,6 +19,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.screen import Shown, some_names, some_of
+from lightpaint.tables import CHANNELS, by_channel, number, pandas, xarray
 
 
 @keywords()
@@ -113,6 +115,60 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             cd_per_unit=self.cd_per_unit,
         )
         return seen.without_colour() if light.is_partly_reached else seen
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas.DataFrame with a row for each light, by its name.
+
+        red, green, blue: its emission, linear Rec.709 in `unit`, with error_… and the ends
+        lower_… and upper_… of the 95 % interval where they are known. y: luminance of the emission.
+        kelvin, duv, hex: its colour, where it has one. Raises LightpaintError without pandas.
+        """
+        rows = [self._row(light) for light in self.lights]
+        return pandas().DataFrame(rows, index=pandas().Index([*self], name="light"))
+
+    def _row(self, light: LightSetting) -> dict[str, Any]:
+        seen, nothing = self.photometry(light), (None, None, None)
+        errors = [number(x) for x in light.standard_error or nothing]
+        ends = [x or (math.nan, math.nan) for x in light.interval or nothing]
+        return {
+            **by_channel("", light.emission),
+            "unit": light.unit,
+            "y": seen.y,
+            "kelvin": number(seen.kelvin),
+            "duv": number(seen.duv),
+            "hex": seen.hex,
+            **by_channel("error", errors),
+            **by_channel("lower", [x[0] for x in ends]),
+            **by_channel("upper", [x[1] for x in ends]),
+            "constraint": light.constraint,
+            "is_active": light.is_active,
+            "is_fixed": light.is_fixed,
+            "untold": light.untold,
+            "plugin": light.plugin,
+            "members": ", ".join(light.members),
+        }
+
+    def to_xarray(self) -> Any:
+        """Return an xarray.Dataset: emission, weight and error, (light, channel).
+
+        error: standard error of the emission, NaN where nothing tells. Raises LightpaintError
+        without xarray.
+        """
+        errors = [light.standard_error or (None, None, None) for light in self.lights]
+        dims = ("light", "channel")
+        return xarray().Dataset(
+            {
+                "emission": (dims, np.array([x.emission for x in self.lights], np.float64)),
+                "weight": (dims, np.array([x.weight for x in self.lights], np.float64)),
+                "error": (dims, np.array(errors, np.float64)),
+            },
+            coords={
+                "light": [*self],
+                "channel": list(CHANNELS),
+                "unit": ("light", [x.unit for x in self.lights]),
+            },
+            attrs={"target": self.target},
+        )
 
     def with_emission(self, name: str, emission: RGB) -> "Lighting":
         """This lighting with another RGB emission for one light, and no claim to be optimal.

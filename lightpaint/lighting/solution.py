@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
 from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.fit import Space
@@ -16,6 +17,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import Reweighting
 from lightpaint.screen import Shown
+from lightpaint.tables import CHANNELS, by_channel, xarray
 
 
 @keywords()
@@ -112,6 +114,48 @@ class Solution(Shown):
         """What shows how good the solve is."""
         assert self.lighting.certificate is not None
         return self.lighting.certificate
+
+    def to_dataframe(self) -> Any:
+        """Return what `Lighting.to_dataframe` does, and how each light was.
+
+        was_red, was_green, was_blue: its emission in the scene. stops: by how many its luminance
+        changed, -inf for what is off now. Raises LightpaintError without pandas.
+        """
+        table = self.lighting.to_dataframe()
+        was = np.array([light.emission for light in self.basis.lights], np.float64)
+        for name, values in by_channel("was", was.T).items():
+            table[name] = values
+        with np.errstate(divide="ignore", invalid="ignore"):  # of what was off, or is
+            table["stops"] = np.log2(table["y"].to_numpy() / luminance(was))
+        return table
+
+    def to_xarray(self) -> Any:
+        """Return an xarray.Dataset of the linear problem and its answer, with lights by name.
+
+        M: (channel, light, other), ⟨Φ_i, Φ_j⟩. b: (channel, light), ⟨Φ_i, Ψ⟩. weights, present:
+        (light, channel). Of one view also target, predicted: (y, x, channel), and importance:
+        (y, x); of several, `views` has those of each. Where the loss is no squares of light, M, b
+        and target are of the squares that stand for it at the answer. Raises LightpaintError
+        without xarray.
+        """
+        lit, basis = ("light", "channel"), self.basis
+        arrays: dict[str, Any] = {
+            "M": (("channel", "light", "other"), self.equations.M),
+            "b": (("channel", "light"), self.equations.b),
+            "weights": (lit, self.weights),
+            "present": (lit, basis.present_weights),
+        }
+        if len(self.problem.views) == 1:
+            picture = ("y", "x", "channel")
+            arrays["target"] = (picture, self.image)
+            arrays["predicted"] = (picture, basis.mix(self.weights))
+            arrays["importance"] = (picture[:2], self.importance)
+        names = list(basis.names)
+        return xarray().Dataset(
+            arrays,
+            coords={"light": names, "other": names, "channel": list(CHANNELS)},
+            attrs={"target": self.problem.name, "space": self.space},
+        )
 
     def told(self, **about: Any) -> "Solution":
         """The same, with this in its certificate."""

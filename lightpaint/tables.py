@@ -1,0 +1,40 @@
+"""Tables of pandas and labelled arrays of xarray, of which neither is needed for anything else."""
+
+import math
+from importlib import import_module
+from typing import Any
+
+from lightpaint.errors import LightpaintError
+
+#: Names of the colour channels, linear Rec.709.
+CHANNELS = ("red", "green", "blue")
+
+
+def pandas() -> Any:
+    """Return the module. Raises LightpaintError where it is not installed."""
+    return _module("pandas")
+
+
+def xarray() -> Any:
+    """Return the module. Raises LightpaintError where it is not installed."""
+    return _module("xarray")
+
+
+def by_channel(name: str, values: Any) -> dict[str, Any]:
+    """Return a column for each channel: `{"red": ...}`, or `{"error_red": ...}` of a name."""
+    lead = f"{name}_" if name else ""
+    return {f"{lead}{channel}": values[k] for k, channel in enumerate(CHANNELS)}
+
+
+def number(value: float | None) -> float:
+    """Return NaN for None, by which a column of numbers stays one."""
+    return math.nan if value is None else float(value)
+
+
+def _module(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise LightpaintError(
+            f"this needs {name}, which is not installed: pip install 'lightpaint[tables]' ({error})"
+        ) from None
