@@ -3,6 +3,7 @@
     python benchmarks/intent.py [--scenes gallery stage cornell] [--styles spot blob all full]
                                 [--cases 12] [--first 0] [--settings literal default ...] [--clean]
                                 [--few 2 4]
+    python benchmarks/intent.py --loosen [--scenes ...] [--styles ...] [--cases ...] [--first ...]
 
 A case means a lighting: the present one with one to three lights changed by 1 to 2.5 stops, up or
 down, most of them warmer or cooler, in a quarter of the cases everything else dimmed by 1 to 3
@@ -14,6 +15,9 @@ not: mean CIEDE2000 between the answer and what was meant, at the exposure of th
 
 The last rows are of bases of few samples, as the painter has at first: painted over the denoised
 look of that basis, judged by the one of many.
+
+With --loosen only those cases count in which the hold keeps the lights from the paint, and what is
+judged is how far it should be loosened: until it brings so much of what no hold would.
 
 Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports 12 to 23.
 """
@@ -34,10 +38,14 @@ from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.difference import delta_e
 from lightpaint.images.denoise import denoised
+from lightpaint.lighting.analysis import held_back
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "cornell": "64x64"}
 SPP = 256
+
+#: Of what no hold would bring, what a weaker one is to bring.
+SHARES = (0.3, 0.5, 0.7, 0.9)
 
 STYLES = ("spot", "blob", "all", "full")
 
@@ -94,8 +102,14 @@ def main() -> None:
     parser.add_argument(
         "--few", nargs="*", type=int, default=[2, 4], metavar="N", help="samples of noisy bases"
     )
+    parser.add_argument(
+        "--loosen", action="store_true", help="judge weaker holds, where the hold is in the way"
+    )
     options = parser.parse_args()
     for name in options.scenes:
+        if options.loosen:
+            loosened(name, options)
+            continue
         scene = lp.load_scene(SCENES / name / "scene.xml").reduced(SIZES[name])
         basis = obtain_basis(scene, spp=SPP)
         print(f"\n{name} {SIZES[name]}, {SPP} spp, cases {options.first} to ", end="")
@@ -131,6 +145,30 @@ def main() -> None:
                 for style, its in cases.items()
             }
             row(f"default, {spp} spp", found, nothing)
+
+
+def loosened(name: str, options: argparse.Namespace) -> None:
+    """Print the mean ΔE of the advised hold, and of what other shares would have advised."""
+    scene = lp.load_scene(SCENES / name / "scene.xml").reduced(SIZES[name])
+    basis = obtain_basis(scene, spp=SPP)
+    found = []
+    for style in options.styles:
+        for k in range(options.first, options.first + options.cases):
+            case = painted(basis, style, np.random.default_rng([STYLES.index(style), k]))
+            solution = lp.solve(basis, case.target)
+            seen = lp.what_is_seen(solution)
+            if not any(reason.kind == "hold" for reason in seen.causes):
+                continue
+            holds = [solution.problem.fit.hold]
+            for share in SHARES:
+                held_back.GRADUALLY = share
+                hold = next(x for x in held_back.reasons_of(solution) if x.kind == "hold")
+                holds.append(hold.loosening.hold if hold.loosening else holds[0])
+            answers = [answer(basis, case, {"hold": hold}) for hold in [*holds, 0.0]]
+            found.append([case.judged(x) for x in (case.current, *answers)])
+    names = ("doing nothing", "held", *(f"{100 * share:.0f} %" for share in SHARES), "let go")
+    told = zip(names, np.mean(found, axis=0), strict=True)
+    print(f"{name}, {len(found)} cases: " + ", ".join(f"{n} {x:.2f}" for n, x in told), flush=True)
 
 
 def row(

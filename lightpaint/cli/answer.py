@@ -1,6 +1,7 @@
 """What `lightpaint solve` prints of an answer: for people, or with everything there is."""
 
 from dataclasses import fields
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal
 
@@ -8,8 +9,12 @@ import numpy as np
 
 from lightpaint.basis.basis import BasisLight
 from lightpaint.cli import terminal
+from lightpaint.cli.options import BY_OPTION
 from lightpaint.cli.tables import spoken_agreement
+from lightpaint.cli.words import spoken
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
+from lightpaint.lighting.analysis.hands import KEYS
+from lightpaint.lighting.analysis.held_back import Reason
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.report.colors import closer_choice
 from lightpaint.report.meant import spoken_meaning
@@ -18,6 +23,7 @@ from lightpaint.report.pictures import spoken_view
 from lightpaint.report.sentences import (
     how_sure,
     partly_reached,
+    spoken_cause,
     spoken_errors,
     spoken_percent,
     unreached_channels,
@@ -48,7 +54,7 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     """Print how near the answer is, what the lights do, and what was asked beside the painting."""
     terminal.tell(look.verdict)
     for sentence in _sentences(look, table):
-        terminal.tell(sentence)
+        terminal.tell(spoken(sentence))
     terminal.write("")
     if table == "full":
         _show_all(look)
@@ -81,11 +87,37 @@ def _sentences(look: Look, table: Table) -> list[str]:
     closer = [f"Other colours come closer: --colors {choice}."] if choice else []
     if table == "short":
         is_told = not look.analysis.seen.is_close
-        return [*(what_holds(look.diagnosis)[:1] if is_told else []), *closer]
-    told = [*what_is_missed(look.diagnosis), *closer]
+        return [*(_what_holds(look)[:1] if is_told else []), *closer]
+    told = [*what_is_missed(look.diagnosis, look.analysis.seen, holds=_what_holds(look)), *closer]
     if look.uncertainty is not None:
         told.append(how_sure(look.basis, look.solution, look.uncertainty))
     return told
+
+
+def _what_holds(look: Look) -> list[str]:
+    """What keeps the lights from the paint, what would bring most first, and by which option."""
+    if not look.analysis.seen.reasons:
+        return what_holds(look.diagnosis)
+    told = [_spoken_cause(look, reason) for reason in look.analysis.seen.reasons]
+    return [sentence for sentence in told if sentence][:2]
+
+
+def _spoken_cause(look: Look, reason: Reason) -> str:
+    """One of them; of what the command line asks of lights, what to leave out."""
+    said = spoken_cause(reason, weaker="--hold")
+    keys = KEYS.get(reason.kind, ())
+    options = [
+        f"--{'limit' if key == 'limits' else key} {name}"
+        for name, wish, where in look.solution.problem.constraints.lights
+        for key in keys
+        if key in wish
+        and key != "duv"
+        and where.startswith(BY_OPTION)
+        and any(name == light or fnmatchcase(light, name) for light in reason.names)
+    ]
+    if not options:
+        return said
+    return f"{said.removesuffix('.')}: leave out {some_names(options, joint=' and ')}."
 
 
 def spoken_settings(settings: Settings) -> str:

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from lightpaint.batch.how import How
     from lightpaint.job import Job
 
+#: Where what options ask of lights stands, as errors say it.
+BY_OPTION = "on the command line"
+
 #: Options that say how a scene is loaded, by the names that Python has for them.
 LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
 
@@ -406,7 +409,7 @@ def constraints_of(options: Namespace) -> Constraints:
         tie=options.tie,
         prefer_current=options.prefer_current,
         sparse=options.sparse,
-        where="on the command line",
+        where=BY_OPTION,
     )
 
 

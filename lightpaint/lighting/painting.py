@@ -86,14 +86,24 @@ def weight_of_rest(views: Views, fit: Fit) -> float:
 
     No more than one that is painted: where little is left, that does not rule the rest.
     """
+    return weight_between(*painted_and_rest(views), fit)
+
+
+def weight_between(painted: float, rest: float, fit: Fit) -> float:
+    """The same of Σ D and Σ (1 − D)."""
     if fit.unpainted or not fit.hold:
         return fit.unpainted
+    return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
+
+
+def painted_and_rest(views: Views) -> tuple[float, float]:
+    """Σ D and Σ (1 − D), the latter of the pixels in which no emitter is seen."""
     painted, rest = 0.0, 0.0
     for basis, target in zip(views.bases, views.targets, strict=True):
         a = target.importance.astype(np.float64)
         painted += float(a.sum())
         rest += float(np.maximum(1 - a, 0)[~basis.emitters_seen].sum())
-    return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
+    return painted, rest
 
 
 def joint_squares(views: Views, *, unpainted: float) -> Squares:

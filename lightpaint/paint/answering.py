@@ -66,15 +66,15 @@ class Answering:
         """What it is to be close, with nothing left open."""
         return self._fit(self.wishes)
 
-    @property
-    def settings(self) -> Settings:
-        """The same, with all that follows from the painting left open."""
-        return self.wishes.settings(self._settings)
+    def settings(self, wishes: Wishes | None = None) -> Settings:
+        """The same of `wishes`, of those there are by default, with all that follows from the
+        painting left open.
+        """
+        return (wishes or self.wishes).settings(self._settings)
 
-    @property
-    def constraints(self) -> Constraints:
-        """What is asked of the lights, beside what their scene asks."""
-        return self._given.and_then(self.wishes.constraints())
+    def constraints(self, wishes: Wishes | None = None) -> Constraints:
+        """What these ask of the lights, beside what their scene asks."""
+        return self._given.and_then((wishes or self.wishes).constraints())
 
     @property
     def basis(self) -> Basis:

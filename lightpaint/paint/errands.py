@@ -1,12 +1,14 @@
 """What somebody asks for that takes long: exports, the verifying render, why it is not closer."""
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import Any, Protocol
 
-from lightpaint.basis.clean import as_halves
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes, as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
@@ -32,8 +34,11 @@ class Home(Protocol):
     def version(self) -> int:
         """A number that grows with every change of what is painted and asked."""
 
-    def now(self) -> tuple[Moment, Lighting]:
-        """What is painted and asked, and the last answer."""
+    def now(self, wishes: Wishes | None = None) -> tuple[Moment, Lighting]:
+        """What is painted and asked, and the last answer. wishes: to be asked instead."""
+
+    def clean(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
+        """Clean planes of these, where they have been made."""
 
     def put(self, name: str, picture: Picture) -> None:
         """A picture from now on, of which pages are told."""
@@ -60,6 +65,7 @@ class Errands:
         self._place, self._threads = place, threads
         self._writes, self._renders = Lock(), Lock()
         self._seen: dict[int, tuple[int, dict[str, Any]]] = {}  # renders, by view: of which version
+        self._foreseen = 0  # number of the last preview that was asked for
         self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
         self._stops = 0  # how often somebody has stopped what is written
 
@@ -86,6 +92,16 @@ class Errands:
         what = type(message).__name__.lower()
         self._threads.later(lambda: works[type(message)](message), what)
         return [Message("started", {"what": what})]
+
+    def foresee(self, message: protocol.Preview, wishes: Wishes) -> list[Message]:
+        """Begin to find what a change would do. Raises PaintError for a view that there is none of.
+
+        wishes: what would be asked then. Of two such messages the later one counts.
+        """
+        self._subject(message.view)
+        self._foreseen = message.number
+        self._threads.later(lambda: self._foresee(message, wishes), "preview")
+        return [Message("started", {"what": "preview"})]
 
     def command(self, sensors: Sequence[str], wishes: Wishes) -> str:
         """The command that answers exported paintings alike, where there are commands."""
@@ -184,6 +200,22 @@ class Errands:
         self._seen[view] = moment.version, about
         is_old = self._place.version != moment.version
         self._place.tell(Message("verified", about | {"is_old": is_old}))
+
+    def _foresee(self, asked: protocol.Preview, wishes: Wishes) -> None:
+        def check() -> None:
+            if self._foreseen != asked.number:
+                raise StoppedError
+
+        with suppress(StoppedError), while_wanted(check):
+            proposed, now = self._place.now(wishes)
+            weights = now.weights_for(proposed.bases[0])
+            clean = self._place.clean(proposed.bases)[asked.view]
+            found = proposed.foresight(weights, asked.view, clean=clean)
+            check()
+            is_old = self._place.version != proposed.version
+            about = {"number": asked.number, "view": asked.view, "is_old": is_old}
+            pictures = {"before": found.before, "after": found.after}
+            self._place.tell(Message("previewed", {**about, **found.fields}, pictures))
 
     def _explain(self, asked: protocol.Explain) -> None:
         moment, _ = self._place.now()

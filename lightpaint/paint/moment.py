@@ -6,15 +6,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.analysis.elsewhere import what_changes
+from lightpaint.lighting.analysis.looking import Looking
+from lightpaint.lighting.analysis.seen import NOTICED
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.paint.told import why_not_closer
+from lightpaint.paint.pictures import Picture, small_picture
+from lightpaint.paint.told import foreseen_fields, why_not_closer
 from lightpaint.paint.wishes import Wishes
 from lightpaint.settings import Settings
 from lightpaint.target.target import Target
@@ -92,3 +98,42 @@ class Moment:
         missed = np.abs(shown - transform.encode(target.image)).max(axis=-1)
         missed = np.where(target.importance > 0, np.clip(missed, 0, 1), 0)
         return why_not_closer(analysis), np.round(255 * missed).astype(np.uint8)
+
+    def foresight(
+        self, weights: Doubles, view: int = 0, *, clean: CleanPlanes | None = None
+    ) -> "Foresight":
+        """Find what the answer to this would change of the one there is, (n, 3), in a view.
+
+        Where the view is not painted, how much closer another one comes is told. clean: planes of
+        the view without their grain, to be shown.
+        """
+        solution = self.solution()
+        after = weights if solution is None else solution.weights
+        planes, transform = clean or self.bases[view], self.transform
+        before, then = (small_picture(planes.mix(x), transform) for x in (weights, after))
+        if solution is None:
+            return Foresight(before, then, foreseen_fields(0.0, None, is_at_cost=False))
+        judged = view if view in self.painted else self.painted[0]
+        its = solution.views[self.painted.index(judged)]
+        look, target = Looking.at(its.problem), its.problem.views.targets[0]
+        pictures = [self.bases[judged].mix(x) for x in (weights, after)]
+        lights = [look.of(picture) for picture in pictures]
+        cost_now, cost_then = (look.mean(look.costs(light)) for light in lights)
+        closes = 1 - cost_then / cost_now if cost_now > 0 else 0.0
+        rest = what_changes(look, self.bases[judged], target.importance > 0, *pictures)
+        gained = look.mean(look.missed(lights[0])) - look.mean(look.missed(lights[1]))
+        is_at_cost = rest is not None and rest.worst > NOTICED and rest.delta_e > gained
+        return Foresight(before, then, foreseen_fields(closes, rest, is_at_cost=is_at_cost))
+
+
+@dataclass(frozen=True)
+class Foresight:
+    """What a change would do, before it is made.
+
+    before, after: (h, w, 3) uint8, small pictures of the answer as a display shows it. fields: what
+    a page is told of it.
+    """
+
+    before: Picture
+    after: Picture
+    fields: dict[str, Any]

@@ -11,7 +11,7 @@ of views but the first as `plane/3@1`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from lightpaint.paint.pixels import Region
@@ -105,6 +105,22 @@ class Set:
     """
 
     values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What a change would do, before it is made. Answered by `started`, later by `previewed`, with
+    small pictures of the answer now and then, `before` and `after` (h, w, 3) uint8.
+
+    number: of the preview, which the page counts; `previewed` gives it back. values, asked, ties:
+    as of `Set`, `AskAll` and `Tie`; null for ties as they are. view: whose pictures they are.
+    """
+
+    number: int
+    values: Mapping[str, Any] = field(default_factory=dict)
+    asked: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    ties: tuple[tuple[str, ...], ...] | None = None
+    view: int = 0
 
 
 @dataclass(frozen=True)
@@ -209,6 +225,7 @@ Said = (
     | AskAll
     | Tie
     | Set
+    | Preview
     | SaveLook
     | LoadLook
     | RenameLook
@@ -232,6 +249,7 @@ KINDS: Mapping[str, type[Any]] = {
     "ask_all": AskAll,
     "tie": Tie,
     "set": Set,
+    "preview": Preview,
     "save_look": SaveLook,
     "load_look": LoadLook,
     "rename_look": RenameLook,

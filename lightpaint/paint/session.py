@@ -137,12 +137,26 @@ class Session:
             over_look=True,
         )
 
-    def moment(self) -> Moment:
-        """What is painted and asked now."""
-        asked, bases = self.answering, tuple(view.basis for view in self.views)
+    def moment(self, wishes: Wishes | None = None) -> Moment:
+        """What is painted now, and asked: `wishes`, by default those there are."""
+        answering, bases = self.answering, tuple(view.basis for view in self.views)
+        asked = wishes or answering.wishes
         targets = tuple(self.target(k) for k in range(len(bases)))
-        what = asked.wishes, asked.settings, asked.constraints, self.transform
-        return Moment(self.version, bases, targets, *what)
+        how = answering.settings(asked), answering.constraints(asked), self.transform
+        return Moment(self.version, bases, targets, asked, *how)
+
+    def changed_by(self, change: protocol.Preview) -> Wishes:
+        """What would be asked after a change. Raises LightpaintError where it cannot be made."""
+        self._check_names(change.asked)
+        wishes = self.wishes.of_answer(change.values)
+        for name, asked in change.asked.items():
+            self._check_free(self.basis.lights[self.basis.names.index(name)])
+            wishes = wishes.of_light(name, asked)
+        if change.ties is not None:
+            self._check_names(name for names in change.ties for name in names)
+            wishes = wishes.of_ties(change.ties)
+        self.answering.check(wishes)
+        return wishes
 
     # What is said
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.clean import CleanPlanes
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
@@ -187,6 +188,8 @@ class Studio:
                     return [looks.said(message)]
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
                     return self._errands.said(message)
+                case protocol.Preview():
+                    return self._errands.foresee(message, session.changed_by(message))
                 case protocol.LoadLook():
                     made = looks.load(message)
                 case _:
@@ -199,10 +202,12 @@ class Studio:
         with self._lock:
             return self.session.moment()
 
-    def now(self) -> tuple[Moment, Lighting]:
-        """The same, and the last answer."""
+    def now(self, wishes: Wishes | None = None) -> tuple[Moment, Lighting]:
+        """The same, and the last answer. wishes: to be asked instead of what is asked now."""
         with self._lock:
-            moment, weights = self.session.moment(), self.session.weights
+            session = self.session
+            moment = session.moment() if wishes is None else session.moment(wishes)
+            weights = session.weights
         return moment, Lighting.of_weights(moment.bases[0], weights)
 
     def load(self, paintings: Mapping[int, Pixels], wishes: Wishes, label: str) -> list[Message]:
@@ -233,6 +238,10 @@ class Studio:
             with self._lock:
                 message = make()
             self.tell(message)
+
+    def clean(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
+        """Clean planes of these, where they have been made."""
+        return self._cleaning.shown(bases)
 
     def put(self, name: str, picture: Picture) -> None:
         """A picture from now on, of which the page is told."""

@@ -11,12 +11,16 @@ from lightpaint.basis.basis import Basis, BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analyse import Analysis
-from lightpaint.lighting.analysis.held_back import Held
-from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.analysis.diagnosis import parts_of_miss
+from lightpaint.lighting.analysis.elsewhere import Elsewhere
+from lightpaint.lighting.analysis.held_back import Reason
+from lightpaint.lighting.analysis.seen import UNSEEN, Seen
 from lightpaint.report.sentences import (
     MET,
-    parts_of_miss,
+    spoken_amount,
+    spoken_changed,
     spoken_errors,
+    spoken_part,
     spoken_percent,
     spoken_place,
     what_holds,
@@ -40,9 +44,10 @@ WAYS = (
 #: The same of an answer that is no closer to the paint than the present look.
 NOT_YET = "No closer than it is now"
 
-#: What to do about what holds the lights; a page has a button for each.
-HELP: dict[Held, str] = {
-    "hold": "Paint what may change too, or let it go.",
+#: What to do about what holds the lights; a page has a button for each, and for what was asked of
+#: lights.
+HELP: dict[str, str] = {
+    "hold": "Paint more, or loosen it.",
     "colors": "The settings allow any colour.",
 }
 
@@ -142,21 +147,40 @@ def unpainted_fields(*, is_asked: bool, is_white: bool) -> dict[str, Any]:
 
 
 def sketched(seen: Seen) -> str:
-    """How far a painting in progress has come, and what would bring it further: no judgement yet.
+    """Say how far a painting in progress has come, and what would bring it further: no judgement.
 
-    A sketch begins with a stroke, of which little can come about before more is said.
+    A sketch begins with a stroke, of which little can come about before more is said. What it does
+    to what is not painted is part of it.
     """
     if seen.is_close:
         return headline(seen)
-    far = next(words for least, words in WAYS if seen.share_met >= least)
-    said = f"{far}, {spoken_percent(seen.share_met)}" if seen.share_met else NOT_YET
+    said = _how_far(seen)
     if seen.place is None:
         return f"{said}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one is told when that has been seen to.
-    first = replace(seen, held=seen.held[:1])
+    first = replace(seen, reasons=seen.causes[:1])
     told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
-    helps = helped(seen)
-    return told if helps is None else f"{told} {HELP[helps]}"
+    cause = helped(seen)
+    if cause is None or cause.kind not in HELP:
+        return told
+    return f"{told} {HELP[cause.kind]}"
+
+
+def _how_far(seen: Seen) -> str:
+    """`About half of the way, 50 %, and changes the annex by ΔE 12`.
+
+    No praise where the rest has changed by more than the paint has come closer.
+    """
+    rest = seen.elsewhere if seen.changes_elsewhere else None
+    if seen.share_met < 0.005:  # which would be said as 0 %
+        said = NOT_YET
+    elif rest is not None and seen.is_at_cost:
+        cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
+        return f"{spoken_percent(seen.share_met)} of the way, at the cost of {cost}"
+    else:
+        far = next(words for least, words in WAYS if seen.share_met >= least)
+        said = f"{far}, {spoken_percent(seen.share_met)}"
+    return said if rest is None else f"{said}, and changes {spoken_changed(rest)}"
 
 
 def why_not_closer(analysis: Analysis) -> list[str]:
@@ -173,14 +197,31 @@ def why_not_closer(analysis: Analysis) -> list[str]:
     said = [f"Of what is missed (great misses count most), {shares}."]
     if seen.place is None and found.place is not None:
         said.append(spoken_place(found.place))
-    return said + what_holds(found)
+    return said + what_holds(found, seen)
 
 
-def helped(seen: Seen) -> Held | None:
-    """Which of HELP `sketched` advises, if it does."""
-    if seen.is_close or seen.place is None or not seen.held:
+def helped(seen: Seen) -> Reason | None:
+    """Return the reason that `sketched` names, where a person can take it away."""
+    if seen.is_close or seen.place is None or not seen.causes:
         return None
-    return seen.held[0] if seen.held[0] in HELP else None
+    first = seen.causes[0]
+    return None if first.kind == "views" else first
+
+
+def help_fields(seen: Seen) -> dict[str, Any] | None:
+    """The same for a page, whose button it is: what to let go of, and what that would bring.
+
+    closes: share of what is missed; None where it takes more than that. hold: the weaker one.
+    """
+    if (cause := helped(seen)) is None:
+        return None
+    fields: dict[str, Any] = {"kind": cause.kind, "names": list(cause.names)}
+    if cause.kind != "hold":
+        return fields | {"closes": None if cause.is_joint else cause.share, "hold": None}
+    weaker = cause.loosening
+    if weaker is None:
+        return fields | {"closes": None, "hold": 0.0}
+    return fields | {"closes": weaker.share, "hold": weaker.hold}
 
 
 def _seen_fields(analysis: Analysis) -> dict[str, Any]:
@@ -188,8 +229,25 @@ def _seen_fields(analysis: Analysis) -> dict[str, Any]:
     seen = analysis.seen
     return {
         "headline": sketched(seen),
-        "help": helped(seen),
+        "help": help_fields(seen),
         "delta_e": seen.delta_e,
         "delta_e_asked": seen.asked,
-        "sentences": [] if seen.is_close else what_holds(analysis.diagnosis)[:2],
+        "sentences": [] if seen.is_close else what_holds(analysis.diagnosis, seen),
     }
+
+
+def foreseen_fields(closes: float, rest: Elsewhere | None, *, is_at_cost: bool) -> dict[str, Any]:
+    """Say what a change would bring, before it is made.
+
+    closes: share of what is missed that it takes away. rest: what it changes where nobody painted.
+    is_at_cost: whether that is more than it brings.
+    """
+    if closes >= 0.005:
+        said = f"Closes {spoken_percent(closes)} of what is missed"
+    else:
+        said = "Brings the answer no closer"
+    if rest is None or rest.worst < UNSEEN:
+        return {"text": f"{said}.", "is_at_cost": False}
+    told = f"{said}, and changes {spoken_changed(rest)}."
+    more = " That is more than it brings." if is_at_cost else ""
+    return {"text": told + more, "is_at_cost": is_at_cost}

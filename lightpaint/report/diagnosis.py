@@ -9,6 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solution import Solution
@@ -90,12 +91,17 @@ def _steps(solution: Solution) -> str:
 
 
 def missed_section(
-    solution: Solution, diagnosis: Diagnosis | None, current: Floats, *, transform: ViewTransform
+    solution: Solution,
+    diagnosis: Diagnosis | None,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    seen: Seen | None = None,
 ) -> str:
     """Why it does not look like the painting: sentences, shares, maps and bounds."""
     if diagnosis is None:
         return ""
-    sentences = "".join(f"<p>{escape(text)}</p>" for text in what_is_missed(diagnosis))
+    sentences = "".join(f"<p>{escape(text)}</p>" for text in what_is_missed(diagnosis, seen))
     return (
         f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"
@@ -192,7 +198,8 @@ def _bounds(diagnosis: Diagnosis) -> str:
     more = diagnosis.bounds_left_out
     others = f"<p>{more} more seem to matter less, and were not looked into.</p>" if more else ""
     meaning = (
-        "<p>What would be gained if one of these alone were let go, and all others stayed. "
+        "<p>What would be gained if one of these alone were let go, and all others stayed, of all "
+        "that counts, also of what is held unpainted. "
         "A light that is kept, locked, limited, coloured or tied would then have any emission; one "
         "that is off for no other reason would go below zero and so take light away: a hint at "
         "which other lights spill where they should not.</p><p>At first: how the objective would "

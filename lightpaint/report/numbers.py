@@ -16,6 +16,8 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.elsewhere import Elsewhere
+from lightpaint.lighting.analysis.held_back import Reason
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.lighting import Lighting
@@ -130,7 +132,27 @@ def _seen(seen: Seen) -> dict[str, Any]:
         "object": place.object or None if place else None,
         "held": seen.held or None,
         "held_by_views": seen.held_by_views or None,
+        "reasons": [_reason(reason) for reason in seen.reasons] or None,
+        "elsewhere": _elsewhere(seen.elsewhere),
     }
+
+
+def _reason(reason: Reason) -> dict[str, Any]:
+    """One thing that keeps the lights from the paint, and the share of the miss that it is."""
+    told: dict[str, Any] = {"kind": reason.kind, "names": reason.names or None}
+    told |= {"share": reason.share, "is_joint": reason.is_joint or None}
+    if (its := reason.loosening) is not None:
+        told |= {"weaker_hold": its.hold, "weaker_hold_share": its.share}
+        told |= {"weaker_hold_elsewhere": _elsewhere(its.elsewhere)}
+    return told
+
+
+def _elsewhere(rest: Elsewhere | None) -> dict[str, Any] | None:
+    """What becomes of what is not painted, in CIEDE2000."""
+    if rest is None:
+        return None
+    place = {"object": rest.object} if rest.object else {"region": rest.region}
+    return {"delta_e": rest.delta_e, "worst": rest.worst, **place}
 
 
 def _choice(choice: ColorChoice) -> dict[str, Any]:

@@ -94,7 +94,7 @@ def report_page(
             missed=missed,
         ),
         partial(_wipe, target, solution, looks, raw, transform=transform),
-        partial(missed_section, solution, diagnosis, current, transform=transform),
+        partial(missed_section, solution, diagnosis, current, transform=transform, seen=seen),
         partial(
             constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
         ),

@@ -8,7 +8,10 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place, parts_of_miss
+from lightpaint.lighting.analysis.elsewhere import Elsewhere
+from lightpaint.lighting.analysis.held_back import Reason
+from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.analysis.uncertainty import Uncertainty
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.lighting import Lighting
@@ -159,8 +162,14 @@ def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
     return int(np.ceil(exact / power) * power) if power >= 1 else int(np.ceil(exact))
 
 
-def what_is_missed(diagnosis: Diagnosis) -> list[str]:
-    """At most four sentences on why it does not look like the painting, the first first."""
+def what_is_missed(
+    diagnosis: Diagnosis, seen: Seen | None = None, *, holds: Sequence[str] | None = None
+) -> list[str]:
+    """Return at most four sentences on why it does not look like the painting, the main one first.
+
+    seen: what `what_is_seen` says, whose reasons go before what holds single lights. holds: other
+    words for what `what_holds` says.
+    """
     d = diagnosis
     if not (parts := parts_of_miss(d)):
         return [MET]
@@ -177,26 +186,21 @@ def what_is_missed(diagnosis: Diagnosis) -> list[str]:
     }
     shares = [f"{spoken_percent(share)} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
-    if d.place is not None and d.share(d.unreachable) >= SMALL:
+    is_told = seen is not None and seen.place is not None  # by the headline
+    if d.place is not None and not is_told and d.share(d.unreachable) >= SMALL:
         sentences.append(spoken_place(d.place))
-    return sentences + what_holds(d)
+    return [*sentences, *(what_holds(d, seen) if holds is None else holds)]
 
 
-def parts_of_miss(diagnosis: Diagnosis) -> dict[str, float]:
-    """Of what is missed the parts that are told, and their shares, the largest first.
+def what_holds(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]:
+    """Return at most two sentences on what holds the lights, what would bring most first.
 
-    None where the lights make what is painted.
+    seen: what `what_is_seen` says: the reasons that its headline names are told with their shares,
+    and others only where there are none.
     """
-    if diagnosis.missed < 0.01:
-        return {}
-    parts = ("unreachable", "forbidden", "compromise", "noise", "painting_noise")
-    shares = {part: diagnosis.share(getattr(diagnosis, part)) for part in parts}
-    told = sorted(shares.items(), key=lambda item: -item[1])
-    return {part: share for part, share in told if share >= 0.005}
-
-
-def what_holds(diagnosis: Diagnosis) -> list[str]:
-    """At most two sentences on what holds single lights, the largest gain first."""
+    if seen is not None and seen.reasons:
+        told = [spoken_cause(reason) for reason in seen.reasons]
+        return [sentence for sentence in told if sentence][:2]
     d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gained(bound) >= SMALL]
     to_switch_on = [
@@ -204,6 +208,77 @@ def what_holds(diagnosis: Diagnosis) -> list[str]:
     ]
     its = dict.fromkeys([*most, *to_switch_on[:1]])
     return [spoken_bound(bound, d.gained(bound)) for bound in its]
+
+
+#: What is asked of lights, and what would be without it: of one, and of several.
+WITHOUT = {
+    "off": ("switched off, as asked; switching it on", "switched off, as asked; switching them on"),
+    "lock": ("locked; adjusting it", "locked; adjusting them"),
+    "limits": ("at a limit; letting go of that", "at their limits; letting go of these"),
+    "colour": ("held to a colour; any other", "held to colours; any others"),
+    "tie": (
+        "on a dimmer with others; adjusting it by itself",
+        "on one dimmer; adjusting each by itself",
+    ),
+}
+
+#: The same of all lights together.
+WITHOUT_ALL = {
+    "colors": 'Lamps are not free in their colour; colors="free"',
+    "sparse": "Only so many lights may be on; more of them",
+    "prefer_current": "Lights are drawn to how they are now; not to do that",
+}
+
+
+def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
+    """What keeps the lights from the paint, and what would come of letting it go; "" of views.
+
+    weaker: what stands before the strength of a weaker hold.
+    """
+    gained = f"would take away {spoken_percent(reason.share)} of the miss"
+    if reason.is_joint:
+        gained += ", if what else is asked is let go, too"
+    if reason.kind in WITHOUT:
+        is_one = len(reason.names) == 1
+        lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
+        return f"{lights} {WITHOUT[reason.kind][not is_one]} {gained}."
+    if reason.kind in WITHOUT_ALL:
+        return f"{WITHOUT_ALL[reason.kind]} {gained}."
+    if reason.kind == "views":
+        return ""
+    held = "What is not painted is held near how it is;"
+    if (loosening := reason.loosening) is None:
+        return f"{held} letting it go {gained}."
+    share, rest = spoken_percent(loosening.share), loosening.elsewhere
+    cost = "" if rest is None else f", and change {spoken_changed(rest)}"
+    return f"{held} {weaker} {loosening.hold:g} would take away {share} of the miss{cost}."
+
+
+def spoken_changed(rest: Elsewhere) -> str:
+    """`the annex by ΔE 12`: what changes most of what is not painted, and how much."""
+    return f"{spoken_part(rest)} by ΔE {spoken_amount(rest.worst)}"
+
+
+def spoken_elsewhere(rest: Elsewhere | None) -> str:
+    """`What is not painted changes too, most of all the annex, by ΔE 12.`; "" where all is."""
+    return f"What is not painted changes too, most of all {_spoken_most(rest)}." if rest else ""
+
+
+def _spoken_most(rest: Elsewhere) -> str:
+    its = spoken_part(rest) if rest.object else spoken_ninth(rest.region)
+    return f"{its}, by ΔE {spoken_amount(rest.worst)}"
+
+
+def spoken_part(rest: Elsewhere) -> str:
+    """`the annex`, or what is in that part of the picture."""
+    if not rest.object:
+        return f"what is {spoken_ninth(rest.region)}"
+    return f"the {some_names([rest.object.replace('_', ' ').strip()])}"
+
+
+def spoken_amount(delta_e: float) -> str:
+    """`0.4`, `12`: a ΔE as it is said."""
+    return f"{delta_e:.0f}" if delta_e >= 9.5 else f"{delta_e:.1f}"
 
 
 def noise_of_painting(diagnosis: Diagnosis) -> str:
@@ -268,8 +343,13 @@ def spoken_hold(bound: Bound) -> str:
 
 def spoken_region(place: Place) -> str:
     """`in the middle`, `top left`: where in the picture."""
+    return spoken_ninth(place.region)
+
+
+def spoken_ninth(region: tuple[int, int]) -> str:
+    """The same of row and column, 0 to 2."""
     rows, columns = ("top", "middle", "bottom"), ("left", "middle", "right")
-    row, column = rows[place.region[0]], columns[place.region[1]]
+    row, column = rows[region[0]], columns[region[1]]
     if row == column == "middle":
         return "in the middle"
     if row == "middle":

@@ -5,23 +5,41 @@ import numpy as np
 from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.held_back import Held
+from lightpaint.lighting.analysis.held_back import Reason
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
-from lightpaint.report.sentences import spoken_difference, spoken_where
+from lightpaint.report.sentences import (
+    spoken_difference,
+    spoken_elsewhere,
+    spoken_percent,
+    spoken_where,
+)
 from lightpaint.screen import some_names
 
 #: Lights that a sentence names.
 NAMED = 2
 
-#: What is asked beside the painting, as what holds the lights back.
-HOLDING: dict[Held, str] = {
-    "hold": "what is not painted is held near how it is",
-    "colors": "lamps are not free in their colour",
-    "constraints": "some lights are locked, limited or left out",
+#: What is asked beside the painting, as what holds the lights back: of one light, and of several.
+HOLDING: dict[str, tuple[str, str]] = {
+    "hold": ("what is not painted is held near how it is",) * 2,
+    "colors": ("lamps are not free in their colour",) * 2,
+    "off": ("{} is switched off", "{} are switched off"),
+    "lock": ("{} is locked", "{} are locked"),
+    "limits": ("{} is at a limit", "{} are at their limits"),
+    "colour": ("{} is held to a colour", "{} are held to their colours"),
+    "tie": ("{} is on a dimmer with others", "{} are on one dimmer"),
+    "sparse": ("only so many lights may be on",) * 2,
+    "prefer_current": ("lights are drawn to how they are now",) * 2,
+    "views": ("view {} asks for other light", "views {} ask for other light"),
 }
+
+#: Names in one clause; of more it says how many.
+MOST_NAMED = 3
+
+#: Where no third of what is missed has one cause.
+NO_ONE_CAUSE = "for several reasons, of which none is a third of it"
 
 
 @keywords()
@@ -61,7 +79,15 @@ def verdict(
 
 
 def headline(seen: Seen) -> str:
-    """One sentence: whether the lights make what was painted, and what is out of reach."""
+    """Whether the lights make what was painted, what is missing and why, and what else changes.
+
+    A cause is named only if a third of what the fit misses is due to it.
+    """
+    told = spoken_elsewhere(seen.elsewhere) if seen.changes_elsewhere else ""
+    return f"{_of_the_paint(seen)} {told}".rstrip()
+
+
+def _of_the_paint(seen: Seen) -> str:
     if seen.is_close and not (seen.is_spot and seen.place):
         return "Close: it looks as painted."
     if seen.place is None:
@@ -71,7 +97,8 @@ def headline(seen: Seen) -> str:
         change = spoken_difference(seen.place.painted, seen.place.reached)
         painted = f"{where} it is painted {change} than they make it"
         return f"{_manner(seen)}: {painted}; {spoken_reason(seen)}."
-    return f"{_manner(seen)} the {spoken_missing(seen)} is out of reach: {spoken_reason(seen)}."
+    state = "is out of reach" if not seen.causes and seen.is_beyond else "is missing"
+    return f"{_manner(seen)} the {spoken_missing(seen)} {state}: {spoken_reason(seen)}."
 
 
 def _manner(seen: Seen) -> str:
@@ -80,11 +107,9 @@ def _manner(seen: Seen) -> str:
     if not seen.is_far:
         return "Part of the way, but"
     # It would not be true of the lights where something else holds them.
-    return (
-        "What else is asked keeps the lights from this"
-        if seen.held or _are_kept(seen)
-        else ("These lights cannot make this")
-    )
+    if seen.causes or _are_kept(seen):
+        return "What else is asked keeps the lights from this"
+    return "These lights cannot make this" if seen.is_beyond else "The lights do not make this"
 
 
 def spoken_missing(seen: Seen) -> str:
@@ -96,12 +121,13 @@ def spoken_missing(seen: Seen) -> str:
 
 
 def spoken_reason(seen: Seen) -> str:
-    """What keeps the lights from the place where most is missed."""
+    """What keeps the lights from the place where most is missed: the main cause first."""
     assert seen.place is not None
-    if seen.held:
-        said = HOLDING | {"views": _spoken_views(seen.held_by_views)}
-        *most, last = (said[one] for one in seen.held)
+    if seen.causes:
+        *most, last = (spoken_holding(reason) for reason in seen.causes)
         return f"{', '.join(most)}, and {last}" if most else last
+    if not seen.is_beyond:
+        return spoken_noise(seen) or NO_ONE_CAUSE
     if not seen.there:
         return "no light gets there"
     some, is_one = _spoken_some(seen.there)
@@ -116,6 +142,29 @@ def spoken_reason(seen: Seen) -> str:
     return f"{_spoken_some(free)[0]} would light too much else"
 
 
+def spoken_holding(reason: Reason) -> str:
+    """`annex_window is switched off`: one thing that keeps the lights from the paint."""
+    one, several = HOLDING[reason.kind]
+    if len(reason.names) > MOST_NAMED and reason.kind == "views":
+        return "other views ask for other light"
+    if len(reason.names) > MOST_NAMED:
+        which = f"{len(reason.names)} lights"
+    else:
+        *most, last = [some_names([name]) for name in reason.names] or [""]
+        which = f"{', '.join(most)} and {last}" if most else last
+    return (one if len(reason.names) == 1 else several).format(which)
+
+
+def spoken_noise(seen: Seen) -> str:
+    """Which noise a third of what is missed is; "" where it is less."""
+    share = spoken_percent(seen.parts.get(seen.noise_that_counts, 0.0))
+    if seen.noise_that_counts == "noise":
+        return f"{share} of what is missed is noise of the samples"
+    if seen.noise_that_counts == "painting_noise":
+        return f"{share} of what is missed is finer than light can be"
+    return ""
+
+
 def _are_kept(seen: Seen) -> bool:
     """Whether no light does much for the place but what something asked of it holds back."""
     is_short = seen.place is not None and seen.does_much and not is_darker(seen)
@@ -125,15 +174,6 @@ def _are_kept(seen: Seen) -> bool:
 def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
     """The first two, and whether there is one only."""
     return some_names(names[:2], joint=" and "), len(names) == 1
-
-
-def _spoken_views(names: tuple[str, ...]) -> str:
-    its = some_names(names, joint=" and ")
-    return (
-        f"view {its} asks for other light"
-        if len(names) == 1
-        else f"views {its} ask for other light"
-    )
 
 
 def is_darker(seen: Seen) -> bool:

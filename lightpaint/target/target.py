@@ -181,6 +181,17 @@ class Target(Shown):
             full_size_share=self.painted_share,
         )
 
+    def cropped(self, height: int, width: int) -> "Target":
+        """Its pixels from the top left corner on."""
+        part = (slice(height), slice(width))
+        return replace(
+            self,
+            image=self.image[part],
+            importance=self.importance[part],
+            at_least=None if self.at_least is None else self.at_least[part],
+            full_size_share=self.painted_share,
+        )
+
     def reduced(self, factor: int) -> "Target":
         """One pixel for each block of factor x factor: their mean, weighted by importance.
 

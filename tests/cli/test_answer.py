@@ -4,6 +4,7 @@ import re
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,13 @@ from rich.cells import cell_len
 from lightpaint.basis.basis import BasisLight
 from lightpaint.basis.file import write_basis
 from lightpaint.cli import main, terminal
-from lightpaint.cli.answer import change
+from lightpaint.cli.answer import _what_holds, change
+from lightpaint.cli.options import BY_OPTION
+from lightpaint.cli.words import spoken
 from lightpaint.images.exr import write_rgb
 from lightpaint.images.png import png_bytes
+from lightpaint.lighting.analysis.held_back import Loosening, Reason
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.setting import LightSetting
 
 PRESENT = [[0.5, 0.5, 0.5], [0.4, 0.3, 0.2], [0.2, 0.3, 0.4], [0, 0, 0]]
@@ -196,3 +201,24 @@ def test_what_became_of_a_light(now: Any, new: Any, said: str):
     light = BasisLight("x", "area", "radiance", "W/(m² sr)", now)
     assert change(light, _setting(*new)) == said
     assert change(light, replace(_setting(*new), reached=(False,) * 3)) == "kept"
+
+
+@pytest.mark.parametrize(
+    ("reason", "where", "said"),
+    [
+        (Reason("off", ("cove",), 0.57), BY_OPTION, ": leave out --off co*."),
+        (Reason("limits", ("key",), 0.5), BY_OPTION, ": leave out --limit key."),
+        (Reason("off", ("cove",), 0.57), "room.toml", "57 % of the miss."),  # of a lights file
+        (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "; --hold 0.8 would take away"),
+        (Reason("colors", (), 0.5), "", "; --colors free would take away 50 % of the miss."),
+    ],
+)
+def test_what_holds_the_lights_is_said_with_its_option(reason: Reason, where: str, said: str):
+    asked = {"co*": {"off": True}, "key": {"limits": {"max": 1}}}
+    constraints = Constraints.of(asked, where=where)
+    look = SimpleNamespace(
+        solution=SimpleNamespace(problem=SimpleNamespace(constraints=constraints)),
+        analysis=SimpleNamespace(seen=SimpleNamespace(reasons=(reason,))),
+    )
+    [sentence] = _what_holds(look)  # type: ignore[arg-type]
+    assert said in spoken(sentence)

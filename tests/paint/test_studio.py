@@ -1,5 +1,6 @@
 """A studio answers at once, says later what takes longer, and exports what `solve` finds."""
 
+import re
 import sqlite3
 import threading
 import time
@@ -18,7 +19,7 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import cleaning, exports, protocol, store, studio, subject
+from lightpaint.paint import cleaning, exports, pictures, protocol, store, studio, subject
 from lightpaint.paint.frames import Message
 from lightpaint.paint.moment import Moment
 from lightpaint.paint.session import Session
@@ -492,6 +493,60 @@ def test_why_it_is_not_closer(heard: Heard, monkeypatch: pytest.MonkeyPatch):
     assert explained().max() < 64
     heard.paint(2, 0.0, (3, 12, 10, 15))
     assert explained()[3:12, 10:15].max() > 128
+
+
+def test_a_preview_shows_what_the_change_does_then(heard: Heard, monkeypatch: pytest.MonkeyPatch):
+    """To the last pixel, where no clean planes are there; and nothing is done before."""
+    monkeypatch.setattr(cleaning.Cleaning, "shown", lambda _, bases: [None] * len(bases))
+    heard.paint(1, 1.2)
+    heard.paint(2, 0.02, (3, 12, 20, 30))
+    heard.exact()
+    studio = heard.studio
+    version, before = studio.session.version, studio.session.weights.copy()
+    for number, values in enumerate(({"hold": 0.5}, {"hold": 0.0}, {"colors": "white"})):
+        assert studio.said(protocol.Preview(number, values), {})[0].kind == "started"
+        seen = heard.wait(lambda m, n=number: m.kind == "previewed" and m.fields["number"] == n)
+        assert studio.session.version == version + 2 * number
+        np.testing.assert_array_equal(studio.session.weights, before)
+        assert not seen.fields["is_old"]
+        assert "of what is missed" in seen.fields["text"] or "no closer" in seen.fields["text"]
+        studio.said(protocol.Set(values), {})
+        heard.exact()
+        mixed = studio.session.views[0].basis.mix(studio.session.weights)
+        shown = pictures.small_picture(mixed, studio.session.transform)
+        np.testing.assert_array_equal(seen.arrays["after"], shown)
+        assert (seen.arrays["after"] != seen.arrays["before"]).any()
+        studio.said(protocol.Undo(), {})
+        heard.exact()
+    with pytest.raises(lp.LightpaintError, match="nothing is called 'holds'"):
+        studio.said(protocol.Preview(9, {"holds": 1}), {})
+
+
+def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: Heard):
+    """What the button sets brings what it says, and changes the rest less than no hold does."""
+    heard.paint(1, 1.2)
+    answer = heard.exact()
+    advised = answer.fields["help"]
+    assert advised is not None
+    assert advised["kind"] == "hold"
+    assert 0 < advised["hold"] < 3
+    [found] = [
+        heard.wait(lambda m: m.kind == "previewed" and m.fields["number"] == 1)
+        for _ in heard.studio.said(protocol.Preview(1, {"hold": advised["hold"]}), {})
+    ]
+    share = round(100 * advised["closes"])
+    told = re.match(r"Closes (\d+) % of what is missed", found.fields["text"])
+    assert told is not None
+    assert int(told[1]) == pytest.approx(share, abs=3)  # of enough pixels, not of all
+    changed = []
+    for hold in (advised["hold"], 0.0):
+        heard.studio.said(protocol.Set({"hold": hold}), {})
+        heard.exact()
+        session = heard.studio.session
+        view = session.views[0]
+        look, mixed = (view.basis.mix(x) for x in (view.basis.present_weights, session.weights))
+        changed.append(np.abs(look - mixed)[view.importance == 0].mean())
+    assert changed[0] < changed[1]
 
 
 def test_without_a_scene_there_is_nothing_to_render(heard: Heard):

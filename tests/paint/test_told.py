@@ -8,9 +8,15 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.lighting.analysis.elsewhere import Elsewhere
+from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.paint.told import HELP, helped, sketched, why_not_closer
+from lightpaint.paint.told import HELP, help_fields, helped, sketched, why_not_closer
+from lightpaint.report.sentences import spoken_cause
 from lightpaint.report.verdict import headline
+
+OFF, HOLD = Reason("off", ("annex_window",), 0.57), Reason("hold", (), 0.5)
+COLORS, SIDE = Reason("colors", (), 0.5), Reason("views", ("side",), 0.4)
 
 PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floor")
 
@@ -20,9 +26,9 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
     [
         (
             18.0,
-            {"held": ("hold",)},
+            {"reasons": (HOLD,)},
             "A first step, 10 %: brighter light on the floor is missing; what is not painted is "
-            "held near how it is. Paint what may change too, or let it go.",
+            "held near how it is. Paint more, or loosen it.",
         ),
         (
             10.0,
@@ -32,21 +38,21 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         ),
         (
             6.0,
-            {"held": ("colors", "views"), "held_by_views": ("side",)},
+            {"reasons": (COLORS, SIDE)},
             "Most of the way, 70 %: brighter light on the floor is missing; lamps are not "
             "free in their colour. The settings allow any colour.",
         ),
         (
             8.0,
-            {"held": ("views",), "held_by_views": ("side",)},
+            {"reasons": (SIDE,)},
             "Most of the way, 60 %: brighter light on the floor is missing; view side asks for "
             "other light.",
         ),
         (
             23.0,
-            {"held": ("hold",)},
+            {"reasons": (HOLD,)},
             "No closer than it is now: brighter light on the floor is missing; what is not "
-            "painted is held near how it is. Paint what may change too, or let it go.",
+            "painted is held near how it is. Paint more, or loosen it.",
         ),
         (
             14.0,
@@ -64,20 +70,51 @@ def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str)
 @pytest.mark.parametrize(
     ("about", "helps"),
     [
-        ({"held": ("hold",)}, "hold"),
-        ({"held": ("colors", "views")}, "colors"),
-        ({"held": ("views",)}, None),
-        ({"held": ("constraints", "hold")}, None),  # the first reason is told alone
-        ({"held": ()}, None),
-        ({"held": ("hold",), "place": None}, None),
-        ({"held": ("hold",), "delta_e": 2.0}, None),
+        ({"reasons": (HOLD,)}, "hold"),
+        ({"reasons": (COLORS, SIDE)}, "colors"),
+        ({"reasons": (SIDE,)}, None),
+        ({"reasons": (OFF, HOLD)}, "off"),  # the first reason is told alone
+        ({"reasons": (replace(OFF, share=0.3),)}, None),
+        ({"reasons": ()}, None),
+        ({"reasons": (HOLD,), "place": None}, None),
+        ({"reasons": (HOLD,), "delta_e": 2.0}, None),
     ],
 )
 def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
     seen = replace(Seen(10.0, 0.0, 20.0, PLACE), **about)
-    assert helped(seen) == helps
+    cause, fields = helped(seen), help_fields(seen)
+    assert (cause and cause.kind) == helps
+    assert (fields and fields["kind"]) == helps
     advised = [held for held, words in HELP.items() if words in sketched(seen)]
-    assert advised == [one for one in (helps,) if one]
+    assert advised == [one for one in (helps,) if one in HELP]
+
+
+def test_a_button_says_what_it_lets_go_and_what_that_brings():
+    seen = replace(Seen(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
+    assert "; annex_window is switched off." in sketched(seen)
+    fields = {"kind": "off", "names": ["annex_window"], "closes": 0.57, "hold": None}
+    assert help_fields(seen) == fields
+    weaker = Loosening(0.8, 0.35, Elsewhere(2.0, 12.0, "annex"))
+    held = replace(seen, reasons=(replace(HOLD, loosening=weaker),))
+    assert help_fields(held) == {"kind": "hold", "names": [], "closes": 0.35, "hold": 0.8}
+    assert spoken_cause(held.reasons[0]) == (
+        "What is not painted is held near how it is; a hold of 0.8 would take away 35 % of the "
+        "miss, and change the annex by ΔE 12."
+    )
+    # Of what takes several, none closes a share by itself.
+    joint = replace(seen, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
+    told = help_fields(joint)
+    assert told is not None
+    assert told["closes"] is None
+
+
+def test_what_harms_the_rest_is_not_praised():
+    """Letting go blew out the annex, and was told as 57 %."""
+    seen = Seen(8.6, 0.0, 20.0, PLACE, there=("lamp",), elsewhere=Elsewhere(19.0, 51.0, "annex"))
+    said = sketched(seen)
+    assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51): ")
+    mild = sketched(replace(seen, elsewhere=Elsewhere(2.0, 7.0, "annex")))
+    assert mild.startswith("About half of the way, 57 %, and changes the annex by ΔE 7.0: ")
 
 
 def test_what_is_close_is_said_as_elsewhere():

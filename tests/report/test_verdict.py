@@ -15,6 +15,8 @@ from lightpaint.basis.file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.lighting.analysis.elsewhere import Elsewhere
+from lightpaint.lighting.analysis.held_back import NAMED, Reason
 from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.lighting import combine
@@ -61,14 +63,14 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
             "it; no light gets there.",
         ),
         (
-            _seen(2.8, 3.0, held=("hold",)),
+            _seen(2.8, 3.0, reasons=(Reason("hold"),)),
             "What else is asked keeps the lights from this: in the middle it is painted brighter "
             "than they make it; what is not painted is held near how it is.",
         ),
         (
-            _seen(5.0, held=("colors", "constraints")),
-            "Part of the way, but the brighter light in the middle is out of reach: lamps are "
-            "not free in their colour, and some lights are locked, limited or left out.",
+            _seen(5.0, reasons=(Reason("colors"), Reason("lock", ("lamp",)))),
+            "Part of the way, but the brighter light in the middle is missing: lamps are not "
+            "free in their colour, and lamp is locked.",
         ),
         (
             _seen(5.0, on="figure_hollow"),
@@ -81,14 +83,14 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
             "make it; lamp would light too much else.",
         ),
         (
-            _seen(5.0, held=("views",), held_by_views=("balcony",)),
-            "Part of the way, but the brighter light in the middle is out of reach: view balcony "
+            _seen(5.0, reasons=(Reason("views", ("balcony",)),)),
+            "Part of the way, but the brighter light in the middle is missing: view balcony "
             "asks for other light.",
         ),
         (
-            _seen(5.0, held=("colors", "views"), held_by_views=("a", "b")),
-            "Part of the way, but the brighter light in the middle is out of reach: lamps are "
-            "not free in their colour, and views a and b ask for other light.",
+            _seen(5.0, reasons=(Reason("colors"), Reason("views", ("a", "b")))),
+            "Part of the way, but the brighter light in the middle is missing: lamps are not "
+            "free in their colour, and views a and b ask for other light.",
         ),
         (
             _seen(5.0, there=("lamp", "sun", "sky"), kept_there=("lamp", "sun")),
@@ -117,6 +119,52 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
 )
 def test_the_headline_in_words(seen: Seen, said: str):
     assert headline(seen) == said
+
+
+PARTS = ("unreachable", "forbidden", "noise", "painting_noise")
+
+#: What a headline says of each part of the miss.
+SAID = {
+    "unreachable": "is out of reach: lamp would light too much else.",
+    "forbidden": "is out of reach: lamp would light too much else.",
+    "noise": "of what is missed is noise of the samples.",
+    "painting_noise": "of what is missed is finer than light can be.",
+}
+
+
+@pytest.mark.parametrize("share", [0.3, 0.36, 0.9])
+@pytest.mark.parametrize("part", PARTS)
+def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float):
+    """Whatever the rest is, of parts as report.json has them."""
+    others = [x for x in PARTS if x not in (part, "unreachable", "forbidden")]
+    parts = {part: share} | dict.fromkeys(others, (1 - share) / 4)
+    said = headline(_seen(5.0, there=("lamp",), parts=parts))
+    named = [x for x in PARTS if SAID[x] in said]
+    assert all(parts.get(x, 0) >= NAMED for x in named if x == part)
+    assert (part in named) == (share >= NAMED)
+    assert ("of which none is a third" in said) == (share < NAMED)
+
+
+@pytest.mark.parametrize(("share", "is_named"), [(0.3, False), (0.36, True)])
+def test_a_headline_names_no_reason_of_less_than_a_third(share: float, is_named: bool):
+    off = Reason("off", ("cove",), share)
+    said = headline(_seen(5.0, there=("lamp",), reasons=(off,), parts={"unreachable": 0.9}))
+    assert ("cove is switched off" in said) == is_named
+    assert ("out of reach" in said) != is_named
+
+
+def test_what_changes_elsewhere_is_part_of_the_verdict():
+    annex = Elsewhere(19.0, 51.0, "annex")
+    close = _seen(1.0, elsewhere=annex)
+    said = "What is not painted changes too, most of all the annex, by ΔE 51."
+    assert headline(close) == f"Close: it looks as painted. {said}"
+    assert headline(_seen(5.0, elsewhere=annex)).endswith(said)
+    corner = Elsewhere(3.0, 7.5, region=(0, 2))
+    assert headline(_seen(1.0, elsewhere=corner)).endswith(
+        "most of all at the top right, by ΔE 7.5."
+    )
+    # What nobody sees at a glance is not spoken of.
+    assert headline(_seen(1.0, elsewhere=Elsewhere(1.0, 5.0, "annex"))) == headline(_seen(1.0))
 
 
 def test_noise_is_no_fault_of_the_lighting():

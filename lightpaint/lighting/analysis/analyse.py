@@ -64,14 +64,15 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
         (2, 3)
     """
     views = solution.views
-    asked: list[Callable[[], Any]] = [partial(what_is_seen, view) for view in views]
-    asked += [partial(diagnose, view) for view in views]
+    asked: list[Callable[[], Any]] = [partial(_looked_at, view) for view in views]
     asked += [partial(error_bars, solution), partial(best_of_each, solution)]
     asked += [partial(_alike, solution)]
     asked += [partial(without_constraints, view) for view in views]
     # None of them needs another, and each leaves a processor idle now and then.
     answers = iter(side_by_side(lambda ask: ask(), asked))
-    seen, diagnoses = ([next(answers) for _ in views] for _ in range(2))
+    looked_at: list[tuple[Seen, Diagnosis]] = [next(answers) for _ in views]
+    seen = [its for its, _ in looked_at]
+    diagnoses = [diagnosis for _, diagnosis in looked_at]
     uncertainty, best, alike = next(answers), next(answers), next(answers)
     solution = with_error_bars(solution, uncertainty)
     choices = color_choices(solution, [its.delta_e for its in seen], best)
@@ -93,6 +94,12 @@ def with_findings(solution: Solution, analyses: tuple[Analysis, ...]) -> Solutio
     seen = first.seen if len(analyses) == 1 else what_is_seen(solution)
     told = with_error_bars(solution, first.uncertainty)
     return told.told(bounds=first.diagnosis.bounds, **_numbers(seen))
+
+
+def _looked_at(view: Solution) -> tuple[Seen, Diagnosis]:
+    """How far one view looks from its painting, and why it misses it."""
+    diagnosis = diagnose(view)
+    return what_is_seen(view, diagnosis=diagnosis), diagnosis
 
 
 def _numbers(seen: Seen) -> dict[str, float]:

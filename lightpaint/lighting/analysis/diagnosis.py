@@ -116,6 +116,19 @@ class Diagnosis:
         return part / self.total if self.total > 0 else 0.0
 
 
+def parts_of_miss(diagnosis: Diagnosis) -> dict[str, float]:
+    """Return the parts of what is missed that are told, and their shares, the largest first.
+
+    None where the lights make what is painted.
+    """
+    if diagnosis.missed < 0.01:
+        return {}
+    parts = ("unreachable", "forbidden", "compromise", "noise", "painting_noise")
+    shares = {part: diagnosis.share(getattr(diagnosis, part)) for part in parts}
+    told = sorted(shares.items(), key=lambda item: -item[1])
+    return {part: share for part, share in told if share >= 0.005}
+
+
 @keywords()
 def diagnose(solution: Solution) -> Diagnosis:
     """Split what `solution`, of one view, misses of its target.
@@ -141,11 +154,13 @@ def diagnose(solution: Solution) -> Diagnosis:
     unreachable = missed - forbidden
     total = float((D * np.square(missed)).sum())
     out_of_reach = min(float((D * np.square(unreachable)).sum()), total)
+    # Grain is sought in what the fit counts: a mean over pixels of other weights would give dark
+    # ones the grain of the bright ones beside them, and more than all that is missed.
     noise, painting_noise = (
-        min(float((D * variance).sum()), out_of_reach)
-        for variance in (
-            np.square(predicted.half_difference, dtype=np.float64),
-            grain(unreachable, solution.importance > 0),
+        min(float(power.sum()), out_of_reach)
+        for power in (
+            D * np.square(predicted.half_difference, dtype=np.float64),
+            grain(np.sqrt(D) * unreachable, solution.importance > 0),
         )
     )
     # What is seen of noise is that of both.

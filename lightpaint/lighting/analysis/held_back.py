@@ -1,7 +1,12 @@
-"""What is asked beside the painting, and whether it keeps the lights from what was painted."""
+"""What keeps the lights from what was painted, and what they would do without each of it.
 
-from collections.abc import Sequence
+All shares are of what the answer misses of the paint, Σ D ‖V(ψ) − V(x)‖², which is what the fit
+minimises there; for each the problem is solved again, of enough of the pixels.
+"""
+
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -9,11 +14,17 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
+from lightpaint.lighting.analysis.hands import Hand, Hands
 from lightpaint.lighting.analysis.looking import Looking
+from lightpaint.lighting.binning import block_sums
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.painting import painted_and_rest, weight_between
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
 #: What may hold the lights back: unpainted pixels, their colours, what is asked of single ones, and
@@ -23,38 +34,196 @@ Held = Literal["hold", "colors", "constraints", "views"]
 #: Painted pixels, and others, that are enough to tell, of all views together.
 ENOUGH = 2**11
 
-#: By how much closer the painting must be without it, in ΔE and of what is missed.
-CLOSER, CLOSER_SHARE = 1.0, 0.2
+#: Share of what is missed from which on a reason is known, and from which on a headline names it.
+KNOWN, NAMED = 0.05, 1 / 3
+
+#: Reasons tie that bring this part of what the best one does.
+TIED = 0.9
+
+#: Part of what letting go of all that is asked brings that one thing alone must bring; else it
+#: takes several.
+ALONE = 0.5
+
+#: Part of what all lights of whom the same is asked would bring that some of them must, to be
+#: named alone, and how many these are at most.
+NEARLY, FEW_LIGHTS = 0.75, 3
+
+#: Part of what no hold would bring that a weaker one must. Measured (docs/benchmarks.md): at a half
+#: the answer is nearer to what was meant than with the hold, at nine tenths it is farther.
+GRADUALLY = 0.5
+
+#: Steps in which the hold is sought, between itself and the part of it that is as good as none.
+STEPS, AS_GOOD_AS_NONE = 6, 1e-3
 
 
-def held_back_by(solution: Solution) -> tuple[tuple[Held, ...], tuple[str, ...]]:
-    """What keeps the lights notably farther from the painting than they could come.
+@dataclass(frozen=True)
+class Loosening:
+    """The strongest hold that still brings about half of what none would.
 
-    Of one view. Each that lets go of half of it alone; all where it takes several, first the one
-    beside which the others bring least. And where other views do, which of them, in the same way.
+    Attributes:
+        hold: Its strength; 0 where no weaker one does.
+        share: Of what is missed of the paint, what it takes away.
+        elsewhere: What it changes in the picture that is shown now, where nobody painted.
+    """
+
+    hold: float
+    share: float
+    elsewhere: Elsewhere | None
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that keeps the lights from the paint.
+
+    Attributes:
+        kind: `hold`, `colors` or `views`; or what was asked of lights.
+        names: Of the lights of which it was asked; of the views; none of the rest.
+        share: Of what is missed of the paint, what would be met without this alone; of one of
+            several that only help together, without all of them.
+        is_joint: Whether it is one of several that only help together.
+        loosening: Of a hold, what to do about it.
+    """
+
+    kind: Literal["hold", "colors", "views"] | Hand
+    names: tuple[str, ...] = ()
+    share: float = 1.0
+    is_joint: bool = False
+    loosening: Loosening | None = None
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether a person asked it of lights."""
+        return self.kind not in ("hold", "colors", "views")
+
+    @property
+    def held(self) -> Held:
+        """Which of the four that hold lights back it is."""
+        if self.kind == "hold" or self.kind == "colors" or self.kind == "views":
+            return self.kind
+        return "constraints"
+
+
+def reasons_of(solution: Solution) -> tuple[Reason, ...]:
+    """Find what keeps the lights from the painting of one view, what would bring most first.
+
+    What a person asked of lights goes before what ties with it. Where no single thing brings half
+    of what all together do, it takes several: first the one beside which the others bring least.
     """
     few = _Few.of(solution)
-    if not few.asked:
-        return (), ()
-    now = few.missed(solution.weights)
+    if not few.asked or few.now <= 0:
+        return ()
+    everything = few.share(few.asked)
+    if everything < KNOWN:
+        return ()
+    found: list[Reason] = []
+    for kind in few.asked:
+        if kind == "constraints":
+            found += _by_hand(few)
+        else:
+            found.append(Reason(kind, few.others_that_matter(kind), few.share([kind])))
+    found = _ordered([reason for reason in found if reason.share >= KNOWN])
+    if (not found or found[0].share < ALONE * everything) and len(few.asked) > 1:
+        return _joint(few, everything)
+    return tuple(
+        replace(reason, loosening=_loosened(solution, few, reason.share))
+        if reason.kind == "hold"
+        else reason
+        for reason in found
+    )
 
-    def without(*those: Held, views: Sequence[int] = few.others) -> float:
-        return now - few.missed(few.solved(those, views))
 
-    gained = without(*few.asked)
-    if gained < max(CLOSER, CLOSER_SHARE * now):
-        return (), ()
-    held = few.asked
-    if len(held) > 1:
-        alone = tuple(one for one in held if without(one) > gained / 2)
-        held = alone or tuple(sorted(held, key=lambda kept: without(*set(held) - {kept})))
-    if "views" not in held:
-        return held, ()
-    its = few.others
-    if len(its) > 1:
-        part = without("views") / 2
-        its = [k for k in its if without("views", views=[k]) > part] or its
-    return held, tuple(few.names[k] for k in its)
+def _ordered(reasons: Sequence[Reason]) -> list[Reason]:
+    """What brings most first; of what ties with that, what a person asked of lights."""
+    tied = TIED * max((reason.share for reason in reasons), default=0.0)
+
+    def rank(reason: Reason) -> tuple[bool, float]:
+        comes_first = reason.share >= tied and reason.is_by_hand
+        return not comes_first, -reason.share
+
+    return sorted(reasons, key=rank)
+
+
+def _by_hand(few: "_Few") -> list[Reason]:
+    """What was asked of lights, each kind of it with the fewest lights that bring nearly all."""
+    hands, found = few.hands, []
+    for kind, lights in hands.kinds().items():
+        whole = few.share_without(kind, lights)
+        if whole < KNOWN:
+            continue
+        if kind in ("sparse", "prefer_current"):
+            found.append(Reason(kind, (), whole))
+            continue
+        chosen, gained = lights, whole
+        likely = sorted(lights, key=lambda k: -few.pull[k])
+        # One by one, of those that would move the picture most.
+        alone = [(few.share_without(kind, [k]), k) for k in likely[: 2 * FEW_LIGHTS]]
+        best = [k for _, k in sorted(alone, key=lambda its: -its[0])]
+        for count in range(1, min(FEW_LIGHTS, len(lights) - 1) + 1):
+            some = sorted(best[:count])
+            part = max(alone)[0] if count == 1 else few.share_without(kind, some)
+            if part >= NEARLY * whole:
+                chosen, gained = tuple(some), part
+                break
+        found.append(Reason(kind, tuple(hands.lights[k].name for k in chosen), gained))
+    return found
+
+
+def _joint(few: "_Few", everything: float) -> tuple[Reason, ...]:
+    """All that is asked, where it takes several to bring something."""
+    order = sorted(few.asked, key=lambda kind: few.share([x for x in few.asked if x != kind]))
+    found: list[Reason] = []
+    for kind in order:
+        if kind == "constraints":
+            found += [
+                Reason(hand, few.named(hand, lights), everything, is_joint=True)
+                for hand, lights in few.hands.kinds().items()
+            ]
+        else:
+            names = few.others_that_matter(kind)
+            found.append(Reason(kind, names, everything, is_joint=True))
+    return tuple(found)
+
+
+def _loosened(solution: Solution, few: "_Few", most: float) -> Loosening | None:
+    """The strongest hold that brings `GRADUALLY` of `most`, which none would bring.
+
+    None where what is not painted counts by the pixel.
+    """
+    fit = few.problem.fit
+    if fit.unpainted or not fit.hold:
+        return None
+
+    def brought(hold: float) -> tuple[float, Doubles]:
+        weights = few.solved((), few.others, hold=hold)
+        return few.share_of(weights), weights
+
+    # Between a hold that brings too little and one that brings enough, whose logarithms are halved.
+    little, enough = float(fit.hold), float(fit.hold) * AS_GOOD_AS_NONE
+    share, weights = brought(enough)
+    if share < GRADUALLY * most:
+        enough = 0.0
+        share, weights = brought(enough)
+    for _ in range(STEPS if enough else 0):
+        between = round_down(float(np.sqrt(little * enough)))
+        if not enough < between < little:
+            break
+        its, found = brought(between)
+        if its >= GRADUALLY * most:
+            enough, share, weights = between, its, found
+        else:
+            little = between
+    [target] = solution.problem.views.targets
+    basis = solution.basis
+    before, after = (basis.mix(x) for x in (solution.weights, weights))
+    look = Looking.at(solution.problem)
+    changed = what_changes(look, basis, target.importance > 0, before, after)
+    return Loosening(enough, share, changed)
+
+
+def round_down(value: float) -> float:
+    """The nearest number of two digits that is not larger; `value` > 0."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(f"{np.floor(value / unit * (1 + 1e-12)) * unit:.2g}")
 
 
 @dataclass(frozen=True)
@@ -62,6 +231,7 @@ class _Few:
     """Some of the pixels of all views, each view in one row.
 
     problem: of all pixels of all views. mine: which of the views it is about. names: of the views.
+    weights: (n, 3), the answer.
     """
 
     problem: Problem
@@ -70,12 +240,13 @@ class _Few:
     mine: int
     names: tuple[str, ...]
     look: Looking
+    weights: Doubles
 
     @staticmethod
     def of(solution: Solution) -> "_Few":
         problem = (solution.whole or solution).problem
-        views = problem.views
-        mine = next(k for k, basis in enumerate(views.bases) if basis is solution.basis)
+        views = _in_blocks(problem.views, problem.block_side)
+        mine = next(k for k, basis in enumerate(problem.views.bases) if basis is solution.basis)
         painted = [(target.importance > 0).ravel() for target in views.targets]
         # One step for all views, so that each counts as much as it does.
         total, rest = (sum(int((x == is_it).sum()) for x in painted) for is_it in (True, False))
@@ -98,6 +269,7 @@ class _Few:
             mine,
             sensors if len(set(sensors)) == len(sensors) else names,
             Looking.at(alone),
+            solution.weights,
         )
 
     @property
@@ -117,27 +289,138 @@ class _Few:
         }
         return tuple(name for name, is_on in on.items() if is_on)
 
-    def missed(self, weights: Doubles) -> float:
-        """Mean ΔE of the view."""
-        look = self.look
-        return look.mean(look.missed(look.of(self.bases[self.mine].mix(weights))))
+    @cached_property
+    def hands(self) -> Hands:
+        """What is asked of the lights."""
+        return Hands.of(self.problem.constraints, self.problem.basis.lights)
 
-    def solved(self, without: Sequence[Held], views: Sequence[int]) -> Doubles:
-        """The best weights, (n, 3), without some of what is asked. views: those that are let go."""
-        change: dict[str, Any] = {}
-        if "hold" in without:
-            change |= {"hold": 0.0, "unpainted": 0.0}
-        if "colors" in without:
-            change["colors"] = "free"
+    @cached_property
+    def pull(self) -> Doubles:
+        """(n,), how much each light would change what is missed if it were moved alone, at first.
+
+        Relative to its power in the picture: by that it may be compared with others.
+        """
+        problem = self.problem
+        gradient = np.abs(problem.equations.gradient(self.weights)).sum(axis=1)
+        power = np.sqrt(np.einsum("cii->ic", problem.equations.M).sum(axis=1))
+        return np.asarray(gradient / np.where(power > 0, power, 1))
+
+    @cached_property
+    def now(self) -> float:
+        """What the answer misses of the paint."""
+        return self.cost(self.weights)
+
+    def cost(self, weights: Doubles) -> float:
+        """What weights (n, 3) miss of the paint of the view, as the fit counts it."""
+        look = self.look
+        return look.mean(look.costs(look.of(self.bases[self.mine].mix(weights))))
+
+    def share_of(self, weights: Doubles) -> float:
+        """The share of what is missed that these weights (n, 3) would not miss."""
+        return 1 - self.cost(weights) / self.now
+
+    def share(self, without: Collection[Held], views: Sequence[int] | None = None) -> float:
+        """The same of the best weights without some of what is asked. views: that are let go."""
+        return self.share_of(self.solved(without, self.others if views is None else views))
+
+    def share_without(self, kind: Hand, lights: Collection[int]) -> float:
+        """The same without one thing that is asked of some lights."""
+        asked = self.hands.without(kind, lights)
+        return self.share_of(self.solved((), self.others, constraints=asked))
+
+    def named(self, kind: Hand, lights: Collection[int]) -> tuple[str, ...]:
+        """The names of lights of which that is asked; none of what is asked of all."""
+        if kind in ("sparse", "prefer_current"):
+            return ()
+        return tuple(self.hands.lights[k].name for k in lights)
+
+    def others_that_matter(self, kind: Held) -> tuple[str, ...]:
+        """The names of the views that hold, where others do."""
+        if kind != "views":
+            return ()
+        its = self.others
+        if len(its) > 1:
+            part = self.share(["views"]) / 2
+            its = [k for k in its if self.share(["views"], views=[k]) > part] or its
+        return tuple(self.names[k] for k in its)
+
+    def solved(
+        self,
+        without: Collection[Held],
+        views: Sequence[int],
+        *,
+        constraints: Constraints | None = None,
+        hold: float | None = None,
+    ) -> Doubles:
+        """The best weights, (n, 3), without some of what is asked.
+
+        views: those that are let go. constraints, hold: instead of those there are.
+        """
         gone = set(views) if "views" in without else set()
         left = [k for k in range(len(self.bases)) if k not in gone]
+        fit = self.problem.fit if hold is None else replace(self.problem.fit, hold=hold)
+        change: dict[str, Any] = {"hold": 0.0, "unpainted": 0.0}
+        if "hold" not in without:
+            change["unpainted"] = self._weight_of_rest(fit, left)
+        if "colors" in without:
+            change["colors"] = "free"
+        asked = self.problem.constraints if constraints is None else constraints
         problem = Problem.of(
             [self.bases[k] for k in left],
             [self.targets[k] for k in left],
-            constraints=Constraints() if "constraints" in without else self.problem.constraints,
-            fit=replace(self.problem.fit, **change),
+            constraints=Constraints() if "constraints" in without else asked,
+            fit=replace(fit, **change),
         )
-        return solution_of(replace(problem, start=self.problem.start)).weights
+        begin = replace(problem, start=self.problem.start)
+        return solution_of(begin).weights
+
+    def _weight_of_rest(self, fit: Fit, left: Sequence[int]) -> float:
+        """What each of the few pixels that are not painted counts, of some views.
+
+        Together they count beside the painted ones what all there are do.
+        """
+        (painted, rest), (few_painted, few_rest) = (
+            painted_and_rest(
+                Views(tuple(views.bases[k] for k in left), tuple(views.targets[k] for k in left))
+            )
+            for views in (self.problem.views, Views(tuple(self.bases), tuple(self.targets)))
+        )
+        if few_rest <= 0 or painted <= 0:
+            return 0.0
+        return weight_between(painted, rest, fit) * (rest / few_rest) * (few_painted / painted)
+
+
+def _in_blocks(views: Views, side: int) -> Views:
+    """Views whose pixels are means of blocks, where single ones are mostly noise.
+
+    What makes no whole block at the right and at the bottom is left out.
+    """
+    sizes = [[side * (n // side) for n in basis.size] for basis in views.bases]
+    parts = zip(views.targets, sizes, strict=True)
+    if side == 1 or not all(target.importance[:h, :w].any() for target, (h, w) in parts):
+        return views
+    bases, targets = [], []
+    for basis, target, (height, width) in zip(views.bases, views.targets, sizes, strict=True):
+        its = target.cropped(height, width).reduced(side)
+        unseen = ~basis.emitters_seen[:height, :width]
+        total = block_sums(unseen.astype(np.float64), side)
+        counts, safe = unseen[..., None], np.where(total > 0, total, 1)[..., None]
+        images, halves = (
+            np.stack([block_sums(x[:height, :width] * counts, side) / safe for x in planes])
+            for planes in (basis.images, basis.half_differences)
+        )
+        made = replace(
+            basis,
+            images=images.astype(np.float32),
+            half_differences=halves.astype(np.float32),
+            emitters_seen=total == 0,
+            learned=None,
+            features=None,
+            objects=None,
+        )
+        bases.append(made)
+        targets.append(its)
+    return Views(tuple(bases), tuple(targets))
 
 
 def _in_a_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:

@@ -24,7 +24,8 @@ class Looking:
     """What was painted, as far as it is looked at: every `step`-th pixel of each side.
 
     painted: (h, w, 3) linear. at_least: (h, w, 3), where brighter is as good. weight: (h, w), the
-    importance. transform: through which a display shows it.
+    importance. transform: through which a display shows it. compared: that through which the fit
+    compares it; None in linear light.
     """
 
     painted: Floats
@@ -32,6 +33,7 @@ class Looking:
     weight: Doubles
     step: int
     transform: ViewTransform
+    compared: ViewTransform | None = None
 
     @staticmethod
     def at(problem: Problem, *, most: int = LOOKED_AT) -> "Looking":
@@ -48,6 +50,7 @@ class Looking:
             weight[every],
             step,
             transform_of(problem),
+            problem.loss.transform,
         )
 
     @cached_property
@@ -72,6 +75,19 @@ class Looking:
     def missed(self, pixels: Doubles) -> Doubles:
         """(p,), how far light (p, 3) looks from the paint."""
         return ciede2000(self.lab(pixels), self.lab_meant(pixels))
+
+    def costs(self, pixels: Doubles) -> Doubles:
+        """What light (p, 3) misses of the paint as the fit counts it, (p,): ‖V(ψ) − V(x)‖².
+
+        Importance is not in it.
+        """
+        missed = self.compare(self.meant(pixels)) - self.compare(pixels)
+        return np.asarray(np.square(missed).sum(axis=-1))
+
+    def compare(self, pixels: Doubles) -> Doubles:
+        """V of light (p, 3): what the fit compares."""
+        encoded = pixels if self.compared is None else self.compared.encode(pixels)
+        return np.asarray(encoded, np.float64)
 
     def lab(self, pixels: Doubles) -> Doubles:
         """L*a*b* (p, 3) of what a display shows of light (p, 3)."""

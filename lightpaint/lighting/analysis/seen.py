@@ -5,7 +5,8 @@ painted looks at the paint. So the miss that people are told is the mean CIEDE20
 exposure and through the view of the painting, weighted by importance.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,8 +16,16 @@ from lightpaint.colour.difference import ciede2000
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.objects import Objects
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
-from lightpaint.lighting.analysis.held_back import Held, held_back_by
+from lightpaint.lighting.analysis.diagnosis import (
+    REGIONS,
+    Diagnosis,
+    Place,
+    diagnose,
+    parts_of_miss,
+)
+from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
+from lightpaint.lighting.analysis.hands import Hand, Hands
+from lightpaint.lighting.analysis.held_back import NAMED, Held, Reason, reasons_of
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.analysis.on_object import object_with_most
 from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
@@ -41,6 +50,9 @@ HALF = 0.5
 #: much there from that.
 GETS_THERE, DOES_MUCH = 0.01, 0.1
 
+#: What holds a light at a level.
+HELD_THERE: tuple[Hand, ...] = ("off", "lock")
+
 #: Every so-many-th pixel of each side is enough to find the brightest.
 THINNED = 2
 
@@ -60,9 +72,12 @@ class Seen:
             too much light, those that it is from.
         does_much: Whether one of them does much there.
         kept_there: Those of them that what is asked of them holds back.
-        held: What is asked beside the painting and keeps the lights from it.
-        held_by_views: Which other views do, where these are among that: their sensors, or paintings
-            where they have the same.
+        reasons: What is asked beside the painting and keeps the lights from it, what would bring
+            most first, with the share of what is missed that goes without it.
+        parts: Shares of what is missed, of all that the fit counts, by what no light can change:
+            `unreachable`, `forbidden`, `noise`, `painting_noise`, and `compromise` of several
+            views. Empty where nobody has looked.
+        elsewhere: What becomes of the rest, where it was painted over the present look.
 
     Examples:
         >>> seen = lp.what_is_seen(lp.solve(basis, target))
@@ -78,10 +93,55 @@ class Seen:
     there: tuple[str, ...] = ()
     does_much: bool = True
     kept_there: tuple[str, ...] = ()
-    held: tuple[Held, ...] = ()
-    held_by_views: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
+    parts: Mapping[str, float] = field(default_factory=dict)
+    elsewhere: Elsewhere | None = None
 
     __repr__ = shortly
+
+    @property
+    def causes(self) -> tuple[Reason, ...]:
+        """The reasons that a headline may name: without one of them a third is not missed."""
+        return tuple(reason for reason in self.reasons if reason.share >= NAMED)
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """The same by what holds: `hold`, `colors`, `constraints` or `views`."""
+        return tuple(dict.fromkeys(reason.held for reason in self.causes))
+
+    @property
+    def held_by_views(self) -> tuple[str, ...]:
+        """Which other views do, where these are among that: their sensors, or paintings where they
+        have the same.
+        """
+        return tuple(name for x in self.causes if x.kind == "views" for name in x.names)
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether a third of what is missed is out of reach of the lights, whatever is asked."""
+        if not self.parts:
+            return True
+        return self.parts.get("unreachable", 0) + self.parts.get("forbidden", 0) >= NAMED
+
+    @property
+    def noise_that_counts(self) -> str:
+        """`noise` or `painting_noise`, where a third of what is missed is that; else ""."""
+        its = {part: self.parts.get(part, 0.0) for part in ("noise", "painting_noise")}
+        part = max(its, key=its.__getitem__)
+        return part if its[part] >= NAMED else ""
+
+    @property
+    def is_at_cost(self) -> bool:
+        """Whether what is not painted has changed by more than what is has come closer."""
+        rest = self.elsewhere
+        if rest is None or not self.changes_elsewhere:
+            return False
+        return rest.delta_e > max(self.asked - self.missed, 0)
+
+    @property
+    def changes_elsewhere(self) -> bool:
+        """Whether a place that is not painted looks different at a glance."""
+        return self.elsewhere is not None and self.elsewhere.worst > NOTICED
 
     @property
     def missed(self) -> float:
@@ -116,12 +176,15 @@ class Seen:
 
 
 @keywords()
-def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
+def what_is_seen(
+    solution: Solution, predicted: Estimate | None = None, *, diagnosis: Diagnosis | None = None
+) -> Seen:
     """How far `solution` looks from its painting, where most, and what keeps it from there.
 
     Args:
         solution: Of one view or, without a place, of several.
         predicted: What `combine` makes of it, where that is known.
+        diagnosis: What `diagnose` says of it, where that is known.
 
     Examples:
         >>> lp.what_is_seen(lp.solve(basis, target)).delta_e < 0.1
@@ -135,9 +198,12 @@ def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     with_noise, missed = _missed(look, light, grain)
     delta_e, left = (float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed))
     seen = Seen(delta_e, max(delta_e - left, 0.0), look.mean(look.missed(now)))
-    if len(problem.views) > 1 or not missed.any():
+    if len(problem.views) > 1:
         return seen
-    place, share = _place(look, missed, light)
+    seen = replace(seen, elsewhere=_rest(solution, look, predicted))
+    if not missed.any():
+        return seen
+    place, share = _place(look, missed, light, grain)
     seen = replace(seen, place=place, is_spot=share >= SPOT)
     if seen.is_close and not seen.is_spot:
         return seen
@@ -154,8 +220,29 @@ def what_is_seen(solution: Solution, predicted: Estimate | None = None) -> Seen:
     }
     kept_there = tuple(name for name in there if name in kept)
     seen = replace(seen, there=there, does_much=does_much, kept_there=kept_there)
-    held, views = held_back_by(solution)
-    return replace(seen, held=held, held_by_views=views)
+    return replace(
+        seen,
+        reasons=reasons_of(solution),
+        parts=parts_of_miss(diagnosis or diagnose(solution)),
+    )
+
+
+def _rest(solution: Solution, look: Looking, predicted: Estimate) -> Elsewhere | None:
+    """What becomes of what nobody painted; None where it was not to stay as it is.
+
+    Both are sums of the same planes, so that noise is no change; nor is what a person did to
+    lights, who holds them where they are.
+    """
+    [target], basis = solution.problem.views.targets, solution.basis
+    if not target.over_look or target.everything:
+        return None
+    kinds = Hands.of(solution.problem.constraints, basis.lights).kinds()
+    before = basis.present_weights.copy()
+    for kind in HELD_THERE:
+        its = list(kinds.get(kind, ()))
+        before[its] = solution.weights[its]
+    now = basis.mix(before)
+    return what_changes(look, basis, target.importance > 0, now, predicted.image)
 
 
 def _missed(look: Looking, light: Doubles, grain: Doubles) -> tuple[Doubles, Doubles]:
@@ -175,11 +262,12 @@ def _missed(look: Looking, light: Doubles, grain: Doubles) -> tuple[Doubles, Dou
     return whole, np.sqrt(np.square(whole) - np.minimum(noise, between))
 
 
-def _place(look: Looking, missed: Doubles, light: Doubles) -> tuple[Place, float]:
-    """Where most is missed, and the share of the paint there that is seen at a glance."""
+def _place(look: Looking, missed: Doubles, light: Doubles, grain: Doubles) -> tuple[Place, float]:
+    """Where the fit misses most, and the share of the paint there that is seen at a glance."""
     weights = look.block_weights
-    noticed = missed > NOTICED
-    amount = weights * missed * (noticed if (weights * noticed).any() else 1)
+    amount = weights * _costs(look, light, grain)
+    if not amount.any():
+        amount = weights * missed
     region = np.zeros((REGIONS, REGIONS))
     at = [REGIONS * np.arange(length) // length for length in amount.shape]
     np.add.at(region, np.ix_(*at), amount)
@@ -199,14 +287,28 @@ def _place(look: Looking, missed: Doubles, light: Doubles) -> tuple[Place, float
         painted=as_rgb(painted),
         reached=as_rgb(reached),
     )
-    return place, float((weights * noticed * inside).sum() / weights.sum())
+    return place, float((weights * (missed > NOTICED) * inside).sum() / weights.sum())
+
+
+def _costs(look: Looking, light: Doubles, grain: Doubles) -> Doubles:
+    """What is missed in each block as the fit counts it, (rows, columns), but for noise.
+
+    Noise explains no more than is left between the pixels, as in `_missed`.
+    """
+    whole = look.in_blocks(look.costs(light))
+    if not grain.any():
+        return whole
+    shown, meant = look.compare(light), look.compare(look.meant(light))
+    of_means = np.square(look.in_blocks(meant) - look.in_blocks(shown)).sum(axis=-1)
+    noise = look.in_blocks(np.square(look.compare(light + grain) - shown).sum(axis=-1))
+    return np.asarray(whole - np.minimum(noise, np.maximum(whole - of_means, 0)))
 
 
 def _object(look: Looking, objects: Objects, missed: Doubles, light: Doubles) -> str:
     """What most of that lies on which is missed, or seen at a glance; "" for no single thing."""
     noticed = missed > NOTICED
     told = look.of_blocks(noticed if noticed.any() else missed > 0)
-    amount = told * look.missed(light) * look.weight[look.counts]
+    amount = told * look.costs(light) * look.weight[look.counts]
     return object_with_most(
         objects, look.of(objects.index.astype(np.float32)).astype(np.intp), amount
     )

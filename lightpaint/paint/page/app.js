@@ -4,6 +4,7 @@ import { html, render, useEffect, useState } from './vendor/preact.js';
 import { ColourPanel } from './ui/colour.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
+import { PreviewDialog } from './ui/help.js';
 import { counted } from './ui/format.js';
 import { hearWithin, press } from './ui/keys.js';
 import { LightsPanel, OfAll } from './ui/lights.js';
@@ -147,6 +148,7 @@ function Painter({ hands, root }) {
         : ui.side && html`<${Side} ui=${ui} hands=${hands} />`
     }
     <${Dialogs} ui=${ui} hands=${hands} />
+    <${PreviewDialog} ui=${ui} hands=${hands} />
     <${Tips} root=${root} />`;
 }
 

@@ -1,5 +1,6 @@
 """The parts of the residual: closed forms, and that they add up."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve
@@ -135,3 +137,22 @@ def test_the_parts_add_up(make_basis: Any, seed: int, n: int, is_scalar: bool):
     # No bound alone can stand for more than all of them together.
     for bound in found.bounds:
         assert bound.gain <= found.forbidden + 1e-6 * found.total
+
+
+def test_texture_is_no_grain_of_the_painting(make_basis: Any):
+    """A shape that no light makes, painted over surfaces of every brightness: out of reach.
+
+    Dark pixels count most in what a display shows, and were given the grain of bright ones.
+    """
+    rng = np.random.default_rng(4)
+    size = (48, 64)
+    albedo = 10 ** rng.uniform(-2.5, 0, size)[..., None] * np.ones(3)
+    x = np.linspace(0, 1, size[1])[None, :, None]
+    basis = make_basis(images=np.stack([albedo * (0.3 + 0.4 * x), albedo * (0.7 - 0.4 * x)]))
+    y = np.linspace(-1, 1, size[0])[:, None, None]
+    image = (albedo * 0.5 * 2.0 ** np.where(np.abs(y) < 0.4, 1.0, -0.5)).astype(np.float32)
+    target = replace(Target.of(image), transform=ViewTransform(), through_view=True)
+    found = diagnose(solve(basis, target))
+    # Some of it is: albedo from pixel to pixel is finer than any surface's. It was all of it.
+    assert found.share(found.unreachable) > 0.5
+    assert found.share(found.painting_noise) < 0.4

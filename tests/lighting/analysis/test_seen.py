@@ -9,11 +9,15 @@ import pytest
 from lightpaint.colour.difference import delta_e
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.objects import Objects
+from lightpaint.lighting.analysis import held_back
 from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.analysis.elsewhere import what_changes
+from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.analysis.seen import CLOSE, Seen, what_is_seen
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve
+from lightpaint.report.verdict import headline
 from lightpaint.target.target import Target
 
 SIZE = (24, 48)
@@ -120,6 +124,123 @@ def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
     both = what_is_seen(solve(basis, target, hold=50.0, constraints=locked)).held
     assert both[0] == "constraints"
     assert "hold" in both
+
+
+def _four(make_basis: Any) -> Any:
+    """A picture of four quarters, each with a light of its own, that spill a little."""
+    images = np.full((4, *SIZE, 3), 0.02)
+    for k in range(4):
+        images[k, :, 12 * k : 12 * k + 12] = 1
+    names = ["left", "annex_window", "annex_lamp", "right"]
+    basis = make_basis(images=images, names=names, emission=[[0.2] * 3] * 4)
+    index = np.repeat(np.arange(4, dtype=np.int32), 12)[None].repeat(SIZE[0], 0)
+    return replace(basis, objects=Objects(index, ("wall", "annex", "niche", "door")))
+
+
+def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any):
+    """Two are off by hand, and one of them is all that is missed."""
+    basis = _four(make_basis)
+    target = _over(_look(basis), (slice(None), slice(12, 24)), 0.5)
+    off = {name: {"off": True} for name in ("annex_window", "annex_lamp")}
+    seen = what_is_seen(solve(basis, target, hold=10.0, constraints=Constraints.of(off)))
+    first = seen.reasons[0]
+    assert (first.kind, first.names) == ("off", ("annex_window",))
+    assert first.share > 0.8
+    assert "annex_window is switched off" in headline(seen)
+    # What both are needed for is told of both, and of no other light that is locked.
+    wide = _over(_look(basis), (slice(None), slice(12, 36)), 0.5)
+    asked = Constraints.of(off | {"left": {"lock": True}})
+    first = what_is_seen(solve(basis, wide, hold=10.0, constraints=asked)).reasons[0]
+    assert first.names == ("annex_window", "annex_lamp")
+
+
+def test_the_share_of_a_reason_is_what_the_fit_misses_no_more(make_basis: Any):
+    """By a solve without it, of all pixels: the few that are looked at give the same."""
+    basis = _four(make_basis)
+    target = _over(_look(basis), (slice(None), slice(12, 24)), 0.5)
+    off = Constraints.of({"annex_window": {"off": True}})
+
+    def missed(**how: Any) -> float:
+        solution = solve(basis, target, **how)
+        loss = solution.problem.loss.missed(basis.mix(solution.weights))
+        return float((target.importance[..., None] * np.square(loss)).sum())
+
+    now, hold = missed(constraints=off, hold=3.0), missed(constraints=off, hold=0.0)
+    on = missed(hold=3.0)
+    shares = {
+        reason.kind: reason.share
+        for reason in what_is_seen(solve(basis, target, constraints=off, hold=3.0)).reasons
+    }
+    assert shares["off"] == pytest.approx(1 - on / now, abs=1e-3)  # of where its solve stops
+    assert shares.get("hold", 0.0) == pytest.approx(1 - hold / now, abs=0.05)
+
+
+def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
+    """Of a large painting the rest is less than the paint, and of few pixels it was as much."""
+    images = np.kron(_left_and_right(make_basis, spill=0.5).images, np.ones((1, 6, 6, 1)))
+    basis = make_basis(images=images, names=["left", "right"], emission=[[0.2] * 3] * 2)
+    look = _look(basis)
+    target = _over(look, (slice(None), slice(0, 240)), 0.6)
+    solution = solve(basis, target, hold=3.0)
+    few = held_back._Few.of(solution)
+    weights = few.solved((), few.others)
+    np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
+
+
+@pytest.mark.parametrize("stops", [(1.0, 0.0), (0.8, -0.5)])
+def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops: Any):
+    """One light for both halves of the paint, and a window elsewhere that spills on it."""
+    images = np.zeros((2, *SIZE, 3))
+    images[0, :, :24] = 1
+    images[1, :, 36:], images[1, :, :12] = 1, 0.3
+    basis = make_basis(images=images, names=["spot", "window"], emission=[[0.1] * 3] * 2)
+    index = np.zeros(SIZE, np.int32)
+    index[:, 36:] = 1
+    basis = replace(basis, objects=Objects(index, ("wall", "annex")))
+    look = _look(basis)
+    target = _over(look, (slice(None), slice(0, 24)), look[:, :24] * 2.0 ** stops[1])
+    target.image[:, :12] = look[:, :12] * 2.0 ** stops[0]
+    solution = solve(basis, target, hold=10.0)
+    hold = next(x for x in what_is_seen(solution).reasons if x.kind == "hold")
+    weaker = hold.loosening
+    assert weaker is not None
+    assert 0 < weaker.hold < 10
+    few = held_back._Few.of(solution)
+    holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
+    brought, less = (few.share_of(few.solved((), few.others, hold=h)) for h in holds)
+    assert brought >= 0.5 * hold.share > less
+    assert weaker.share == pytest.approx(brought)
+    # And it harms less than none would: of the window, which nobody painted.
+    look_at = Looking.at(solution.problem)
+    before = basis.mix(solution.weights)
+    none = basis.mix(solve(basis, target, hold=0.0).weights)
+    harm = what_changes(look_at, basis, target.importance > 0, before, none)
+    assert harm is not None
+    assert weaker.elsewhere is not None
+    assert weaker.elsewhere.object == harm.object == "annex"
+    assert weaker.elsewhere.worst < harm.worst
+
+
+def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
+    """In closed form; and what a person did to a light is no harm of the answer."""
+    basis = _four(make_basis)
+    where = (slice(None), slice(0, 12))
+    locked = Constraints.of({"*": {"lock": True}, "annex_window": {"lock": 0.4}})
+    seen = what_is_seen(solve(basis, _over(_look(basis), where, 0.2), constraints=locked))
+    assert seen.elsewhere is not None
+    assert seen.elsewhere.worst < 1e-3
+    target = _over(_look(basis), where, 0.5)
+    solution = solve(basis, target, hold=0.0, constraints=Constraints.of({"left": {"off": True}}))
+    seen = what_is_seen(solution)
+    mixed = solution.basis.mix(solution.weights)
+    start = basis.present_weights * np.array([0, 1, 1, 1])[:, None]
+    before = basis.mix(start)
+    worst = max(float(delta_e(mixed[0, x], before[0, x])) for x in (12, 24, 36))
+    assert seen.elsewhere is not None
+    assert seen.elsewhere.worst == pytest.approx(worst, rel=1e-4)
+    assert seen.elsewhere.delta_e == pytest.approx(
+        np.mean([delta_e(mixed[0, x], before[0, x]) for x in (12, 24, 36)]), rel=1e-4
+    )
 
 
 def test_lights_that_are_held_back_are_known(make_basis: Any):

@@ -465,24 +465,81 @@ def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) 
     assert painter.page.locator(".settings").is_visible()
 
 
-@pytest.mark.parametrize(
-    ("helps", "label", "values"),
-    [("hold", "Let it go", {"hold": 0}), ("colors", "Any colour", {"colors": "free"})],
-)
-def test_what_is_advised_is_done_by_a_button(
-    painter: Painter, helps: str, label: str, values: dict[str, Any]
+#: What the sentence advises, what its button is called, and the message that it comes to.
+HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
+    ({"kind": "hold", "hold": 0.8, "closes": 0.35}, "Loosen: closes 35 %", "set", {"hold": 0.8}),
+    ({"kind": "colors", "closes": 0.6}, "Any colour: closes 60 %", "set", {"colors": "free"}),
+    (
+        {"kind": "off", "names": ["key"], "closes": 0.57},
+        "Turn on key: closes 57 %",
+        "ask_all",
+        {"key": {}},
+    ),
+    (
+        {"kind": "colour", "names": ["cove"], "closes": None},
+        "Any colour for cove",
+        "ask_all",
+        {"cove": {"limits": {"max": 2}}},
+    ),
+]
+
+
+@pytest.mark.parametrize(("help_", "label", "kind", "change"), HELPS)
+def test_what_is_advised_is_seen_before_it_is_done(
+    painter: Painter, help_: dict[str, Any], label: str, kind: str, change: dict[str, Any]
 ) -> None:
-    button = painter.page.get_by_role("button", name=label)
-    assert button.count() == 0
-    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2}
+    asked = {"key": {"off": True}, "cove": {"kelvin": 2700, "limits": {"max": 2}}}
+    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "asked": asked}
     how = painter.button("How true?").bounding_box()
-    painter.tell(**said, version=2, headline="A first step, 10 %.", help=helps)
+    help_ = {"names": [], "hold": None, **help_}
+    painter.tell(**said, version=2, headline="A first step, 10 %.", help=help_)
     assert painter.button("How true?").bounding_box() == how
+    button = painter.page.get_by_role("button", name=label, exact=True)
+    button.focus()
+    painter.page.keyboard.press("Enter")
+    dialog = painter.page.get_by_role("dialog")
+    dialog.get_by_text("changes the annex by ΔE 49").wait_for()
+    assert [dialog.locator("canvas").nth(k).get_attribute("width") for k in (0, 1)] == ["16"] * 2
+    field = {"set": "values", "ask_all": "asked"}[kind]
+    assert painter.said("preview")[-1][field] == change
+    assert not painter.said(kind)  # nothing is done yet
+    painter.page.keyboard.press("Escape")
+    dialog.wait_for(state="detached")
+    assert not painter.said(kind)
     button.click()
-    assert painter.said("set")[-1]["values"] == values
-    assert button.count() == 0
-    painter.tell(**said, version=90, headline="Nearly there, 90 %.", help=None, settings={})
-    assert button.count() == 0
+    painter.button("Do it").click()
+    assert painter.said(kind)[-1][field] == change
+    assert dialog.count() == 0
+
+
+def test_a_preview_of_before_is_none(painter: Painter) -> None:
+    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
+    help_ = {"kind": "hold", "names": [], "hold": 0.8, "closes": 0.35}
+    painter.tell(**said, headline="A first step, 10 %.", help=help_)
+    painter.page.evaluate("() => { window.host.preview = () => ({ kind: 'started' }); }")
+    painter.button("Loosen").click()
+    number = painter.said("preview")[-1]["number"]
+    painter.tell(kind="previewed", number=number - 1, text="Old.", arrays={})
+    assert painter.page.get_by_text("Finding what it would do").is_visible()
+    assert painter.button("Do it").is_disabled()
+    painter.tell(kind="say", text="That could not be found.", tone="warn", what="preview")
+    painter.page.get_by_role("dialog").wait_for(state="detached")
+
+
+@pytest.mark.parametrize(
+    "help_",
+    [
+        {"kind": "off", "names": ["key"], "closes": 0.5},  # asked before the session began
+        {"kind": "hold", "names": [], "hold": 3, "closes": 0.5},  # is so already
+        {"kind": "tie", "names": ["key", "cove"], "closes": 0.5},
+        {"kind": "sparse", "names": [], "closes": 0.5},
+    ],
+)
+def test_what_cannot_be_let_go_here_has_no_button(painter: Painter, help_: dict[str, Any]) -> None:
+    said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
+    painter.tell(**said, headline="A first step, 10 %.", help={"hold": None, **help_})
+    painter.still()
+    assert painter.page.locator(".answer .help").count() == 0
 
 
 def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> None:

@@ -251,6 +251,9 @@ SENTENCE = (
 )
 
 
+HELP = {"kind": "colors", "names": [], "closes": 0.57, "hold": None}
+
+
 def cut_off(painter: Painter) -> list[str]:
     """What is wider, or higher, than what is seen of it."""
     names: list[str] = painter.page.evaluate(
@@ -265,7 +268,7 @@ def cut_off(painter: Painter) -> list[str]:
 @pytest.mark.parametrize("size", SIZES + COLUMNS + LOW)
 def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
     painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
-    about = {"headline": SENTENCE, "help": "colors", "delta_e": 11.2, "delta_e_asked": 20.5}
+    about = {"headline": SENTENCE, "help": HELP, "delta_e": 11.2, "delta_e_asked": 20.5}
     painter.tell(kind="answer", version=2, exact=True, lights=[], **about)
     painter.page.keyboard.press("Control+s")
     for key in "bwa":

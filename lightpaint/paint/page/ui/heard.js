@@ -13,10 +13,11 @@ export const ENDED = {
   export: { isWriting: false, writing: null },
   verify: { verifying: null },
   explain: { explaining: false },
+  preview: { preview: null },
 };
 
 /** When nothing is known to be under way. */
-export const IDLE = { ...ENDED.export, ...ENDED.verify, ...ENDED.explain };
+export const IDLE = { ...ENDED.export, ...ENDED.verify, ...ENDED.explain, ...ENDED.preview };
 
 /** @param {any} message @returns {Partial<Ui>} */
 export function stateOf(message, /** @type {import('./model.js').Ui} */ before) {
@@ -168,6 +169,13 @@ export function verifiedOf(message, ui) {
 export function explainedOf({ view = 0, sentences, is_old: isOld = false }, ui) {
   const isIts = view === ui.view && !isOld && !ui.isLive;
   return { explaining: false, explained: isIts ? sentences : [] };
+}
+
+/** What a change would do, unless another one is looked at by now. @param {any} message
+ * @param {Ui} ui @returns {Partial<Ui>} */
+export function previewedOf({ number, text, is_at_cost: isAtCost, arrays }, { preview }) {
+  if (!preview || preview.number !== number) return {};
+  return { preview: { ...preview, text, isAtCost, before: arrays.before, after: arrays.after } };
 }
 
 /** @param {Message} message @returns {Partial<Ui>} */

@@ -14,8 +14,15 @@ import { ofKelvin } from './colours.js';
 /** stamp: when it was kept, in seconds since 1970.
  * @typedef {{id: number, name: string, weights: RGB[], stamp: number, thumbnail: string}} Look */
 /** @typedef {Record<string, any>} Asked */
-/** What keeps the lights from the paint, and can be let go of by a setting.
- * @typedef {"hold" | "colors"} Help */
+/** What keeps the lights from the paint and can be let go of: what it is, the lights of which it was
+ * asked, which share of what is missed goes without it, and the weaker hold.
+ * @typedef {{kind: string, names: string[], closes: number | null, hold: number | null}} Help */
+/** A message that changes what is asked.
+ * @typedef {{kind: "set" | "ask_all" | "tie", fields: Record<string, any>}} Change */
+/** What a change would do: what it is called, and what is known of it.
+ * @typedef {{number: number, label: string, change: Change, text: string, isAtCost: boolean,
+ *   before: import("./engine.js").Picture | null, after: import("./engine.js").Picture | null}}
+ *   Preview */
 /** @typedef {{headline: string, help: Help | null, delta_e: number, delta_e_asked: number,
  *   sentences: string[]}} Seen */
 /** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
@@ -42,6 +49,7 @@ import { ofKelvin } from './colours.js';
  * @property {RGB[]} weights the last answer
  * @property {string} headline
  * @property {Help | null} help what the headline advises
+ * @property {Preview | null} preview of a change that is looked at before it is made
  * @property {number | null} deltaE
  * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
  * @property {string[]} sentences
@@ -144,6 +152,7 @@ export function first() {
     weights: [],
     headline: '',
     help: null,
+    preview: null,
     deltaE: null,
     deltaAsked: null,
     sentences: [],

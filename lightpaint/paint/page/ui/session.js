@@ -7,6 +7,7 @@ import {
   answerOf,
   explainedOf,
   looksOf,
+  previewedOf,
   progressOf,
   stateOf,
   verifiedOf,
@@ -34,6 +35,7 @@ const HEARD = [
   'exported',
   'verified',
   'explained',
+  'previewed',
   'closed',
   'connection',
   'silence',
@@ -56,6 +58,8 @@ export class Session {
     this.before = new Map();
     /** What is asked of lights by messages on their way. @type {Map<number, Asked>} */
     this.asking = new Map();
+    /** How many changes were looked at before they were made. */
+    this.previews = 0;
     /** What the session has said last of what is asked, and of what comes of that: what it refuses
      * is shown no longer. @type {Pick<Ui, 'asked' | 'ties' | 'settings' | 'weights'>} */
     this.said = { asked: {}, ties: [], settings: {}, weights: [] };
@@ -106,6 +110,7 @@ export class Session {
       exported: (/** @type {any} */ m) => this.exported(m),
       verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
       explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
+      previewed: (/** @type {any} */ m) => previewedOf(m, this.store.value),
       closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
       connection: (/** @type {any} */ m) => ({ connection: m.state }),
       silence: (/** @type {any} */ m) => ({ isSilent: m.isSilent }),
@@ -309,6 +314,29 @@ export class Session {
   async change(kind, fields) {
     const reply = await this.send(kind, fields);
     if (reply?.kind === 'failed') this.goBack();
+  }
+
+  /** What a change would do is found before it is made. @param {string} label what it is called
+   * @param {import("./model.js").Change} change */
+  preview(label, change) {
+    this.previews += 1;
+    const number = this.previews;
+    const unknown = { text: '', isAtCost: false, before: null, after: null };
+    this.store.set({ preview: { number, label, change, ...unknown } });
+    return this.send('preview', { ...change.fields, number, view: this.store.value.view });
+  }
+
+  /** The change that was looked at is made, in one step. */
+  makeChange() {
+    const { preview } = this.store.value;
+    this.store.set({ preview: null });
+    if (!preview) return undefined;
+    const { kind, fields } = preview.change;
+    if (kind === 'set') {
+      const [[key, value]] = Object.entries(fields.values);
+      return this.setting(key, value);
+    }
+    return kind === 'tie' ? this.tieAll(fields.ties) : this.change(kind, fields);
   }
 
   /** Why the view that is shown is not closer. */

@@ -52,7 +52,7 @@ function clear(canvas) {
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./engine.js").Picture} picture (h, w, 3) */
-function put(canvas, { data, shape: [height, width] }) {
+export function put(canvas, { data, shape: [height, width] }) {
   canvas.width = width;
   canvas.height = height;
   const pixels = new ImageData(width, height);

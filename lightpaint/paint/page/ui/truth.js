@@ -4,6 +4,7 @@ import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/pre
 import { Bar } from './bar.js';
 import { Button, Choice, Whole, comeInto } from './controls.js';
 import { lightText, number, progressText, shortened } from './format.js';
+import { Help } from './help.js';
 import { Icon } from './icons.js';
 import { isUnseen, keepLook } from './keeping.js';
 import { exposureOf, overlayOf } from './model.js';
@@ -168,31 +169,6 @@ const STATES = {
   judging: 'The lights are found; how close they come is being worked out',
   'answer not shown': 'It is said of the answer, which is neither of the looks that are compared',
 };
-
-/** What the sentence advises, as a button: which setting it changes, and to what.
- * @type {Record<import("./model.js").Help, {key: string, value: any, label: string, tip: string}>} */
-const HELPS = {
-  hold: {
-    key: 'hold',
-    value: 0,
-    label: 'Let it go',
-    tip: 'What you did not paint may become anything. Undo holds it again.',
-  },
-  colors: {
-    key: 'colors',
-    value: 'free',
-    label: 'Any colour',
-    tip: 'Lamps may have whatever colour is best. Undo gives them theirs again.',
-  },
-};
-
-/** @param {{ui: Ui, hands: Hands}} props */
-function Help({ ui, hands }) {
-  const its = ui.help && HELPS[ui.help];
-  if (!its || ui.settings[its.key] === its.value) return null;
-  return html`<${Button} label=${its.label} tip=${its.tip} class="help"
-    act=${() => hands.session.setting(its.key, its.value)} />`;
-}
 
 /** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */

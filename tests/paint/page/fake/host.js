@@ -314,6 +314,20 @@ export class FakeHost {
       sentences: ['No light reaches the floor at the left.', 'The cove is at its limit.'],
     };
   }
+  preview({ number, view }) {
+    const picture = { data: new Uint8Array(9 * 16 * 3).fill(90), shape: [9, 16, 3] };
+    setTimeout(() =>
+      this.tell({
+        kind: 'previewed',
+        number,
+        view,
+        text: 'Closes 63 % of what is missed, and changes the annex by ΔE 49. That is more than it brings.',
+        is_at_cost: true,
+        arrays: { before: picture, after: picture },
+      }),
+    );
+    return { kind: 'started', what: 'preview' };
+  }
   take_over() {
     return this.state();
   }
