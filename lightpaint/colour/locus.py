@@ -31,7 +31,7 @@ def uv_of(xyz: Floats) -> Doubles:
     return np.asarray(np.stack([4 * X, 6 * Y], axis=-1) / (X + 15 * Y + 3 * Z)[..., None])
 
 
-def xyz_of(uv: Floats) -> Doubles:
+def xyz_of(uv: Floats | tuple[float, float]) -> Doubles:
     """XYZ of luminance 1, (3,), of CIE 1960 (u, v)."""
     u, v = uv
     return np.asarray(np.array([3 * u, 2 * v, 4 - u - 10 * v]) / (2 * v))

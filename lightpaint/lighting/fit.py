@@ -45,7 +45,8 @@ class Fit:
         hold: Weight of all that is not painted, against the current look, beside that of all that
             is. 0 lets it go.
         colors: `free`; `gentle`, to leave a lamp's present colour only as far as the painting gains
-            by it; `white`, between 2200 and 9000 K.
+            by it, and for no colour but whites and what is painted; `white`, on Planck's locus
+            between 2200 and 9000 K.
         unpainted: Instead of `hold`, the weight of each pixel that is not painted.
         literal: Whether every target is taken at its word, but for what is said here.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's iteration alone,

@@ -22,10 +22,16 @@ from lightpaint.arrays import Doubles
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.binning import block_side
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.on_locus import around, next_whites, snapped
+from lightpaint.lighting.constraints.on_locus import (
+    around,
+    next_whites,
+    snapped,
+    within_gamuts,
+)
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.fit import Fit, Space
+from lightpaint.lighting.gamuts import PaintedLight, gamuts_of
 from lightpaint.lighting.live_sums import FILM, Films, SmallFilm
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -37,6 +43,9 @@ WHITE_STEPS = 2
 
 #: Pieces of a range of white within which a light first looks for its white, under the hand.
 WHITE_WIDTH = 8
+
+#: Painted pixels that say which colours lights may take, about.
+GAMUT_PIXELS = 2**9
 
 #: Of which views, and what pulls to the present and to its colours.
 _Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
@@ -90,22 +99,30 @@ class Live:
             start = _nearest(start, views, self._reduction)
             self._is_kept_to = True
         pull, rest_weight = self._pull(views), self._rest_weight(views)
+        reduction = self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             asked = equations if pull is None else equations + pull
-            return _best(asked, self._reduction, begin, self._fit.method)
+            return _best(asked, reduction, begin, self._fit.method)
+
+        def allowed(weights: Doubles) -> Doubles:
+            return within_gamuts(reduction, snapped(reduction, weights))
 
         if self.mode == "linear":
             return best(reduce(add, (x.tiles().equations(rest_weight) for x in views)), start)
         films = self._films_of(views)
         pixels = films.pixels(rest_weight, self._fit.transform)
         # A painting that another hand has changed may leave the answer before worse than none.
-        starts = start, untouched(self._views, self._reduction)
-        return films.nearer(pixels, starts, best, pull, self._on_locus)
+        starts = allowed(start), untouched(self._views, self._reduction)
+        return films.nearer(pixels, starts, best, pull, allowed)
 
-    def _on_locus(self, weights: Doubles) -> Doubles:
-        """Weights (n, 3), a mix of answers, as lights can have them that keep to whites."""
-        return snapped(self._reduction, weights)
+    def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
+        """What is left to solve for, with the colours that lights may take as it is painted."""
+        if self._fit.colors != "gentle":
+            return self._reduction
+        light = PaintedLight.of([view.painting for view in views], most=GAMUT_PIXELS)
+        gamuts = gamuts_of(light, _power(views), self._basis.present_weights)
+        return self._reduction.with_gamuts(gamuts)
 
     def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
         """What pulls at the weights, as of `Problem.pull`: the colours' part is found once."""
@@ -178,7 +195,7 @@ def _best(
 ) -> Doubles:
     """The best weights (n, 3) of what constraints leave, near those to begin with."""
     if not reduction.white_knobs:
-        return solve_reduced(equations, reduction, start, method=method).weights
+        return next_whites(equations, reduction, start, method=method)[1].weights
     start = snapped(reduction, start)
     near = solve_reduced(equations, around(reduction, start, WHITE_WIDTH), start, method=method)
     reduction = around(reduction, near.weights)

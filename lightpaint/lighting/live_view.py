@@ -26,6 +26,11 @@ class LiveView:
         self._display: SmallFilm | None = None
 
     @property
+    def painting(self) -> tuple[Basis, Floats, Floats]:
+        """Its basis, painting and importance."""
+        return self.basis, self._image, self._importance
+
+    @property
     def counts(self) -> Doubles:
         """Importance of all that is painted, and the weight of the rest, (2,)."""
         return np.asarray(self._sums.sum(axis=(0, 1)))

@@ -18,6 +18,7 @@ from lightpaint.lighting.constraints.on_locus import tangent
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.whites import white_where_free
 from lightpaint.lighting.fit import Fit, Space, meant_by
+from lightpaint.lighting.gamuts import Gamuts, PaintedLight, gamuts_of
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -148,7 +149,7 @@ class Problem:
             painted=lambda: painted_light(views),
             current=lambda: whole.mix(whole.present_weights),
         )
-        reduction = reduced_by(asked, whole, fit)
+        reduction = reduced_by(asked, whole, fit, gamuts_for(whole, views, fit))
         return cls(
             basis=whole,
             views=views,
@@ -288,14 +289,17 @@ class Problem:
         elif painting.strokes != self.strokes:
             raise ValueError("this problem was painted on already: go on from what that returned")
         painting.paint(view, region, image, importance, at_least)
-        word = replace(painting.word)
+        word, reduction = replace(painting.word), self.full
+        if (gamuts := gamuts_for(self.basis, painting.views, self.fit)) is not None:
+            reduction = reduced_by(self.constraints, self.basis, self.fit, gamuts)
         return replace(
             self,
             views=painting.views,
             loss=painting.loss(word, self.loss.transform),
             squares=word,
             equations=painting.equations,
-            reduction=self.full,
+            reduction=reduction,
+            full=reduction,
             corrected=None,
             noise_removed=0.0,
             refinement=None,
@@ -305,14 +309,36 @@ class Problem:
         )
 
 
-def reduced_by(asked: Constraints, basis: Basis, fit: Fit) -> Reduction:
+def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
+    """Of each light the colours that it may take; None where `fit` does not limit them."""
+    if fit.colors != "gentle":
+        return None
+    its = [
+        (one, target.image, _with_colour(target))
+        for one, target in zip(views.bases, views.targets, strict=True)
+    ]
+    return gamuts_of(PaintedLight.of(its), basis.power, basis.present_weights)
+
+
+def _with_colour(target: Target) -> Floats:
+    """(h, w), the importance of what has a colour: not where a channel may be more than it is."""
+    if target.at_least is None:
+        return target.importance
+    return np.where(target.at_least.any(axis=-1), np.float32(0), target.importance)
+
+
+def reduced_by(
+    asked: Constraints, basis: Basis, fit: Fit, gamuts: Gamuts | None = None
+) -> Reduction:
     """What constraints leave of the lights, and the fit of their colours.
 
-    Raises ConstraintError for a light that is to be white and cannot be what else is asked of it.
+    gamuts: as of `gamuts_for`. Raises ConstraintError for a light that is to be white and cannot be
+    what else is asked of it.
     """
     if fit.colors == "white":
         asked = white_where_free(asked, basis.lights)
-    return replace(reduce_to(asked, basis.lights), is_joined=fit.colors == "gentle")
+    reduction = replace(reduce_to(asked, basis.lights), is_joined=fit.colors == "gentle")
+    return reduction if gamuts is None else reduction.with_gamuts(gamuts)
 
 
 def _bases(given: Any) -> list[Basis]:

@@ -169,22 +169,24 @@ def _one(problem: Problem, start: Doubles, reached: Bools | None = None) -> Solu
 def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
     """From weights (n, 3) within what is asked to the least of the loss.
 
-    reached: as of `_solution`. The whites of lights that keep to a range of them stay as the
-    reduction has them while the loss falls, and are asked again where it is least.
+    reached: as of `_solution`. Which whites lights mix that keep to a range of them, and which
+    lights are kept within their gamuts, stays as the reduction has it while the loss falls, and is
+    asked again where it is least.
     """
     solution = _descended_between(problem, start, reached)
-    if not problem.reduction.white_knobs:
+    if not (problem.reduction.white_knobs or problem.reduction.gamut_knobs):
         return solution
     count, value = solution.certificate.rounds, _missed(solution)
     for _ in range(WHITES_TRIED):
         at = solution.problem
         equations = at.pulled(at.solved)
         reduction, optimum = next_whites(equations, at.reduction, solution.weights)
-        if all(reduction.knobs[k] is at.reduction.knobs[k] for k in reduction.white_knobs):
+        if all(a is b for a, b in zip(reduction.knobs, at.reduction.knobs, strict=True)):
             break
         nearer = _descended_between(at.reduced(reduction), optimum.weights, reached, is_near=True)
         count, missed = count + nearer.certificate.rounds, _missed(nearer)
-        if missed > value * (1 - WORTH):
+        # What left its gamut may not, whatever that costs.
+        if reduction.gamut_knobs == at.reduction.gamut_knobs and missed > value * (1 - WORTH):
             break
         solution, value = nearer, missed
     return solution.told(rounds=count)

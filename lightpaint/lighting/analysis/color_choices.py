@@ -24,7 +24,7 @@ from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Squares
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, reduced_by
+from lightpaint.lighting.problem import Problem, gamuts_for, reduced_by
 from lightpaint.lighting.reweighted import Asked, Led, change, rounds
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
@@ -35,7 +35,7 @@ SAMPLE, EACH, LOOKED_AT = 2**12, 2**6, 2**12
 #: Change of a light's picture in a round, beside the brightest light's, that ends the rounds.
 ENOUGH = 1e-3
 
-#: Times that lights which are to be white go on to other whites, at most.
+#: Times that lights go on to other whites, or are kept within their gamuts, at most.
 WHITES_TRIED = 5
 
 #: Part of all light that the hue of one must change to be spoken of.
@@ -134,7 +134,8 @@ def _finder(solution: Solution) -> Callable[[Problem], Doubles]:
     def best(problem: Problem) -> Doubles:
         problem, begin = squares(problem)
         found = led(problem, begin)
-        for _ in range(WHITES_TRIED if problem.reduction.white_knobs else 0):
+        its = problem.reduction
+        for _ in range(WHITES_TRIED if its.white_knobs or its.gamut_knobs else 0):
             asked = problem.pulled(found.equations)
             reduction, near = next_whites(asked, problem.reduction, found.weights)
             if change(found.equations, found.weights, near.weights) <= ENOUGH:
@@ -152,7 +153,8 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     Raises ConstraintError where a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
-    full = reduced_by(problem.constraints, problem.basis, fit)
+    gamuts = gamuts_for(problem.basis, problem.views, fit)
+    full = reduced_by(problem.constraints, problem.basis, fit, gamuts)
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)

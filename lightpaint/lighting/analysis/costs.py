@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.problem import reduced_by
+from lightpaint.lighting.problem import gamuts_for, reduced_by
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 
@@ -16,7 +16,8 @@ def without_constraints(solution: Solution) -> Solution | None:
     problem = solution.problem
     if not problem.constraints or solution.whole is not None:
         return None
-    free = reduced_by(Constraints(), solution.basis, problem.fit)
+    gamuts = gamuts_for(problem.basis, problem.views, problem.fit)
+    free = reduced_by(Constraints(), solution.basis, problem.fit, gamuts)
     anew = replace(
         problem,
         constraints=Constraints(),

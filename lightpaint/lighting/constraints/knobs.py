@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import BasisLight
 from lightpaint.colour.color import luminance
+from lightpaint.colour.hull import ColorHull
 from lightpaint.colour.whites import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
@@ -37,7 +38,9 @@ class Knob:
 
     limit: coefficients, least and most of a sum over its unknowns, if one is limited.
     whites: the range of white of a light that keeps to one. window: between which of these its two
-    unknowns mix at present (whites.py).
+    unknowns mix at present (on_locus.py).
+    gamut: the colours of a light that keeps to some, but has any as long as that makes no
+    difference (on_locus.py).
     """
 
     lights: tuple[int, ...]
@@ -45,6 +48,7 @@ class Knob:
     limit: tuple[tuple[float, ...], float, float] | None = None
     whites: WhiteRange | None = None
     window: tuple[int, int] = (0, 0)
+    gamut: ColorHull | None = None
 
     @cached_property
     def is_free(self) -> bool:
@@ -69,6 +73,16 @@ class Knob:
         """It on the straight line that its window is part of, by `reach` mireds further."""
         assert self.whites is not None
         return self._mixing(self.whites.tangent(self.window, reach), self.window)
+
+    def within_gamut(self) -> "Knob":
+        """It as a mix of what its gamut is made of."""
+        assert self.gamut is not None
+        [light], primaries = self.lights, self.gamut.primaries
+        limit = self.limit
+        if limit is not None:
+            limit = ((1.0,) * len(primaries), *limit[1:])
+        unknowns = tuple(Unknown(((light, rgb),)) for rgb in primaries)
+        return replace(self, unknowns=unknowns, limit=limit)
 
     def _mixing(self, colors: Doubles, window: tuple[int, int]) -> "Knob":
         [light] = self.lights

@@ -64,7 +64,7 @@ def solve_on_locus(
     neighbours, at most. how: as of `solve_reduced`.
     """
     if not reduction.white_knobs:
-        return reduction, solve_reduced(equations, reduction, start, **how)
+        return next_whites(equations, reduction, start, steps=steps, **how)
     groups, at = _groups(reduction), start
     if all(_is_whole(reduction, k) for k in reduction.white_knobs):
         at = solve_reduced(equations, reduction, _snapped(groups, start), **how).weights
@@ -91,10 +91,11 @@ def next_whites(
     groups = _groups(reduction, only)
     found = solve_reduced(equations, reduction, _snapped(groups, start), **how)
     for _ in range(steps):
-        windows = _better(equations, reduction, groups, found)
-        if not windows:
+        beyond = _beyond_gamuts(reduction, found.weights)
+        windows = {} if beyond else _better(equations, reduction, groups, found)
+        if not (windows or beyond):
             break
-        reduction = reduction.with_windows(windows)
+        reduction = reduction.with_windows(windows).kept_within(beyond)
         found = solve_reduced(equations, reduction, _snapped(groups, found.weights), **how)
     return reduction, found
 
@@ -110,6 +111,30 @@ def snapped(reduction: Reduction, weights: Doubles) -> Doubles:
     Lights stay as bright as they are.
     """
     return _snapped(_groups(reduction), weights) if reduction.white_knobs else weights
+
+
+def _beyond_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
+    """The knobs of lights whose colours, of weights (n, 3), are not of their gamuts.
+
+    Lights first have any colour: where all of these are of their gamuts, the answer is the best
+    of these, too, and has fewer unknowns.
+    """
+    found = []
+    for k in reduction.gamut_knobs:
+        knob = reduction.knobs[k]
+        assert knob.gamut is not None
+        if not knob.gamut.has(weights[knob.lights[0]]):
+            found.append(k)
+    return found
+
+
+def within_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
+    """Weights (n, 3) with the nearest colour of its gamut for each light that keeps to one."""
+    moved = weights.copy()
+    for knob in reduction.knobs:
+        if knob.gamut is not None:
+            moved[knob.lights[0]] = knob.gamut.nearest(weights[knob.lights[0]])
+    return moved
 
 
 def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_Lights]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.basis import BasisLight
+from lightpaint.colour.hull import ColorHull
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
 from lightpaint.lighting.constraints.blocks import Alike, Block, Entries, Kind, Stack
@@ -65,6 +66,25 @@ class Reduction:
             if knob.whites is not None and any(x.upper > 0 for x in knob.unknowns)
         )
 
+    @cached_property
+    def gamut_knobs(self) -> tuple[int, ...]:
+        """Places of the knobs that keep to a gamut, and as yet have any colour."""
+        its = enumerate(self.knobs)
+        return tuple(k for k, knob in its if knob.gamut is not None and knob.is_free)
+
+    def with_gamuts(self, gamuts: Sequence[ColorHull]) -> "Reduction":
+        """The same with lights that may have any colour keeping to `gamuts`, one of each light."""
+        knobs = [
+            replace(knob, gamut=gamuts[knob.lights[0]]) if _has_any_colour(knob) else knob
+            for knob in self.knobs
+        ]
+        return replace(self, knobs=tuple(knobs))
+
+    def kept_within(self, places: Collection[int]) -> "Reduction":
+        """The same with these knobs, by their places, within their gamuts."""
+        knobs = [knob.within_gamut() if k in places else knob for k, knob in enumerate(self.knobs)]
+        return replace(self, knobs=tuple(knobs))
+
     def with_windows(self, windows: Mapping[int, tuple[int, int]]) -> "Reduction":
         """The same with knobs, by their places, between other whites of their ranges."""
         knobs = [*self.knobs]
@@ -75,8 +95,9 @@ class Reduction:
 
     @cached_property
     def is_free(self) -> Bools:
-        """(n,), which lights may have any colour, each channel by itself."""
-        free = {light for knob in self.knobs if knob.is_free for light in knob.lights}
+        """(n,), which lights may have any colour, or any of a gamut."""
+        its = (knob for knob in self.knobs if knob.is_free or knob.gamut is not None)
+        free = {light for knob in its for light in knob.lights}
         return np.array([k in free for k in range(len(self.labels))], dtype=bool)
 
     @cached_property
@@ -251,6 +272,11 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
         else:
             knobs.append(mix_of(k, light, one))
     return Reduction(held, tuple(labels), tuple(knobs))
+
+
+def _has_any_colour(knob: Knob) -> bool:
+    """Whether nothing is asked of a light's channels."""
+    return knob.is_free and all(x.lower == 0 and np.isinf(x.upper) for x in knob.unknowns)
 
 
 def only(reduction: Reduction, chosen: Collection[int]) -> Reduction:

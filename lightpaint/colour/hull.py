@@ -1,0 +1,88 @@
+"""Colours that light may have: all mixes of some, as a polygon in CIE 1976 (u', v').
+
+Mixes of two lights lie on the straight line between them there, so that what is mixed of colours
+in a convex polygon stays in it. The polygon is given by how far it reaches in some directions.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.color import luminance
+from lightpaint.colour.locus import uv_of, xyz_of
+from lightpaint.colour.primaries import REC709, rgb_to_xyz
+
+#: Directions in which a polygon is bounded, (k, 2), of length 1.
+DIRECTIONS = np.stack([(np.cos(a), np.sin(a)) for a in np.arange(12) * (np.pi / 6)])
+
+#: Distance beyond a bound that is round-off, in (u', v').
+ROUND_OFF = 1e-9
+
+
+def chromaticity(rgb: Floats) -> Doubles:
+    """CIE 1976 (u', v'), (…, 2), of linear Rec.709 colours (…, 3) that are not black."""
+    return np.asarray(uv_of(np.asarray(rgb, np.float64) @ rgb_to_xyz(REC709).T) * [1, 1.5])
+
+
+def reach_of(rgb: Floats) -> Doubles:
+    """(k,), how far colours (n, 3) reach in each direction, the farthest of them."""
+    return np.asarray((chromaticity(rgb) @ DIRECTIONS.T).max(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class ColorHull:
+    """The colours that reach no further than `reach`, (k,), in each direction.
+
+    own: (3,), one of them, linear.
+    """
+
+    reach: Doubles
+    own: Doubles
+
+    @cached_property
+    def primaries(self) -> Doubles:
+        """(m, 3), linear Rec.709 of luminance 1, whose mixes with weights >= 0 these are.
+
+        No more than Rec.709 has.
+        """
+        corners = chromaticity(np.eye(3))
+        for direction, reach in zip(DIRECTIONS, self.reach, strict=True):
+            corners = _cut(corners, direction, float(reach))
+        xyz = np.array([xyz_of((u, v / 1.5)) for u, v in corners])
+        rgb: Doubles = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz.T).T, 0)
+        rgb /= luminance(rgb)[:, None]
+        return rgb
+
+    def has(self, rgb: Floats) -> bool:
+        """Whether it has the colour of a light (3,); that of black is any."""
+        if not np.any(rgb):
+            return True
+        beyond = DIRECTIONS @ chromaticity(rgb) - self.reach
+        return bool((beyond <= ROUND_OFF).all())
+
+    def nearest(self, rgb: Floats) -> Doubles:
+        """The colour on the way from its own to that of a light (3,) where it ends, as bright."""
+        if self.has(rgb):
+            return np.array(rgb, np.float64)
+        own, to = chromaticity(self.own), chromaticity(rgb)
+        along = DIRECTIONS @ (to - own)
+        room = self.reach - DIRECTIONS @ own
+        t = float(np.min(room[along > 0] / along[along > 0], initial=1.0))
+        u, v = own + max(t, 0.0) * (1 - 1e-12) * (to - own)
+        found = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz_of((u, v / 1.5))), 0)
+        return np.asarray(found * (luminance(rgb) / luminance(found)))
+
+
+def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:
+    """The part of a convex polygon, (m, 2), that reaches no further (Sutherland and Hodgman)."""
+    room = reach - corners @ direction
+    kept = []
+    for k, (a, left) in enumerate(zip(corners, room, strict=True)):
+        b, other = corners[(k + 1) % len(corners)], room[(k + 1) % len(corners)]
+        if left >= 0:
+            kept.append(a)
+        if left * other < 0:
+            kept.append(a + (b - a) * (left / (left - other)))
+    return np.array(kept).reshape(-1, 2)

@@ -1,0 +1,131 @@
+"""Lamps take no colour that nobody painted, however dim; and what somebody paints they take."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.hull import DIRECTIONS, chromaticity
+from lightpaint.colour.whites import white_range
+from lightpaint.lighting import problem as module
+from lightpaint.lighting.fit import meant_by
+from lightpaint.lighting.gamuts import MARGIN
+from lightpaint.lighting.live import Live
+from lightpaint.lighting.live_view import LiveView
+
+SIZE = (24, 30)
+
+#: Duv: that of the margin on the side of green; on that of pink the mixes of far whites, too, which
+#: are 0.015 off the locus.
+NOT_GREEN, NOT_PINK = 0.012, 0.026
+
+PAINTED = slice(2, 10), slice(3, 14)
+BLACK = slice(14, 22), slice(12, 27)
+
+WARM = kelvin_to_rgb(2700) / kelvin_to_rgb(5500)
+GREEN = np.array([0.2, 1.0, 0.25])
+
+
+def _room(make_basis: Any, seed: int) -> lp.Basis:
+    """Lamps of white light over surfaces of any colour; one hardly shows, one lights few pixels."""
+    rng = np.random.default_rng(seed)
+    albedo = rng.uniform(0.05, 0.9, (*SIZE, 3))
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
+    images = []
+    for _ in range(6):
+        y, x, wide = rng.uniform(0, SIZE[0]), rng.uniform(0, SIZE[1]), rng.uniform(3, 12)
+        spot = np.exp(-((rows - y) ** 2 + (columns - x) ** 2) / (2 * wide**2)) + 0.02
+        # Light that comes off coloured surfaces before it gets there.
+        images.append(spot[..., None] * albedo * rng.uniform(0.3, 1, 3))
+    images[4] *= 0.01
+    emission = [kelvin_to_rgb(float(rng.uniform(3000, 7500))) for _ in images]
+    return make_basis(6, SIZE, images=np.array(images), emission=emission)  # type: ignore[no-any-return]
+
+
+def _painting(basis: lp.Basis, tint: Any, *, brighter: float = 1.7) -> tuple[Any, Any]:
+    image, weight = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    image[PAINTED] *= brighter * tint
+    image[BLACK] = 0
+    weight[PAINTED] = weight[BLACK] = 1
+    return image, weight
+
+
+def _target(image: Any, weight: Any) -> lp.Target:
+    transform = lp.ViewTransform("srgb", 0.0)
+    how: dict[str, Any] = {"through_view": True, "over_look": True, "transform": transform}
+    return lp.Target("t", image, weight, everything=False, **how)
+
+
+def _is_white(weights: Any) -> bool:
+    """Whether all lamps that shine at all are nearly white."""
+    green = white_range(2200, 9000).greener(weights)
+    return bool(green.min() > -NOT_PINK and green.max() < NOT_GREEN)
+
+
+@pytest.mark.parametrize("space", ["display", "linear"])
+@pytest.mark.parametrize("seed", range(8))
+def test_who_paints_warm_and_black_gets_no_green_lamp(
+    make_basis: Any, seed: int, space: Any
+) -> None:
+    basis = _room(make_basis, seed)
+    solution = lp.solve(basis, _target(*_painting(basis, WARM)), space=space)
+    assert solution.problem.fit.colors == "gentle"
+    assert solution.certificate.converged
+    assert _is_white(solution.weights)
+
+
+def test_without_gamuts_lamps_would_be_green(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the test above could not fail."""
+    monkeypatch.setattr(module, "gamuts_for", lambda *_: None)
+    found = []
+    for seed in range(8):
+        basis = _room(make_basis, seed)
+        target = _target(*_painting(basis, WARM))
+        found.append(_is_white(lp.solve(basis, target, space="linear").weights))
+    assert np.count_nonzero(found) <= 2
+
+
+@pytest.mark.parametrize("space", ["display", "linear"])
+def test_who_paints_green_gets_green(make_basis: Any, space: Any) -> None:
+    basis = _room(make_basis, 1)
+    image, weight = _painting(basis, GREEN)
+    solution = lp.solve(basis, _target(image, weight), space=space, hold=0.1)
+    where = white_range(2200, 9000).greener(solution.weights)
+    lit = (basis.images[(slice(None), *PAINTED)].mean(axis=(1, 2)) * solution.weights).sum(axis=1)
+    assert where[np.argmax(lit)] > 0.02
+
+
+@pytest.mark.parametrize("space", ["display", "linear"])
+@pytest.mark.parametrize("seed", range(3))
+def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:
+    basis = _room(make_basis, seed)
+    image, weight = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    view = LiveView(basis, image, weight)
+    fit = meant_by(lp.Fit(space=space), [_target(*_painting(basis, WARM))])
+    live = Live([view], fit=fit, constraints=lp.Constraints())
+    painted, whole = _painting(basis, WARM)
+    answer = basis.present_weights
+    for region in (PAINTED, BLACK):
+        for row in range(region[0].start, region[0].stop):
+            its = slice(row, row + 1), region[1]
+            image[its], weight[its] = painted[its], whole[its]
+            view.painted(its)
+            answer = live.answer(answer)
+            assert _is_white(answer)
+
+
+def test_gamuts_are_no_wider_than_what_is_painted(make_basis: Any) -> None:
+    basis = _room(make_basis, 3)
+    target = _target(*_painting(basis, WARM))
+    gamuts = [knob.gamut for knob in module.Problem.of(basis, target).full.knobs]
+    allowed = np.vstack([white_range(2200, 9000).colors, WARM * basis.present_weights])
+    allowed = np.vstack([allowed, basis.present_weights, WARM * np.eye(3).sum(axis=0)])
+    reach = (chromaticity(allowed) @ DIRECTIONS.T).max(axis=0)
+    for gamut in gamuts:
+        assert gamut is not None
+        # What several lamps mix that have other colours is between these.
+        assert (gamut.reach <= reach + MARGIN + 1e-3).all()
