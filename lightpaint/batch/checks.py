@@ -1,12 +1,13 @@
 """What a table asks for, before files are read: what lacks, contradicts itself, is not there."""
 
 from collections.abc import Mapping
-from glob import glob, has_magic
+from glob import has_magic
 from pathlib import Path
 from typing import Any
 
 from lightpaint.batch.keys import SOURCE, SUBJECTS, Handover, Mistakes, near_key
 from lightpaint.batch.manifest import Manifest, Table, subject
+from lightpaint.batch.patterns import files_matching
 from lightpaint.batch.variations import SOLVED
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
@@ -218,4 +219,4 @@ def matching(base: Path, path: str) -> list[str]:
     given = str(base / path)
     if not has_magic(path) or Path(given).is_file():
         return [given] if Path(given).is_file() else []
-    return sorted(x for x in glob(given, recursive=True) if Path(x).is_file())
+    return sorted(files_matching(given))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from glob import has_magic
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,14 @@ from lightpaint.batch.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
 from lightpaint.batch.manifest import Manifest, Table
 from lightpaint.batch.variations import SHIFTED
 from lightpaint.colour.transform import TransformChoice
-from lightpaint.errors import LightpaintError
+from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
+
+#: Looks of one batch, at most.
+MOST_LOOKS = 10_000
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,10 @@ def looks_of(manifest: Manifest) -> Looks:
     for table in manifest.looks:
         made, entry = _of_look(manifest, sources, table)
         looks.whole.extend(made)
+        if len(looks.whole) > MOST_LOOKS:
+            raise BatchError(
+                f"{manifest.path} asks for more than {MOST_LOOKS} looks: make several batches of it"
+            )
         if entry is not None:
             looks.rest.append((table, entry))
     return looks
@@ -150,7 +158,7 @@ def _of_look(
         _painting(manifest, look, "")
         if len(mistakes.found) == before and not table.unclear:
             entry = replace(entry, basis=sources.basis(look))
-            made = list(_of_subject(manifest, sources, entry, look))
+            made = list(islice(_of_subject(manifest, sources, entry, look), MOST_LOOKS + 1))
             made += [_varied(x, word) for word in look.get("variations", ()) for x in made]
     except LightpaintError as error:
         mistakes.add(where, str(error))

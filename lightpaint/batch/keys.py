@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 from lightpaint.batch.variations import VARIATIONS
 from lightpaint.errors import LightpaintError
-from lightpaint.expected import BRIGHTEST, SWITCH, Check, a, one_of, whole
+from lightpaint.expected import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, one_of, whole
 from lightpaint.files import one_line
 from lightpaint.relit.forms import FORMS
 from lightpaint.scene.film import check_resolution
@@ -29,7 +29,9 @@ MOST_FRAMES = 10_000
 
 
 def _texts(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(x, str) and x for x in value)
+    if not (isinstance(value, list) and 0 < len(value) <= MAX_LISTED):
+        return False
+    return all(isinstance(x, str) and x for x in value)
 
 
 def _table_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
@@ -54,7 +56,7 @@ def _some_of(words: Iterable[str]) -> Check:
 
 
 TEXT: Check = (lambda value: isinstance(value, str) and value != "", "a text")
-TEXTS: Check = (_texts, 'a list of texts, ["a", "b"]')
+TEXTS: Check = (_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most')
 TABLE: Check = a(dict, "a table")
 
 #: How a scene is loaded, or what is there in its place.

@@ -5,11 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.batch.checks import SHOWN, check_handover, check_sequence, check_wanted
-from lightpaint.batch.entries import Entry, Looks, looks_of
-from lightpaint.batch.keys import Mistakes
+from lightpaint.batch.entries import MOST_LOOKS, Entry, Looks, looks_of
+from lightpaint.batch.keys import MOST_FRAMES, Mistakes
 from lightpaint.batch.manifest import Manifest, Table
 from lightpaint.batch.names import is_reserved, name_clashes
 from lightpaint.batch.sequence import at_frame
+from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 
 
@@ -18,6 +19,11 @@ def entries_of(manifest: Manifest) -> Looks:
     looks = looks_of(manifest)
     for table in manifest.sequences:
         looks.whole.extend(_of_sequence(manifest, looks, table))
+        if len(looks.whole) > MOST_LOOKS + MOST_FRAMES:
+            raise BatchError(
+                f"{manifest.path} asks for more than {MOST_LOOKS} looks and {MOST_FRAMES} frames: "
+                "make several batches of it"
+            )
     named = [entry for _, entry in looks.rest if entry.name]
     _check_names(manifest, [*looks.whole, *named])
     return looks

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lightpaint.colour.icc import Profile, read_icc
 from lightpaint.errors import ImageError
 from lightpaint.files import first_line
-from lightpaint.images.png import read_png_head
+from lightpaint.images.png import PNG_HEAD, longest_png, read_png_head
 from lightpaint.images.psd import check_psd
 from lightpaint.images.silence import silenced
 from lightpaint.images.tiff import check_tiff
@@ -60,6 +60,13 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
     profile: Profile | None = None
     transparency = True
     if kind == "png":
+        with path.open("rb") as file:
+            longest = longest_png(file.read(PNG_HEAD))
+        if path.stat().st_size > longest:
+            raise ImageError(
+                f"is {path.stat().st_size} bytes long, and no PNG of its size has more than "
+                f"{longest}: save it again"
+            )
         shown, profile = read_png_head(path)
     elif kind == "psd":
         transparency = check_psd(path, most=MAX_PIXELS)

@@ -10,7 +10,8 @@ from typing import IO
 
 from lightpaint.errors import ImageError
 from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.kinds import head_of, kind_of
+from lightpaint.images.kinds import kind_of
+from lightpaint.images.png import PNG_HEAD, longest_png
 
 #: What a layered zip says it is, and where its merged picture lies.
 LAYERED = {b"image/openraster": "ora", b"application/x-krita": "kra"}
@@ -51,9 +52,13 @@ def read_merged(path: Path, kind: str) -> Bitmap:
                 raise ImageError("declares a merged picture that is too large to unpack")
             merged = Path(folder) / MERGED
             with archive.open(member) as packed, merged.open("wb") as unpacked:
-                _copy(packed, unpacked, member.file_size)
-            if kind_of(head_of(merged, 16)) != "png":
-                raise ImageError("has a merged picture that is no PNG")
+                head = packed.read(PNG_HEAD)
+                if kind_of(head) != "png":
+                    raise ImageError("has a merged picture that is no PNG")
+                if member.file_size > longest_png(head):
+                    raise ImageError("is damaged: its merged picture is longer than it can be")
+                unpacked.write(head)
+                _copy(packed, unpacked, member.file_size - len(head))
             return replace(read_bitmap(merged, "png"), kind=kind)
     except KeyError:
         raise ImageError(f"has no merged picture ({MERGED}): save it again") from None

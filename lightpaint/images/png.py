@@ -24,6 +24,9 @@ from lightpaint.keywords import keywords
 #: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
 MAX_CHUNK = 2**24
 
+#: Bytes of a PNG that say its size.
+PNG_HEAD = 26
+
 #: Bytes of a PNG in which its texts stand.
 MAX_TEXTS = 2**12
 
@@ -96,6 +99,21 @@ def write_png(
 ) -> None:
     """Write a linear image display-encoded as 8-bit sRGB PNG, whole or not at all."""
     write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
+
+
+def longest_png(head: bytes) -> int:
+    """Return the most bytes that a PNG which begins like `head` has any use for.
+
+    That is what its pixels take without compression, and room for profiles, texts and a thumbnail.
+    Raises ImageError, without naming the file, for what does not begin like one.
+    """
+    if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
+        raise ImageError("is damaged: it does not begin like a PNG")
+    width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
+    channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
+    # Adam7 has seven pictures, each with a byte for each of its rows.
+    row = -(-int(width) * channels * bits // 8) + 1
+    return 2 * MAX_CHUNK + 8 * int(height) + row * int(height) * 1001 // 1000
 
 
 def read_png_head(path: Path) -> tuple[str | None, Profile | None]:

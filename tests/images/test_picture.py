@@ -19,7 +19,9 @@ from PIL import Image, ImageCms
 from lightpaint.colour.display import decode_display
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import ImageError
+from lightpaint.images import layered as layered_module
 from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.images.png import MAX_CHUNK, longest_png
 
 SIZE = (9, 7)
 
@@ -508,3 +510,44 @@ def test_the_profile_of_pillow(tmp_path: Path):
     pixels = _pixels()
     Image.fromarray(pixels).save(tmp_path / "a.tif", icc_profile=profile)
     _assert_is(read_picture(tmp_path / "a.tif"), pixels, "tiff")
+
+
+# --- Files that are longer than what they hold
+
+
+@pytest.mark.parametrize("begins", [b"", "png"])
+def test_a_merged_picture_of_nothing_is_not_unpacked(
+    tmp_path: Path, begins: Any, monkeypatch: pytest.MonkeyPatch
+):
+    """No more than its head is, however long it says it is."""
+    buffer, head = io.BytesIO(), png(_pixels()) if begins else b""
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("mimetype", b"application/x-krita", zipfile.ZIP_STORED)
+        archive.writestr("mergedimage.png", head + bytes(2**26))
+    unpacked = []
+    monkeypatch.setattr(layered_module, "_copy", lambda *given: unpacked.append(given))
+    with pytest.raises(ImageError, match=r"that is no PNG|longer than it can be"):
+        _read(tmp_path, buffer.getvalue())
+    assert unpacked == []
+
+
+def test_what_stands_behind_a_png_is_not_read(tmp_path: Path):
+    path = tmp_path / "long.png"
+    path.write_bytes(png(_pixels()))
+    read_picture(path)
+    with path.open("ab") as file:
+        for _ in range(40):
+            file.write(bytes(range(256)) * 2**12)
+    with pytest.raises(ImageError, match=r"no PNG of its size has more than \d+: save it again"):
+        read_picture(path)
+
+
+@pytest.mark.parametrize("mode", ["RGBA", "RGB", "L", "1"])
+def test_no_png_of_noise_is_too_long(mode: str):
+    """Which is the longest there is, stored as it is."""
+    noise = np.random.default_rng(0).integers(0, 256, (300, 401, 4), np.uint8)
+    buffer = io.BytesIO()
+    Image.fromarray(noise).convert(mode).save(buffer, "PNG", compress_level=0)
+    data = buffer.getvalue()
+    assert len(data) <= longest_png(data[:26]) - 2 * MAX_CHUNK
+    assert longest_png(data[:26]) < 2 * MAX_CHUNK + 1.1 * len(data) + 8 * 300 + 1000

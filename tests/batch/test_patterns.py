@@ -1,0 +1,68 @@
+"""Patterns of a manifest: they find what `glob` finds, and end."""
+
+import os
+import time
+from glob import glob
+from pathlib import Path
+
+import pytest
+
+from lightpaint.batch import entries
+from lightpaint.batch.manifest import read_manifest
+from lightpaint.batch.patterns import files_matching
+from lightpaint.batch.plan import plan
+from lightpaint.errors import BatchError
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    names = ["a.exr", "b.exr", "b.png", ".hidden.exr", "x/c.exr", "x/y/d.exr", "x/y/z/e.exr"]
+    for name in [*names, ".x/f.exr", "x[1]/g.exr"]:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        *("*.exr", "?.exr", "[ab].*", "**/*.exr", "x/**", "**", "**/y/*", "*/*.exr", ".*.exr"),
+        *("**/**/**/*.exr", "x/**/z/*", "nowhere/*.exr", "*/nowhere", "./*.exr", "x/../*.exr"),
+    ],
+)
+def test_they_find_what_glob_finds(here: Path, pattern: str) -> None:
+    for given in (pattern, str(here / pattern)):
+        expected = {x for x in glob(given, recursive=True) if Path(x).is_file()}
+        found = files_matching(given)
+        assert {os.path.normpath(x) for x in found} == {os.path.normpath(x) for x in expected}
+        assert len(set(found)) == len(found)
+
+
+@pytest.mark.parametrize("pattern", ["/**/*", "/proc/**/*", "/usr/**/**", "/usr/**/**/**/*x*/**"])
+def test_one_that_means_the_whole_machine_ends_soon(here: Path, pattern: str) -> None:
+    (here / "looks.toml").write_text(f'[[look]]\nscene = "room.xml"\npainting = "{pattern}"\n')
+    began_s = time.monotonic()
+    with pytest.raises(BatchError, match="more than 20000 files to look at: name a folder"):
+        plan("looks.toml", "out")
+    assert time.monotonic() - began_s < 15
+
+
+def test_a_loop_of_links_has_an_end(here: Path) -> None:
+    (here / "x" / "again").symlink_to(here)
+    assert len(files_matching("**/d.exr")) == 1
+
+
+def test_looks_have_a_number(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (here / "room.xml").touch()
+    manifest = here / "looks.toml"
+    text = '[[look]]\nscene = "room.xml"\npainting = "a.exr"\nsensors = {}\n'
+    names = [f"sensor {k}" for k in range(100_000)]
+    manifest.write_text(text.format(names))
+    [first, *_] = read_manifest(manifest).mistakes.found
+    assert "sensors is" in first
+    assert "10000 at most" in first
+    monkeypatch.setattr(entries, "MOST_LOOKS", 20)
+    manifest.write_text(text.format(names[:21]))
+    with pytest.raises(BatchError, match="asks for more than 20 looks"):
+        plan(manifest, "out")
