@@ -11,6 +11,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.batch.cluster import LEAST_S, PATIENCE
+from lightpaint.cli.commands import template_lines
 from lightpaint.cli.parser import command_parser
 from lightpaint.lighting.constraints.whites import WHITES
 from lightpaint.lighting.fit import HOLD
@@ -18,6 +19,7 @@ from lightpaint.paint.address import PORT
 from lightpaint.scene.alike import FEW
 from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import load_scene
+from lightpaint.target.template import PLAIN
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -157,6 +159,21 @@ def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
     for text in (page, solving):
         assert f"{WHITES[0]} to {WHITES[1]} K" in text
     assert f"`--kelvin '*={WHITES[0]}:{WHITES[1]}'`" in method
+
+
+def test_which_files_are_painted_over_is_said_alike():
+    """In the README, in the document on targets, and by `lightpaint template` itself."""
+    told = {
+        match[1]
+        for line in template_lines(Path("template"), [Path("template") / name for name in PLAIN])
+        if (match := re.match(r"template/(\S+): .*paint over", line))
+    }
+    readme = (ROOT / "README.md").read_text()
+    [section] = re.findall(r"The first command writes (.*?)Paint over one of the two", readme, re.S)
+    named = re.findall(r"`(\w+\.(?:png|exr))`", section)
+    targets = (ROOT / "docs" / "targets.md").read_text()
+    [opened] = re.findall(r"Open `([\w.]+)` \(16 bits, sRGB\) or `([\w.]+)` \(linear", targets)
+    assert told == set(named) == set(opened)
 
 
 def test_the_corridor_is_quoted_as_it_stands():

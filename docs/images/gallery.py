@@ -31,7 +31,7 @@ def manifest(folder: Path, spp: int) -> Path:
     for there, here in (
         ('"scene.xml"', f'"{LOOKS.with_name("scene.xml")}"'),
         ("../../targets", str(ROOT / "targets")),
-        ('quality = "preview"', f'resolution = "1/2"\nspp = {spp}'),
+        ('resolution = "1/2"', f'resolution = "1/2"\nspp = {spp}'),
         ('"predict", "verify", "report"]', '"predict"]'),
     ):
         assert there in text, there

@@ -33,8 +33,9 @@ from lightpaint.version import __version__
 
 FORMAT = "lightpaint-batch 1"
 
-#: Pixels of a small picture from left to right, at most; and quality of its JPEG.
-WIDEST, QUALITY = 320, 82
+#: Pixels of a picture in the gallery from left to right, at most: of a few looks, which are
+#: compared as large as a window, and of more of them; quality of its JPEG.
+WIDE, WIDE_LOOKS, NARROW, QUALITY = 960, 64, 320, 82
 
 #: Columns of summary.csv before those of the lights.
 COLUMNS = (
@@ -102,6 +103,7 @@ class Row:
 def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
     """A row for each view of each look, in the order of the manifest."""
     rows: list[Row] = []
+    widest = WIDE if len(plan.looks) <= WIDE_LOOKS else NARROW
     views: dict[str, tuple[str, float] | None] = {}
     for look in plan.looks:
         state, why = state_of(look, lines)
@@ -111,7 +113,7 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
             like = row.view or next((views[x] for x in look.entry.of if views.get(x)), None)
             views.setdefault(look.entry.name, like)
             if state == "done":
-                row = _with_picture(row, plan.folder, folder, like, _key(look, lines))
+                row = _with_picture(row, plan.folder, folder, like, _key(look, lines), widest)
             rows.append(row)
     return rows
 
@@ -194,15 +196,16 @@ def _json(path: Path) -> dict[str, Any]:
 
 
 def _with_picture(
-    row: Row, base: Path, folder: Path, view: tuple[str, float] | None, key: str
+    row: Row, base: Path, folder: Path, view: tuple[str, float] | None, key: str, widest: int
 ) -> Row:
-    """With a small picture of the prediction, made once for each answer."""
-    name = f"{THUMBNAILS}/{key}{'-' + folder.name if row.folder != row.look else ''}.jpg"
+    """With a picture of the prediction, made once for each answer. widest: in pixels."""
+    of_view = f"-{folder.name}" if row.folder != row.look else ""
+    name = f"{THUMBNAILS}/{key}{of_view}-{widest}.jpg"
     path = base / name
     with suppress(LightpaintError, OSError):
         if not path.is_file():
             predicted = read_estimate(folder / "predicted.exr")[0]
-            small = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // WIDEST)))
+            small = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
             if predicted.half_difference.any():
                 small = denoised(small)
             stops = choose_exposure(predicted.image)

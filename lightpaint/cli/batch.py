@@ -52,8 +52,9 @@ def batch(
     if form is None and len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
     folder = output or Path(called(Path(paths[0])))
-    # The same in all reports, however often it was stopped, and by how many it is done.
-    command = shlex.join(["lightpaint", "batch", paths[0], "-o", str(folder)])
+    # The same in all reports, however often it was stopped, and from wherever it is done.
+    manifest, into = (str(Path(x).absolute()) for x in (paths[0], folder))
+    command = shlex.join(["lightpaint", "batch", manifest, "-o", into])
     planned = plan(paths[0], folder, force=force, command=command).only(only)
     if is_dry:
         return _dry(planned)

@@ -13,6 +13,7 @@ from lightpaint.cli.listing import note_scene
 from lightpaint.cli.manner import Outcome
 from lightpaint.cli.options import folders_of, is_folder
 from lightpaint.cli.solving import solve
+from lightpaint.cli.words import from_any_folder
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import OutputError
@@ -121,22 +122,30 @@ def _shown_template(output: Path, files: Sequence[Path], *, is_denoised: bool = 
     is_tree = is_folder(output)
     picture = output / SHOWN if is_tree else output.with_suffix(".png")
     linear = output / LIGHT if is_tree else output
-    names = {file.name for file in files}
-    told = "; it is denoised" if is_denoised else ""
-    terminal.write(f"{picture}: paint over it, in any program, and save as PNG{told}")
-    if CLEAN in names:
-        terminal.write(f"{output / CLEAN}: the same in linear light, for programs that know EXR")
-    its = "as it was rendered, with its grain" if is_denoised else "the same in linear light"
-    terminal.write(f"{linear}: {its}")
-    if is_tree:
-        if (output / MATTES) in {file.parent for file in files}:
-            its = f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do"
-        else:
-            its = f"{output}/{LIGHTS}: what lights do"
-        terminal.write(its)
+    for line in template_lines(output, files, is_denoised=is_denoised):
+        terminal.write(line)
     folder = output if is_tree else output.parent
     shown = {"picture": str(picture), "light": str(linear)}
     return Outcome(lambda: documents.files_document(folder, files, **shown))
+
+
+def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> list[str]:
+    """Return what is said of the files of a template, those to paint over first."""
+    is_tree = is_folder(output)
+    picture = output / SHOWN if is_tree else output.with_suffix(".png")
+    told = "; it is denoised" if is_denoised else ""
+    lines = [f"{picture}: paint over it, in any program, and save the painting beside it{told}"]
+    if CLEAN in {file.name for file in files}:
+        lines += [
+            f"{output / CLEAN}: the same in linear light, to paint over in programs that know EXR"
+        ]
+    its = "as it was rendered, with its grain" if is_denoised else "the same in linear light"
+    lines += [f"{output / LIGHT if is_tree else output}: {its}"]
+    if is_tree and (output / MATTES) in {file.parent for file in files}:
+        lines += [f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do"]
+    elif is_tree:
+        lines += [f"{output}/{LIGHTS}: what lights do"]
+    return lines
 
 
 def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
@@ -149,7 +158,8 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
     terminal.say(f"a gallery, and a painting of it at evening, are in {folder}; what runs is")
     terminal.say(command)
     scene = SceneFile(str(made.scene), variant=variant)
-    painting, settings = Painting(str(made.painting)), replace(settings, command=command)
+    settings = replace(settings, command=from_any_folder(command))
+    painting = Painting(str(made.painting))
     solved = solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
     terminal.write("")
     terminal.write(f"Open {made.answer / 'report.html'} in a browser. Then paint your own:")

@@ -5,7 +5,6 @@ both mean another renderer's light groups; `--lights key,fill` goes on to mean t
 scene.
 """
 
-import shlex
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import fields
@@ -16,6 +15,7 @@ from lightpaint.basis.file import is_basis_file
 from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
 from lightpaint.cli.order import options_but
 from lightpaint.cli.wanted import Wanted
+from lightpaint.cli.words import from_any_folder
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import ALONE, BasisError, BatchError, OutputError, TargetError
 from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
@@ -118,7 +118,7 @@ def settings_of(options: Namespace, given: Sequence[str]) -> Settings:
     # A transform is of the painting, which has it; the command is the whole line.
     names = {field.name for field in fields(Settings)} - {"transform", "command"}
     said = {name: value for name, value in vars(options).items() if name in names}
-    return Settings(**said, command=shlex.join(["lightpaint", *given]))
+    return Settings(**said, command=from_any_folder(["lightpaint", *given]))
 
 
 def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> SceneFile:

@@ -55,9 +55,10 @@ def paint(
 
     check_installed()
     from lightpaint.cli.spelling import solve_command
+    from lightpaint.cli.words import from_any_folder
 
     def command(paintings: Mapping[str, str], wishes: "Wishes") -> str:
-        return solve_command(sources[0].path, paintings, options, wishes)
+        return from_any_folder(solve_command(sources[0].path, paintings, options, wishes))
 
     subjects = subjects_of(
         sources,

@@ -1,6 +1,9 @@
 """The words of the command line for those of the library: `--resize` for `resize=True`."""
 
+import os
 import re
+import shlex
+from collections.abc import Sequence
 
 #: Arguments of the library that errors and remarks name, and their options.
 OPTIONS = {
@@ -75,3 +78,16 @@ def _spoken(match: re.Match[str]) -> str:
     if key := re.fullmatch(r"\{'(\w+)': \.\.\.\}", value):
         return f"{OPTIONS[name]} {key[1]}=VALUE"
     return OPTIONS[name] if value in ("...", "True") else f"{OPTIONS[name]} {value.strip(chr(34))}"
+
+
+def from_any_folder(words: Sequence[str] | str) -> str:
+    """Return a command, given as words or as a shell has it, that does the same from any folder.
+
+    Paths stand in it as they were given. In a shell of its own it first goes to the folder that
+    they are meant from.
+    """
+    command = words if isinstance(words, str) else shlex.join(words)
+    try:
+        return f"(cd {shlex.quote(os.getcwd())} && {command})"
+    except OSError:  # of a folder that is there no more
+        return command

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
 from importlib import resources
+from pathlib import Path
 from string import Template
 
 from lightpaint.arrays import Floats
@@ -179,8 +180,13 @@ def _mixer(
         target_picture(target, solution, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
-        scene=shlex.quote(scene) if scene.endswith(".xml") else None,
+        scene=shlex.quote(_from_any_folder(scene)) if scene.endswith(".xml") else None,
     )
+
+
+def _from_any_folder(path: str) -> str:
+    """Return the path of a file that is there as any folder has it, or what it was called."""
+    return str(Path(path).absolute()) if Path(path).exists() else path
 
 
 def _banner(verification: Verification | None) -> str:
@@ -226,6 +232,7 @@ def _paint_again(basis: Basis, target: Target, verification: Verification | None
     if target.content:
         text += " What counts is what differs from the template."
     elif target.everything and basis.origin.scene.endswith(".xml"):
-        make = f"<code>lightpaint template {escape(basis.origin.scene)}</code>"
+        scene = shlex.quote(_from_any_folder(basis.origin.scene))
+        make = f"<code>lightpaint template {escape(scene)}</code>"
         text += f" Here every pixel counts; painted over what {make} renders, only the paint does."
     return text

@@ -11,12 +11,15 @@ import pytest
 from accessible import axe_source
 from batches import NAMES, run_all, small_basis, write_batch
 from command import succeed
+from PIL import Image
 
+from lightpaint.batch import summary
 from lightpaint.batch.gallery import gallery_page
 from lightpaint.batch.planes import keep_planes, planes_name, read_planes
-from lightpaint.batch.summary import LightRow, Row
+from lightpaint.batch.summary import NARROW, WIDE, LightRow, Row
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Lighting
 
@@ -300,3 +303,17 @@ def test_several_paintings_of_solve_are_mixed_as_well(page: Any, tmp_path: Path)
     page.goto((tmp_path / "out" / "index.html").as_uri())
     page.get_by_label("Mix the lights of p1", exact=True).click()
     page.locator(".mixer:not([hidden]) .mixer-body").wait_for()
+
+
+@pytest.mark.parametrize(("widest", "width"), [(WIDE, 600), (NARROW, 300)])
+def test_pictures_of_few_looks_fill_a_window(tmp_path: Path, widest: int, width: int) -> None:
+    """Those of many are half as wide: their page would be too large."""
+    image = np.full((8, 600, 3), 0.2, np.float32)
+    (tmp_path / "p0").mkdir()
+    write_estimate(tmp_path / "p0" / "predicted.exr", Estimate(image, 0 * image), {})
+    row = Row("p0", "done", "", "p0")
+    for _ in range(2):  # made, and found
+        made = summary._with_picture(row, tmp_path, tmp_path / "p0", None, "key", widest)
+        assert made.size[0] == width
+    with Image.open(tmp_path / made.picture) as picture:
+        assert picture.size == made.size

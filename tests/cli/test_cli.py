@@ -7,7 +7,9 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -69,6 +71,27 @@ def test_solve_leaves_everything_it_promises(solved: tuple[Path, str]) -> None:
     assert max(data["solve"]["kkt_residual"]) <= 1e-10
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert f"lightpaint solve {CORNELL} {WARM} --spp 32" in page
+
+
+def test_the_command_that_a_report_shows_works_from_any_folder(
+    basis_file: Path, tmp_path: Path
+) -> None:
+    """Also where paths were given from the folder it was, which has a name that shells part."""
+    there, elsewhere = tmp_path / "it's a room", tmp_path / "elsewhere"
+    for folder in (there, elsewhere):
+        folder.mkdir()
+    shutil.copy(basis_file, there / "a room.basis.exr")
+    shutil.copy(WARM, there / "warm & cosy.exr")
+    succeed(there, "solve", "a room.basis.exr", "warm & cosy.exr", "-o", "out", "-q")
+    answer = (there / "out" / "lighting.json").read_bytes()
+    command = json.loads((there / "out" / "report.json").read_text(encoding="utf-8"))["command"]
+    assert escape(command) in (there / "out" / "report.html").read_text(encoding="utf-8")
+    shutil.rmtree(there / "out")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    how: dict[str, Any] = {"cwd": elsewhere, "env": {**os.environ, "PATH": path}}
+    subprocess.run(["sh", "-c", command], **how, check=True, capture_output=True)
+    assert (there / "out" / "lighting.json").read_bytes() == answer
+    assert not [*elsewhere.iterdir()]
 
 
 def test_verify_and_relight_take_the_result(solved: tuple[Path, str], tmp_path: Path) -> None:

@@ -182,6 +182,26 @@ def test_a_finger_scrolls_past_sliders(make_basis: Any, opened: Any, browser: An
     context.close()
 
 
+def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, opened: Any) -> None:
+    """But what is said of a copy, while it is; and nothing is wider than the phone."""
+    page = opened(report(lit(make_basis, 4)))
+    between = """() => document.querySelector('.mixer-light').getBoundingClientRect().top
+        - document.querySelector('.mixer-buttons').getBoundingClientRect().bottom"""
+    for width in (360, 400):
+        page.set_viewport_size({"width": width, "height": 740})
+        assert 8 < page.evaluate(between) < 24
+        assert page.evaluate("() => document.documentElement.scrollWidth") == width
+    page.get_by_role("button", name="Copy as lighting.json").click()
+    said = page.locator(".mixer-said")
+    said.get_by_text("clipboard").or_(said.get_by_text("copy here")).wait_for()
+    box, buttons, light = (
+        page.locator(x).first.bounding_box()
+        for x in (".mixer-said", ".mixer-buttons", ".mixer-light")
+    )
+    assert buttons["y"] + buttons["height"] <= box["y"]
+    assert box["y"] + box["height"] <= light["y"]
+
+
 @pytest.mark.parametrize("name", ["filmic", "agx", "linear"])
 def test_through_other_transforms(make_basis: Any, opened: Any, name: str) -> None:
     basis = lit(make_basis, 3)
