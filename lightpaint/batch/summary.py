@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -203,7 +204,7 @@ def _with_picture(
     name = f"{THUMBNAILS}/{key}{of_view}-{widest}.jpg"
     path = base / name
     with suppress(LightpaintError, OSError):
-        if not path.is_file():
+        if not _is_whole(path):
             predicted = read_estimate(folder / "predicted.exr")[0]
             small = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
             if predicted.half_difference.any():
@@ -221,6 +222,17 @@ def _with_picture(
         view = (seen, float(stops)) if stops else view
         return Row(**{**vars(row), "picture": name, "size": size, "view": view})
     return row
+
+
+def _is_whole(path: Path) -> bool:
+    """Return whether there is a small picture that can be shown."""
+    try:
+        with Image.open(path) as opened:
+            opened.load()
+            name, _, stops = opened.info.get("comment", b"").decode().partition(" ")
+            return opened.format == "JPEG" and bool(name) and math.isfinite(float(stops))
+    except (OSError, SyntaxError, ValueError):
+        return False
 
 
 def drop_pictures(folder: Path, rows: Iterable[Row]) -> None:

@@ -112,8 +112,8 @@ def longest_png(head: bytes) -> int:
     width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
     channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
     # Adam7 has seven pictures, each with a byte for each of its rows.
-    row = -(-int(width) * channels * bits // 8) + 1
-    return 2 * MAX_CHUNK + 8 * int(height) + row * int(height) * 1001 // 1000
+    row = -(-width * channels * bits // 8) + 1
+    return int(2 * MAX_CHUNK + 8 * height + row * height * 1001 // 1000)
 
 
 def read_png_head(path: Path) -> tuple[str | None, Profile | None]:

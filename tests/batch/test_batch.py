@@ -447,3 +447,15 @@ def test_a_first_manifest_is_one_that_can_be_run(here: Path) -> None:
 
 def test_without_anybody_listening(here: Path) -> None:
     assert run_batch(plan(here / "looks.toml", here / "out").only("third"), None, silent).done
+
+
+@pytest.mark.parametrize("damage", [b"", b"junk", None])
+def test_small_pictures_that_are_damaged_are_made_again(here: Path, damage: bytes | None) -> None:
+    do(here)
+    pictures = sorted((here / "out" / "thumbnails").glob("*.jpg"))
+    before = {path: path.read_bytes() for path in pictures}
+    assert pictures
+    first = pictures[0]
+    first.write_bytes(before[first][: len(before[first]) // 2] if damage is None else damage)
+    do(here)
+    assert {path: path.read_bytes() for path in pictures} == before

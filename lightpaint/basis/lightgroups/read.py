@@ -18,12 +18,16 @@ from lightpaint.basis.lightgroups.beauty import NOTHING, shares, spoken_share, s
 from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import FILES
 from lightpaint.basis.lightgroups.roles import Roles, roles_of
+from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.screen import shortly, some_names
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
+
+#: Share of its light that a group may take away in places: filters with negative lobes do.
+NEGATIVE = 0.25
 
 #: Name of what the groups lack of the beauty, with underscores added should a light have it.
 REST = "rest"
@@ -110,6 +114,21 @@ def read_light_groups(
     return _light_groups(path, roles_of(path, layers, pattern), told)
 
 
+def _check_light(
+    path: Path, lights: Mapping[str, RenderLayer], holes: npt.NDArray[np.bool_]
+) -> None:
+    """Raise BasisError for a group that takes light away: all that follows would be of no use."""
+    for name, layer in lights.items():
+        light = np.where(holes, 0, layer.image.astype(np.float32) @ LUMINANCE)
+        given, taken = float(light[light > 0].sum()), -float(light[light < 0].sum())
+        if taken > NEGATIVE * given:
+            part = f"{taken / given:.2g} times what it gives" if given else "and gives none"
+            raise BasisError(
+                f"{path}: the light group {name!r} takes light away, {part}, which no light does: "
+                "render it again, or leave it out (pattern=...)"
+            )
+
+
 def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
     """told: sentences that come before those of the roles."""
     names, lights, beauty = list(roles.lights), list(roles.lights.values()), roles.beauty
@@ -119,6 +138,7 @@ def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
     holes = ~np.logical_and.reduce([np.isfinite(x.image).all(axis=-1) for x in read])
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
+    _check_light(path, roles.lights, holes)
     missing = _what_is_missing(roles, holes)
     listed = f"light groups as of {roles.renderer}: {some_names(names)}"
     if beauty is not None:

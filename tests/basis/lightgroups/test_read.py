@@ -415,3 +415,16 @@ def test_a_file_of_cycles(tmp_path: Path):
     wanted = np.random.default_rng(0).uniform(0, 3, (6, 3))
     wanted[2] = 0
     np.testing.assert_allclose(_solved(groups, basis.mix(wanted)), wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize("at", [0, 2])
+def test_a_light_that_takes_light_away_is_named_first(tmp_path: Path, at: int):
+    """Before anything is said of their sum, which is of no use then."""
+    images = pictures()
+    images[at] *= -1
+    with pytest.raises(BasisError, match=rf"the light group '{'abc'[at]}' takes light away"):
+        read_light_groups(interleaved(tmp_path / "a.exr", _layers(images)))
+    # Negative lobes of a filter at edges are no such thing.
+    images[at] = np.abs(images[at])
+    images[at, ::3] *= -0.1
+    read_light_groups(interleaved(tmp_path / "b.exr", _layers(images)))
