@@ -113,6 +113,7 @@ def render_template(
     )
 
 
+@keywords()
 def template_of_basis(
     basis: Basis, folder: str | Path, *, transform: ViewTransform | None = None
 ) -> list[Path]:
