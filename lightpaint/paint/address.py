@@ -39,13 +39,15 @@ class Address:
     """Where a socket listens.
 
     name: how the address is written in a URL, without its port; it leads here. names: further names
-    by which requests may call this server, in lower case.
+    by which requests may call this server, in lower case. here: as `name`, for a browser of this
+    machine; None for the same.
     """
 
     name: str
     port: int
     reach: Reach
     names: frozenset[str] = frozenset()
+    here: str | None = None
 
     @property
     def url(self) -> str:
@@ -55,7 +57,7 @@ class Address:
     @property
     def url_here(self) -> str:
         """The same for a browser of this machine, to which its own name is the safest."""
-        return f"http://127.0.0.1:{self.port}/" if self.reach is Reach.ALL else self.url
+        return f"http://{self.here or self.name}:{self.port}/"
 
 
 #: A socket that listens, and where.
@@ -72,12 +74,14 @@ def listen(host: str | None = None, port: int | None = None) -> Listening:
     """
     family, number, is_number = _resolved("127.0.0.1" if host is None else host)
     made = _bound(host or number, family, number, port)
+    here = None
     try:
         at, *_ = made.getsockname()
         bound, its_port = ipaddress.ip_address(at), int(made.getsockname()[1])
         mapped = getattr(bound, "ipv4_mapped", None)
         if bound.is_unspecified:
-            name, reach = _outward_name(its_port), Reach.ALL
+            here = next((x for x in LOOPBACK if _leads_here(x, its_port)), "localhost")
+            name, reach = _outward_name(its_port) or here, Reach.ALL
         else:
             is_loopback = (mapped or bound).is_loopback
             reach = Reach.MACHINE if is_loopback else Reach.ADDRESS
@@ -90,7 +94,7 @@ def listen(host: str | None = None, port: int | None = None) -> Listening:
     names = {name.lower()}
     if reach is not Reach.MACHINE:
         names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
-    return made, Address(name, its_port, reach, frozenset(names))
+    return made, Address(name, its_port, reach, frozenset(names), here)
 
 
 def _resolved(host: str) -> tuple[socket.AddressFamily, str, bool]:
@@ -130,8 +134,10 @@ def _bound(host: str, family: socket.AddressFamily, number: str, port: int | Non
     raise PaintError(f"cannot listen at {host}:{tried}: {reason}; choose another with port=...")
 
 
-def _outward_name(port: int) -> str:
-    """How others on its network call this machine, where all of its addresses are listened to."""
+def _outward_name(port: int) -> str | None:
+    """How others on its network call this machine, where all of its addresses are listened to;
+    None where it is in no network.
+    """
     for family, elsewhere in ((socket.AF_INET, "203.0.113.1"), (socket.AF_INET6, "2001:db8::1")):
         # No packet is sent: it asks by which address one would go.
         try:
@@ -142,7 +148,7 @@ def _outward_name(port: int) -> str:
             continue
         if not own.is_link_local and _leads_here(_written(own), port):
             return _written(own)
-    return "127.0.0.1"
+    return None
 
 
 def _leads_here(name: str, port: int) -> bool:

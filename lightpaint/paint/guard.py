@@ -158,7 +158,9 @@ def _bearer(scope: Scope) -> str | None:
 
 def _offered(scope: Scope) -> str | None:
     """What a socket shows: a page's script cannot give it headers, but names of protocols."""
-    found = [x for x in scope.get("subprotocols", ()) if x.startswith(KEY_PROTOCOL)]
+    # From the header itself: what servers make of it differs.
+    names = ",".join(_header(scope, b"sec-websocket-protocol")).split(",")
+    found = [name for x in names if (name := x.strip()).startswith(KEY_PROTOCOL)]
     return found[0].removeprefix(KEY_PROTOCOL) if len(found) == 1 else None
 
 

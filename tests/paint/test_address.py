@@ -79,6 +79,16 @@ def test_who_can_reach_it_is_known_and_its_address_leads_there(
                 made.accept()[0].close()
 
 
+@IPV6
+def test_an_address_of_ipv6_alone_leads_there_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(socket, "has_dualstack_ipv6", lambda: False)
+    made, its = listen("::", 0)
+    with made:
+        for url in (its.url, its.url_here):
+            place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
+            socket.create_connection((place, its.port), 5).close()
+
+
 @pytest.mark.parametrize(
     "host",
     [
