@@ -19,6 +19,10 @@ look of that basis, judged by the one of many.
 With --loosen only those cases count in which the hold keeps the lights from the paint, and what is
 judged is how far it should be loosened: until it brings so much of what no hold would.
 
+`lamps` are strokes over a lamp that the camera sees and what is around it: one light is meant that
+much brighter and warmer, or a quarter of the times darker, and the brush goes over the lamp in the
+colour of what is beside it.
+
 Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports 12 to 23.
 """
 
@@ -145,6 +149,15 @@ def main() -> None:
                 for style, its in cases.items()
             }
             row(f"default, {spp} spp", found, nothing)
+        lamps = [over_lamp(basis, np.random.default_rng([99, k])) for k in range(options.cases)]
+        lamps = [x for x in lamps if x is not None]
+        if lamps:
+            print(f"{'':22s}{'lamps':>14s}{'mean':>8s}{'harm':>7s}")
+            none = {"lamps": [x.judged(x.current) for x in lamps]}
+            row("doing nothing", none, none)
+            for setting in options.settings:
+                found = {"lamps": [x.judged(answer(basis, x, SETTINGS[setting])) for x in lamps]}
+                row(setting, found, none)
 
 
 def loosened(name: str, options: argparse.Namespace) -> None:
@@ -228,6 +241,49 @@ def painted(
         transform.decode(codes).astype(np.float32),
         mask.astype(np.float32),
         everything=style == "full",
+        at_least=codes >= 1,
+        transform=transform,
+        through_view=True,
+        over_look=True,
+    )
+    return Case(meant, current, target)
+
+
+def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
+    """A stroke over a lamp in view and what is around it; None where no lamp is in view."""
+    current, seen = basis.present_look, basis.emitters_seen
+    lit = np.array(
+        [
+            luminance(x) * luminance(np.array(its))
+            for x, its in zip(basis.images, basis.present_weights, strict=True)
+        ]
+    )
+    whose = np.argmax(lit, axis=0)
+    lamps = [k for k in np.unique(whose[seen]) if not basis.is_fixed[k]]
+    if not lamps:
+        return None
+    k = int(rng.choice(lamps))
+    rows, columns = np.nonzero(seen & (whose == k))
+    at = int(rng.integers(rows.size))
+    y, x = np.mgrid[: basis.size[0], : basis.size[1]]
+    away = np.hypot(y - rows[at], x - columns[at]) / basis.size[0]
+    mask = gaussian_filter((away < rng.uniform(0.06, 0.2)).astype(float), basis.size[1] / 80)
+    mask[mask < 0.02] = 0
+    weights = basis.present_weights.copy()
+    weights[k] *= 2 ** (rng.uniform(1, 2.5) * (1 if rng.random() < 0.75 else -1))
+    tint = kelvin_to_rgb(rng.uniform(2400, 5000)) / kelvin_to_rgb(6500)
+    weights[k] *= tint / luminance(tint)
+    meant = basis.mix(weights)
+    unseen = ~seen[..., None]
+    beside = (meant * mask[..., None] * unseen).sum((0, 1)) / (mask[..., None] * unseen).sum((0, 1))
+    image = np.where(seen[..., None], beside, meant) * rng.uniform(0.75, 1.35)
+    transform = lp.ViewTransform("srgb", meter_exposure(current, basis))
+    codes = np.round(255 * transform.encode(image)) / 255
+    target = lp.Target(
+        "lamp",
+        transform.decode(codes).astype(np.float32),
+        mask.astype(np.float32),
+        everything=False,
         at_least=codes >= 1,
         transform=transform,
         through_view=True,

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.images.blocks import enlarged
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -107,6 +108,11 @@ def binned_pixels(views: Views, loss: PaintingLoss, side: int) -> BinnedPixels:
     for k, basis in enumerate(views.bases):
         its = loss.cut(lambda joint, k=k: views.part(joint, k))  # type: ignore[misc]
         counts = its.importance.astype(np.float64)
+        # Emitters that may be brighter say something where a block has nothing else.
+        glows = basis.emitters_seen & its.at_least.all(axis=-1)
+        others = enlarged(block_sums(np.where(glows, 0, counts), side), side)
+        counts[glows & (others[: counts.shape[0], : counts.shape[1]] > 0)] = 0
+        its = replace(its, importance=counts)
         total = block_sums(counts, side)
         safe = np.where(total > 0, total, 1)
         for made, images in zip(planes, (basis.images, basis.half_differences), strict=True):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import block_mean
+from lightpaint.images.blocks import block_mean, enlarged
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pixels import STRIP, Pixels, joined
 from lightpaint.lighting.reweighted import between
@@ -93,16 +93,26 @@ class SmallFilm:
         self._image, self._importance, self._seen = image, importance, basis.emitters_seen
         rows, columns = -(-height // side), -(-width // side)
         self._size = rows, columns
-        small = np.stack([_averaged(x, side) for x in basis.images])
+        # A block in which something else is seen shows no emitter.
+        unseen = (~self._seen).astype(np.float64)
+        self._shown = np.where(_spread(_summed(unseen, side), side, unseen.shape) > 0, unseen, 1)
+        small = np.stack([self._average(x) for x in basis.images])
         # Singles are enough for what is averaged, and sums of them take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
         self.rows = np.ascontiguousarray(planes, np.float32)
-        self._current = _planes(_averaged(basis.present_look, side))
+        self._current = _planes(self._average(basis.present_look))
         self._painted = self._current.copy()
         self._transform: ViewTransform | None = None
         self._seen_painted = self._seen_current = self._current
         self._a, self._left = np.zeros((2, rows * columns))
         self.painted((slice(0, height), slice(0, width)))
+
+    def _average(self, image: Floats) -> Floats:
+        """Return (h', w', 3) means over blocks of a picture (h, w, 3)."""
+        if self._side == 1 or self._shown.all():
+            return _averaged(image, self._side)
+        total = _summed(image * self._shown[..., None], self._side)
+        return np.asarray(total / _summed(self._shown, self._side)[..., None], np.float32)
 
     def painted(self, region: Slices) -> None:
         """Average anew what a rectangle touches."""
@@ -114,7 +124,7 @@ class SmallFilm:
         if top >= bottom or left >= right:
             return
         where = slice(top, bottom), slice(left, right)
-        a = self._importance[where].astype(np.float64)
+        a = self._importance[where] * self._shown[where]
         light = self._image[where] * a[..., None]
         rest = np.where(self._seen[where], 0, np.maximum(1 - a, 0))
         total, lit, unpainted = (_summed(x, side) for x in (a, light, rest))
@@ -228,11 +238,16 @@ def _around(along: slice, side: int, length: int) -> tuple[int, int]:
     return start // side * side, min(-(-stop // side) * side, length)
 
 
-def _summed(values: npt.NDArray[np.float64], side: int) -> Doubles:
+def _summed(values: npt.NDArray[np.floating], side: int) -> Doubles:
     """Sums over blocks; those that the border cuts off are of what there is."""
     height, width = values.shape[:2]
     rows, columns = (np.arange(0, length, side) for length in (height, width))
     return np.asarray(np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1))
+
+
+def _spread(blocks: Doubles, side: int, size: tuple[int, ...]) -> Doubles:
+    """Return the value of its block for each pixel, (h, w)."""
+    return np.asarray(enlarged(blocks, side)[: size[0], : size[1]])
 
 
 def _averaged(image: Floats, side: int) -> Floats:

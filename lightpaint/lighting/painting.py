@@ -11,6 +11,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
+from lightpaint.lighting.emitters import asks_no_less, dark_of
 from lightpaint.lighting.fit import Emitters, Fit
 from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -62,6 +63,27 @@ def what_counts(target: Target, seen: Bools, emitters: Emitters = "auto") -> Tar
             'counts; paint others too, or pass emitters="count"'
         )
     return replace(target, importance=importance, everything=False)
+
+
+def with_emitters_read(target: Target, basis: Basis, fit: Fit) -> Target:
+    """`target`, painted over the look of `basis`, with "at least" where it paints emitters in view.
+
+    Once: where it is not taken at its word, and nobody says that emitters count as painted. fit:
+    with nothing left open.
+    """
+    if fit.literal or fit.emitters != "auto" or not (target.over_look and target.reads_emitters):
+        return target
+    glows = asks_no_less(
+        target.image,
+        target.importance,
+        basis.present_look,
+        basis.emitters_seen,
+        fit.transform,
+        dark=dark_of(basis.present_look, basis.emitters_seen),
+    )[..., None]
+    at_least = glows if target.at_least is None else target.at_least | glows
+    its = np.broadcast_to(at_least, target.image.shape) if glows.any() else target.at_least
+    return replace(target, at_least=its, reads_emitters=False)
 
 
 def present_look(basis: Basis, unpainted: float) -> Floats | None:

@@ -30,6 +30,7 @@ from lightpaint.lighting.painting import (
     painted_light,
     weight_of_rest,
     what_counts,
+    with_emitters_read,
 )
 from lightpaint.lighting.pull import pull_of
 from lightpaint.lighting.views import Views, joint_basis
@@ -139,8 +140,9 @@ class Problem:
             what_counts(its.fitted_to(one.size, resize=resize), one.emitters_seen, fit.emitters)
             for its, one in zip(targets, parts, strict=True)
         ]
-        views = Views(parts, tuple(fitted))
         fit = meant_by(fit, fitted)
+        read = [with_emitters_read(x, one, fit) for x, one in zip(fitted, parts, strict=True)]
+        views = Views(parts, tuple(read))
         word = joint_squares(views, unpainted=weight_of_rest(views, fit))
         loss = loss_of(
             word,

@@ -29,6 +29,9 @@ def emitters_in_view(target: Target, solution: Solution, predicted: Estimate) ->
             *_too_bright(target, solution, predicted, out),
         ]
     counted = seen & painted
+    [read] = solution.problem.views.targets
+    if read.at_least is not None:
+        counted &= ~read.at_least.all(axis=-1)
     if not counted.any():
         return []
     energy = target.importance[..., None] * np.square(target.image, dtype=np.float64)

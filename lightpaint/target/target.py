@@ -42,6 +42,8 @@ class Target(Shown):
         transform: What a display showed it through when it was painted; None if nobody knows.
         through_view: Whether its values are those of a display, and not light.
         over_look: Whether it was painted over the current look, which what it leaves is to keep.
+        reads_emitters: Whether paint over emitters in view is still to be read: as paint for what
+            they light, or for their glow, where that was painted over the current look.
         files: That it was read from: the painting first, then mask and template.
         full_size_share: `painted_share` of the painting as it was read; None where nothing was
             taken out of it or averaged since.
@@ -67,6 +69,7 @@ class Target(Shown):
     transform: ViewTransform | None = None
     through_view: bool = False
     over_look: bool = False
+    reads_emitters: bool = True
     files: tuple[Path, ...] = ()
     full_size_share: float | None = None
 

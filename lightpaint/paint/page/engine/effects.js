@@ -8,7 +8,8 @@ import { VALUES } from './half.js';
 /** @typedef {import("./protocol.js").RGB} RGB */
 
 /**
- * What a stroke does. paint: the pixel becomes a colour, or light of that colour on its albedo.
+ * What a stroke does. paint: the pixel becomes a colour, or light of that colour on its albedo; of
+ * light on what reflects none, as a flame, nothing can be said, and it stays as it is.
  * erase: it is the present look again, and not painted; of a picture that was asked for as a whole
  * it is what was asked of that. weigh: it counts so many times as much
  * as it did; what is not painted is kept as it is, and counts as a stroke would. ask: its light is
@@ -61,6 +62,7 @@ export function changing(canvas, effect) {
       const { rgb } = effect;
       const on = effect.as === 'light' ? albedo : null;
       return (tile, q, p, covered) => {
+        if (on && !VALUES[on[3 * p]] && !VALUES[on[3 * p + 1]] && !VALUES[on[3 * p + 2]]) return;
         towards(tile, q, p, covered, (c) => (on ? VALUES[on[3 * p + c]] * rgb[c] : rgb[c]));
         count(tile, q, p, covered);
       };

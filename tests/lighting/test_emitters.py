@@ -1,0 +1,138 @@
+"""Paint over an emitter in view: for what it lights, or for its glow, and seldom for less of it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.lighting.emitters import asks_no_less
+from lightpaint.lighting.fit import meant_by
+from lightpaint.lighting.live import Live
+from lightpaint.lighting.live_view import LiveView
+
+SIZE = (36, 30)
+FLAME = (slice(16, 19), slice(14, 17))
+AROUND = (slice(10, 26), slice(8, 24))
+WARM = np.array([1.5, 0.9, 0.4])
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> Basis:
+    """`sky` lights all evenly; `lantern` what is near it, and its flame is 12 times white."""
+    seen = np.zeros(SIZE, bool)
+    seen[FLAME] = True
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
+    near = np.exp(-np.hypot(rows - 17, columns - 15) / 3)
+    images = np.stack([np.full(SIZE, 0.03), np.where(seen, 12, 0.2 * near)])[..., None]
+    emission = [[1.0] * 3, [1.0] * 3]
+    images = np.repeat(images, 3, axis=-1)
+    return make_basis(images=images, names=["sky", "lantern"], seen=seen, emission=emission)
+
+
+def _painted(basis: Basis, where: Any, color: Any, *, times: bool = False) -> lp.Target:
+    """A stroke over the present look. times: whether it multiplies what is there."""
+    image = basis.present_look.copy()
+    image[where] = image[where] * color if times else color
+    counts = np.zeros(SIZE, np.float32)
+    counts[where] = 1
+    how: dict[str, Any] = {"through_view": True, "over_look": True}
+    return lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **how)
+
+
+def _lantern(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]:
+    """How bright it comes out, exactly and live, beside the present."""
+    exact = lp.solve(basis, target, **fit).weights
+    view = LiveView(basis, target.image.copy(), target.importance.copy())
+    live = Live([view], fit=meant_by(lp.Fit(**fit), [target]), constraints=lp.Constraints())
+    weights: Doubles = basis.present_weights
+    for _ in range(8):
+        weights = live.answer(weights)
+    return float(exact[1].max()), float(weights[1].max())
+
+
+@pytest.mark.parametrize("space", ["display", "linear"])
+def test_a_warm_stroke_over_a_lantern_leaves_it_on(basis: Basis, space: Any):
+    """What it lights is painted brighter, the flame itself darker than it is, or even black."""
+    for flame in (0.5 * WARM, 0 * WARM):
+        target = _painted(basis, AROUND, 0.5 * WARM)
+        target.image[FLAME] = flame
+        exact, live = _lantern(basis, target, space=space)
+        assert exact > 1.5
+        assert live > 1.5
+
+
+def test_a_clearly_darker_stroke_dims_it(basis: Basis):
+    exact, live = _lantern(basis, _painted(basis, AROUND, 0.2, times=True))
+    assert exact < 0.7
+    assert live < 0.7
+
+
+@pytest.mark.parametrize(
+    ("color", "is_less"), [(WARM, False), (0.9 * WARM, False), (0.1 * WARM, True), (0 * WARM, True)]
+)
+def test_of_a_flame_alone_what_a_display_shows_decides(basis: Basis, color: Any, is_less: bool):
+    exact, live = _lantern(basis, _painted(basis, FLAME, color))
+    assert (exact < 0.7) == is_less
+    # Beyond white a display's curve is flat, which answers under the brush cannot leave.
+    assert is_less or live > 0.7
+
+
+def test_a_glow_that_is_painted_brighter_comes_about(make_basis: Any, basis: Basis):
+    """Of an emitter that a display can show: a window, of a tenth of white."""
+    images = basis.images.copy()
+    images[1][FLAME] = 0.1
+    window = make_basis(
+        images=images,
+        names=["sky", "window"],
+        seen=basis.emitters_seen,
+        emission=[[1.0] * 3, [1.0] * 3],
+    )
+    exact, _ = _lantern(window, _painted(window, FLAME, 0.3), hold=0.1)
+    assert exact > 2
+
+
+@pytest.mark.parametrize("fit", [{"emitters": "count"}, {"literal": True}])
+def test_who_says_so_has_it_as_painted(basis: Basis, fit: Any):
+    target = _painted(basis, AROUND, 0.5 * WARM)
+    target.image[FLAME] = 0
+    assert lp.solve(basis, target, **fit).weights[1].max() < 0.7
+
+
+def test_what_is_read_once_is_not_read_again(basis: Basis):
+    [read] = lp.Problem.of(basis, _painted(basis, AROUND, 0.5 * WARM)).views.targets
+    assert read.at_least is not None
+    assert (read.at_least.any(axis=-1) == basis.emitters_seen).all()
+    [again] = lp.Problem.of(basis, read).views.targets
+    assert again.at_least is read.at_least
+
+
+def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
+    """Also those beside an emitter, which change what the paint on it means."""
+    rng = np.random.default_rng(2)
+    image, counts = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    view = LiveView(basis, image, counts)
+    view.see_through(lp.ViewTransform())
+    view.film(lp.ViewTransform(), 100)
+    view.tiles()
+    for _ in range(30):
+        top, left = rng.integers(0, 30), rng.integers(0, 24)
+        region = (slice(top, top + 6), slice(left, left + 6))
+        image[region] = rng.choice([0, 0.02, 0.5, 20]) * WARM
+        counts[region] = rng.choice([0, 0.3, 1, 10])
+        view.painted(region)
+        fresh = LiveView(basis, image, counts)
+        fresh.see_through(lp.ViewTransform())
+        assert (view.counts == fresh.counts).all()
+        here, there = (x.film(lp.ViewTransform(), 100).pixels(0.1, None) for x in (view, fresh))
+        assert (here.importance == there.importance).all()
+        assert (here.painted == there.painted).all()
+        one, other = (x.tiles().equations(0.1) for x in (view, fresh))
+        np.testing.assert_allclose(one.M, other.M, rtol=1e-9)
+
+
+def test_nothing_painted_is_nothing_meant(basis: Basis):
+    look, none = basis.present_look, np.zeros(SIZE, np.float32)
+    assert not asks_no_less(look, none, look, basis.emitters_seen, None, dark=0.01).any()
