@@ -112,7 +112,9 @@ class Moment:
         planes, transform = clean or self.bases[view], self.transform
         before, then = (small_picture(planes.mix(x), transform) for x in (weights, after))
         if solution is None:
-            return Foresight(before, then, foreseen_fields(0.0, None, is_at_cost=False))
+            return Foresight(
+                before, then, foreseen_fields(0.0, None, delta_e=(0, 0), is_at_cost=False)
+            )
         judged = view if view in self.painted else self.painted[0]
         its = solution.views[self.painted.index(judged)]
         look, target = Looking.at(its.problem), its.problem.views.targets[0]
@@ -121,9 +123,12 @@ class Moment:
         cost_now, cost_then = (look.mean(look.costs(light)) for light in lights)
         closes = 1 - cost_then / cost_now if cost_now > 0 else 0.0
         rest = what_changes(look, self.bases[judged], target.importance > 0, *pictures)
-        gained = look.mean(look.missed(lights[0])) - look.mean(look.missed(lights[1]))
+        seen = look.mean(look.missed(lights[0])), look.mean(look.missed(lights[1]))
+        gained = seen[0] - seen[1]
         is_at_cost = rest is not None and rest.worst > NOTICED and rest.delta_e > gained
-        return Foresight(before, then, foreseen_fields(closes, rest, is_at_cost=is_at_cost))
+        return Foresight(
+            before, then, foreseen_fields(closes, rest, delta_e=seen, is_at_cost=is_at_cost)
+        )
 
 
 @dataclass(frozen=True)

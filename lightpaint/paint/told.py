@@ -236,14 +236,17 @@ def _seen_fields(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def foreseen_fields(closes: float, rest: Elsewhere | None, *, is_at_cost: bool) -> dict[str, Any]:
+def foreseen_fields(
+    closes: float, rest: Elsewhere | None, *, delta_e: tuple[float, float], is_at_cost: bool
+) -> dict[str, Any]:
     """Say what a change would bring, before it is made.
 
     closes: share of what is missed that it takes away. rest: what it changes where nobody painted.
-    is_at_cost: whether that is more than it brings.
+    delta_e: over the paint, now and then. is_at_cost: whether it changes more than it brings.
     """
+    now, then = map(spoken_amount, delta_e)
     if closes >= 0.005:
-        said = f"Closes {spoken_percent(closes)} of what is missed"
+        said = f"Closes {spoken_percent(closes)} of what is missed (ΔE {now} becomes {then})"
     else:
         said = "Brings the answer no closer"
     if rest is None or rest.worst < UNSEEN:

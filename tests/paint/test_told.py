@@ -11,7 +11,14 @@ from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.paint.told import HELP, help_fields, helped, sketched, why_not_closer
+from lightpaint.paint.told import (
+    HELP,
+    foreseen_fields,
+    help_fields,
+    helped,
+    sketched,
+    why_not_closer,
+)
 from lightpaint.report.sentences import spoken_cause
 from lightpaint.report.verdict import headline
 
@@ -106,6 +113,17 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     told = help_fields(joint)
     assert told is not None
     assert told["closes"] is None
+
+
+def test_a_preview_says_what_it_brings_and_what_it_costs():
+    annex = Elsewhere(2.0, 12.0, "annex")
+    its = {"delta_e": (17.2, 6.9), "is_at_cost": False}
+    told = "Closes 57 % of what is missed (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
+    assert foreseen_fields(0.57, annex, **its) == {"text": told, "is_at_cost": False}
+    costly = foreseen_fields(0.57, annex, **{**its, "is_at_cost": True})
+    assert costly == {"text": f"{told} That is more than it brings.", "is_at_cost": True}
+    none = foreseen_fields(0.004, None, **its)["text"]
+    assert none == "Brings the answer no closer."
 
 
 def test_what_harms_the_rest_is_not_praised():
