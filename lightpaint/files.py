@@ -38,8 +38,8 @@ _BESIDE = re.compile(r"\.(.+)\.[a-z0-9_]{8}")
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a path beside `path` to write to; it takes the place of `path` at the end.
 
-    What was at `path` stays untouched if the block raises, is interrupted or the disk
-    is full. Raises OutputError, naming `path`, for whatever the system refuses.
+    What was at `path` stays untouched if the block raises, is interrupted, the disk is full or the
+    current ends. Raises OutputError, naming `path`, for whatever the system refuses.
     """
     path = Path(path)
     beside: Path | None = None
@@ -49,10 +49,21 @@ def replacing(path: Path) -> Iterator[Path]:
         with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
             beside = Path(folder) / path.name
             yield beside
+            flush(beside)
             os.replace(beside, path)
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"cannot write {path}: {reason}") from error
+
+
+def flush(path: Path) -> None:
+    """Have the disk hold what was written to a file, before a name promises it.
+
+    Else a rename may be on the disk sooner than what is renamed: when the current ends, the name
+    then stands for an empty file, and what it stood for before is gone. Raises OSError.
+    """
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 def sweep(folder: Path) -> None:

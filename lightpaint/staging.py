@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
-from lightpaint.files import MAX_TEXT, read_text, write_text
+from lightpaint.files import MAX_TEXT, flush, read_text, write_text
 from lightpaint.records import read_record, strict_json
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.system import exchange, is_mounted, is_somebody_in
@@ -166,8 +166,7 @@ def _files_in(folder: Path) -> set[str]:
 def _flush(stage: Path) -> None:
     """Have the disk hold what was written, before names promise it."""
     for name in _files_in(stage):
-        with (stage / name).open("rb") as file:
-            os.fsync(file.fileno())
+        flush(stage / name)
 
 
 def _publish(stage: Path, folder: Path, gone: set[str]) -> None:

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
-from lightpaint.files import first_line
+from lightpaint.files import first_line, flush
 from lightpaint.paint.steps import Identity, SeenFrom
 from lightpaint.records import strict_json
 from lightpaint.screen import some_names
@@ -225,6 +225,7 @@ def rewritten(
         beside.unlink(missing_ok=True)
         try:
             database.execute("VACUUM INTO ?", (str(beside),))
+            flush(beside)
             os.replace(beside, path)
         except BaseException:
             beside.unlink(missing_ok=True)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.files import flush
 from lightpaint.paint.database import APPLICATION, VERSION, damaged, free_name, opened, transaction
 from lightpaint.paint.kept import DTYPES
 from lightpaint.paint.packed import unpacked, unpacked_patch
@@ -49,6 +50,7 @@ def mended(path: Path, identity: Identity | None) -> str:
             with suppress(FileNotFoundError):
                 shutil.copy(f"{path}{ending}", f"{copy}{ending}")
         lost = _carried_over(copy, new, path, identity)
+        flush(new)
         aside = free_name(path)
         os.link(path, aside)
         if os.path.exists(f"{path}-wal"):

@@ -1,0 +1,112 @@
+"""The current ends: what no `fsync` has brought to the disk is gone, though its name may be there.
+
+A disk that writes names before contents is played: what is renamed without having been flushed is
+empty afterwards. So do XFS and btrfs, and ext4 where a folder is renamed.
+"""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from lightpaint import staging
+from lightpaint.batch.journal import Journal, Line
+from lightpaint.files import write_text
+from lightpaint.lighting.file import read_lighting, write_lighting
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import LightSetting
+from lightpaint.paint.store import Store
+from lightpaint.staging import staged
+
+
+class Disk:
+    """Which files have been flushed as they are."""
+
+    def __init__(self) -> None:
+        self._flushed: dict[int, tuple[int, int]] = {}
+
+    def flush(self, descriptor: int) -> None:
+        its = os.fstat(descriptor)
+        self._flushed[its.st_ino] = its.st_size, its.st_mtime_ns
+
+    def rename(self, path: Path) -> None:
+        """What the disk has of a file, or of all in a folder, when its name changes."""
+        files = [x for x in path.rglob("*") if x.is_file()] if path.is_dir() else [path]
+        for file in files:
+            its = file.stat()
+            if self._flushed.get(its.st_ino) != (its.st_size, its.st_mtime_ns):
+                os.truncate(file, 0)
+
+
+@pytest.fixture
+def _unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
+    disk, real = Disk(), {name: getattr(os, name) for name in ("replace", "rename", "fsync")}
+
+    def fsync(descriptor: int) -> None:
+        real["fsync"](descriptor)
+        disk.flush(descriptor)
+
+    def renaming(name: str) -> Callable[..., None]:
+        def rename(source: Path, target: Path, **how: int) -> None:
+            disk.rename(Path(source))
+            real[name](source, target, **how)
+
+        return rename
+
+    def exchange(one: Path, other: Path) -> None:
+        disk.rename(one)
+        swapped(one, other)
+
+    swapped = staging.exchange
+    monkeypatch.setattr(os, "fsync", fsync)
+    for name in ("replace", "rename"):
+        monkeypatch.setattr(os, name, renaming(name))
+    monkeypatch.setattr(staging, "exchange", exchange)
+
+
+def lighting(emission: float) -> Lighting:
+    setting = LightSetting("a", "point", "intensity", "W/sr", *2 * ((emission,) * 3,))
+    return Lighting((setting,), target="t")
+
+
+@pytest.mark.usefixtures("_unsafe")
+def test_a_file_is_the_earlier_or_the_new_one(tmp_path: Path) -> None:
+    path = tmp_path / "lighting.json"
+    for emission in (1.0, 2.0):
+        write_lighting(path, lighting(emission))
+        assert read_lighting(path).emission == {"a": (emission,) * 3}
+
+
+@pytest.mark.usefixtures("_unsafe")
+def test_so_are_results_that_appear_together(tmp_path: Path) -> None:
+    folder = tmp_path / "evening"
+    for text in ("first", "second"):
+        with staged(folder) as stage:
+            (stage / "a.txt").write_text(text)
+            write_text(stage / "b.txt", text)
+        assert [(folder / x).read_text() for x in ("a.txt", "b.txt")] == [text] * 2
+        (folder / "mine.txt").write_text("mine")
+
+
+@pytest.mark.usefixtures("_unsafe")
+def test_so_is_a_journal_that_is_settled(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    for look in ("a", "b"):
+        journal.add(Line(look, "answer", "done", "0f"))
+    journal.settle([("b", "answer")])
+    assert [*Journal(tmp_path).lines] == [("b", "answer")]
+
+
+@pytest.mark.usefixtures("_unsafe")
+def test_so_is_a_session_that_is_written_anew(tmp_path: Path) -> None:
+    from sessions import IDENTITY, content, step
+
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        store.append(step(1))
+        path.unlink()
+        store.append(step(2))
+        held = content(store)
+    with Store.open(path, IDENTITY) as store:
+        assert content(store) == held
