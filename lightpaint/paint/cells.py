@@ -16,6 +16,7 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.painting import what_counts
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.database import AFRESH, ELSEWHERE
 from lightpaint.paint.keeping import check_together
@@ -47,13 +48,31 @@ def of_targets(session: Session, targets: Any) -> Loaded:
     """These paintings, one for each view; None leaves a view unpainted. Raises LightpaintError."""
     fitted = _fitted_targets(targets, [view.size for view in session.views])
     paintings = {k: _painting(session, k, one) for k, one in enumerate(fitted)}
-    return paintings, session.wishes, "paintings from a cell"
+    return paintings, _as_painted(session.wishes, fitted), "paintings from a cell"
 
 
 def of_target(session: Session, target: Any) -> Loaded:
     """This painting of the first view. Raises LightpaintError."""
     fitted = _fitted(target, session.views[0].size, "target")
-    return {0: _painting(session, 0, fitted)}, session.wishes, "painting from a cell"
+    wishes = _as_painted(session.wishes, [fitted])
+    return {0: _painting(session, 0, fitted)}, wishes, "painting from a cell"
+
+
+def _as_painted(wishes: Wishes, targets: Sequence[Target | None]) -> Wishes:
+    """Return `wishes` that answer these as `lp.solve` does: what follows from how they were made.
+
+    What is light, with nothing under it, is taken at its word; what holds numbers of a display and
+    lay over nothing holds nothing else, unless somebody has said how firmly.
+    """
+    painted = [target for target in targets if target is not None]
+    if not painted:
+        return wishes
+    over_look = any(target.over_look for target in painted)
+    on_display = any(target.through_view for target in painted)
+    made = wishes.of_answer({"literal": not (over_look or on_display)})
+    if on_display and not over_look and "hold" not in made.values:
+        made = made.of_answer({"hold": 0.0})
+    return made
 
 
 def check_given(target: Any, subjects: Sequence[Subject]) -> None:
@@ -63,6 +82,13 @@ def check_given(target: Any, subjects: Sequence[Subject]) -> None:
         _fitted_targets(target, sizes)
     else:
         _fitted(target, sizes[0], "target")
+
+
+def transform_of_paint(target: Any) -> ViewTransform | None:
+    """Return the one view transform that a target, or those of all views, were seen through."""
+    targets = target if is_of_each_view(target) else [target]
+    seen = {its.transform for its in targets if isinstance(its, Target) and its.through_view}
+    return seen.pop() if len(seen) == 1 else None
 
 
 def is_of_each_view(target: Any) -> bool:
@@ -108,7 +134,8 @@ def in_a_notebook() -> Iterator[None]:
 def _painting(session: Session, view: int, target: Target | None) -> Pixels:
     if target is None:
         return Pixels.unpainted(session.views[view].present)
-    return _pixels_of(target)
+    its = session.views[view]
+    return _pixels_of(what_counts(target, its.basis.emitters_seen, session.answering.fit.emitters))
 
 
 def of_lighting(session: Session, lighting: Any) -> Loaded:

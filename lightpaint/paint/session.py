@@ -121,11 +121,15 @@ class Session:
         return self.answering.kept is not None or self.views.is_open
 
     def target(self, view: int = 0) -> Target | None:
-        """A painting, with arrays of its own; None where nothing is painted."""
+        """A painting, with arrays of its own; None where nothing is painted.
+
+        It is answered elsewhere as here: one that is taken at its word is light, over nothing.
+        """
         canvas = self.views[view]
         if not canvas.is_painted:
             return None
         image, importance, at_least = canvas.pixels(canvas.whole)
+        is_sketch = not self.answering.fit.literal
         return Target(
             self.name if len(self.views) == 1 else f"{self.name} {canvas.name}",
             image,
@@ -133,8 +137,8 @@ class Session:
             everything=False,
             at_least=at_least,
             transform=self.transform,
-            through_view=True,
-            over_look=True,
+            through_view=is_sketch,
+            over_look=is_sketch,
         )
 
     def moment(self, wishes: Wishes | None = None) -> Moment:

@@ -80,7 +80,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             or the path of a scene. Of several views a list of bases or of scenes, for one lighting.
         target: To begin with; of several views a list of them.
         constraints: What is asked of the lights, beside what is asked in the painter.
-        transform: To paint through; what is open of it follows from the scene.
+        transform: To paint through; that of the target, if it was seen through one, by default.
+            What is open of it follows from the scene.
         store: A file to keep the session in, which is gone on with if it is there; a painter of
             this kernel that has it is closed. Without one what was painted lives as long as the
             kernel.
@@ -141,6 +142,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
         asked = {"settings": cells.settings_given(settings, ARGUMENTS), "constraints": constraints}
+        transform = transform or cells.transform_of_paint(target)
         subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
         if target is not None:
             cells.check_given(target, subjects)

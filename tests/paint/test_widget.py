@@ -45,6 +45,10 @@ PAGE, OTHER = 7, 9
 HOW = {"colors": "free", "hold": 0.0, "space": "linear"}
 
 
+#: What is painted through, where that says something.
+VIEW = lp.ViewTransform("srgb", 0.5)
+
+
 class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
     """A line to a page that there is none of."""
 
@@ -76,7 +80,7 @@ def open_(basis: lp.Basis, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     made = []
 
     def make(**how: Any) -> Any:
-        made.append(lp.Painter(basis, folder=tmp_path, **HOW, **how))
+        made.append(lp.Painter(basis, folder=tmp_path, **{**HOW, **how}))
         made[-1].comm.messages = []
         return made[-1]
 
@@ -192,6 +196,45 @@ def test_what_is_set_from_a_cell_shows(basis: lp.Basis, open_: Any, tmp_path: Pa
     painter.target = None
     assert painter.target is None
     assert painter.solution is None
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"everything": True},
+        {},
+        {"through_view": True, "transform": VIEW},
+        {"through_view": True, "over_look": True, "transform": VIEW},
+    ],
+)
+def test_a_target_is_answered_as_by_solve(basis: lp.Basis, open_: Any, how: Any) -> None:
+    """And so is the painter's own target, and so are both of them with something left out."""
+    image = np.random.default_rng(3).random((*SIZE, 3)).astype(np.float32)
+    counts = np.ones(SIZE, np.float32)
+    if "everything" not in how:
+        counts[:, :8] = 0
+    target = lp.Target("t", image, counts, **{"everything": False, **how})
+    painter = open_(target=target, colors=None, hold=None, space=None)
+    expected = lp.solve(basis, target)
+    assert painter.solution.problem.space == expected.problem.space
+    np.testing.assert_allclose(painter.solution.weights, expected.weights, rtol=1e-6, atol=1e-9)
+    painter.target = painter.target
+    np.testing.assert_allclose(painter.solution.weights, expected.weights, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("how", [{}, {"through_view": True, "over_look": True}])
+def test_the_first_answer_to_an_untouched_target_is_the_present(
+    basis: lp.Basis, open_: Any, how: Any
+) -> None:
+    painter = open_(colors=None, hold=None, space=None)
+    told: list[Any] = []
+    painter.observe(lambda change: told.append(change.new), "lighting")
+    counts = np.ones(SIZE, np.float32)
+    painter.target = lp.Target("t", basis.present_look.copy(), counts, False, **how)
+    assert painter.solution is not None
+    for lighting in (*told, painter.lighting):
+        weights = lighting.weights_for(basis)
+        np.testing.assert_allclose(weights, basis.present_weights, atol=1e-6)
 
 
 def test_two_threads_may_tell_at_once(
