@@ -97,7 +97,8 @@ class Uncertainty:
     def relative_excess(self) -> float:
         """What these errors miss of the painting, root mean square."""
         norm2 = float(self.target_norm2.sum())
-        return float(np.sqrt(self.excess.sum() / norm2)) if norm2 > 0 else 0.0
+        # An estimate, which is below zero where hardly anything is left to gain.
+        return float(np.sqrt(max(self.excess.sum(), 0) / norm2)) if norm2 > 0 else 0.0
 
     @property
     def standard_error(self) -> Doubles:

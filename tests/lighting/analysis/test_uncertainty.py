@@ -132,6 +132,13 @@ def test_without_noise_nothing_is_uncertain(make_basis: Any):
     assert None not in errors
 
 
+def test_an_estimate_below_zero_is_nothing_to_gain(make_basis: Any):
+    """As it was on a shipped painting, which was told as a warning of NumPy's."""
+    bars = error_bars(solve(make_basis(2, (16, 20)), Target.of(np.ones((16, 20, 3)))))
+    assert bars is not None
+    assert replace(bars, excess=np.array([-0.1, 0.01, 0.01])).relative_excess == 0
+
+
 def test_kept_and_unreached_lights_have_no_error(make_basis: Any):
     clean = _pools(3)
     clean[2] = 0
