@@ -36,7 +36,7 @@ from lightpaint.lighting.live_sums import FILM, Films, SmallFilm
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import reduced_by
-from lightpaint.lighting.pull import pull_of, to_present
+from lightpaint.lighting.pull import dimming_of, drawn_more, pull_of, to_present
 
 #: Steps between whites for one answer, at most: the next answer goes on.
 WHITE_STEPS = 2
@@ -98,7 +98,7 @@ class Live:
             # What is not allowed may well be nearer to the painting.
             start = _nearest(start, views, self._reduction)
             self._is_kept_to = True
-        pull, rest_weight = self._pull(views), self._rest_weight(views)
+        pull, rest_weight = self._pull(views, start), self._rest_weight(views)
         reduction = self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
@@ -124,8 +124,11 @@ class Live:
         gamuts = gamuts_of(light, _power(views), self._basis.present_weights)
         return self._reduction.with_gamuts(gamuts)
 
-    def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
-        """What pulls at the weights, as of `Problem.pull`: the colours' part is found once."""
+    def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
+        """What pulls at the weights, as of `Problem.pull`: the colours' part is found once.
+
+        before: (n, 3), the last answer, which says which lights are dim.
+        """
         if self._pulls is None or self._pulls[0] != views:
             power = _power(views)
             keeps_color = self._reduction.is_free & power.any(axis=1)
@@ -148,6 +151,7 @@ class Live:
         # Importance of all that is painted, beside the number of pixels.
         pixels = sum(view.pixels for view in views)
         to_colors = to_colors.times(sum(float(view.counts[0]) for view in views) / pixels)
+        to_colors = drawn_more(to_colors, dimming_of(self._basis.present_weights, before))
         return to_colors if to_present is None else to_present + to_colors
 
     def _rest_weight(self, views: tuple[LiveView, ...]) -> float:

@@ -80,6 +80,8 @@ class Problem:
             was taken out.
         refinement: The last step by which an answer was improved, if one was.
         block_side: Pixels along the side of the blocks that `corrected` is of; 1 for single pixels.
+        dimming: (n,), by how much dimmer lights are than at present in an answer before, which the
+            pull to their colours heeds; None where there was none.
         painting: Where strokes go, once there are some.
         strokes: How many there had been.
 
@@ -105,6 +107,7 @@ class Problem:
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     refinement: Refinement | None = None
+    dimming: Doubles | None = None
     block_side: int = 1
     painting: Painting | None = None
     strokes: int = 0
@@ -228,6 +231,7 @@ class Problem:
             prefer_current=self.constraints.prefer_current,
             painted_share=self.painted_share,
             keeps_color=self.keeps_color,
+            dimming=self.dimming,
         )
 
     def pulled(self, equations: NormalEquations) -> NormalEquations:
@@ -305,6 +309,7 @@ class Problem:
             corrected=None,
             noise_removed=0.0,
             refinement=None,
+            dimming=None,
             block_side=1,
             painting=painting,
             strokes=painting.strokes,

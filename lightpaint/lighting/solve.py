@@ -28,7 +28,7 @@ from lightpaint.lighting.loss import PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pixels import image_of
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.pull import to_present
+from lightpaint.lighting.pull import dimming_of, to_present
 from lightpaint.lighting.reweighted import Asked, Descent, descend, value_of
 from lightpaint.lighting.software import Software
 from lightpaint.lighting.solution import Solution
@@ -98,9 +98,28 @@ def solve(
 def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     """The solution of a problem. start: (n, 3), where to begin, its own start by default.
 
-    Where its loss is no linear problem, one that stands for it is found first.
+    Where its loss is no linear problem, one that stands for it is found first. Lamps that keep
+    their colour and come out dim are drawn to it the more, and all is solved once again.
     """
     begin = problem.start if start is None else start
+    solution = _solved_once(problem, begin)
+    if not problem.keeps_color.any() or problem.fit.colors != "gentle":
+        return solution
+    dimming = dimming_of(problem.basis.present_weights, solution.weights)
+    if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
+        return solution
+    drawn = replace(solution.problem, dimming=dimming)
+    if problem.is_linear:
+        nearer = _one(drawn, solution.weights)
+    else:
+        nearer = _descended(drawn, solution.weights, solution.reached, is_near=True)
+    before = solution.certificate
+    told = nearer.told(curve=before.curve, rounds=before.rounds + nearer.certificate.rounds)
+    return replace(told, tried=solution.tried)
+
+
+def _solved_once(problem: Problem, begin: Doubles) -> Solution:
+    """The solution of a problem with the pull that it has. begin: (n, 3)."""
     if problem.is_linear:
         return _linear(problem, begin)
     # The painting is first taken at its word, which also tells what lights reach.
@@ -166,14 +185,16 @@ def _one(problem: Problem, start: Doubles, reached: Bools | None = None) -> Solu
     return _solution(problem.reduced(reduction), optimum, optimum.weights, equations, reached)
 
 
-def _descended(problem: Problem, start: Doubles, reached: Bools) -> Solution:
+def _descended(
+    problem: Problem, start: Doubles, reached: Bools, *, is_near: bool = False
+) -> Solution:
     """From weights (n, 3) within what is asked to the least of the loss.
 
-    reached: as of `_solution`. Which whites lights mix that keep to a range of them, and which
-    lights are kept within their gamuts, stays as the reduction has it while the loss falls, and is
-    asked again where it is least.
+    reached: as of `_solution`. is_near: whether the start is near it. Which whites lights mix that
+    keep to a range of them, and which lights are kept within their gamuts, stays as the reduction
+    has it while the loss falls, and is asked again where it is least.
     """
-    solution = _descended_between(problem, start, reached)
+    solution = _descended_between(problem, start, reached, is_near=is_near)
     if not (problem.reduction.white_knobs or problem.reduction.gamut_knobs):
         return solution
     count, value = solution.certificate.rounds, _missed(solution)

@@ -13,7 +13,7 @@ from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import HOLD, Fit, meant_by
 from lightpaint.lighting.painting import weight_of_rest
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.pull import GENTLE
+from lightpaint.lighting.pull import DIMMEST, GENTLE
 from lightpaint.lighting.solve import solution_of
 
 SRGB = lp.ViewTransform()
@@ -93,7 +93,10 @@ def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
 
 
 def test_colors_are_pulled_as_the_formula_says(make_basis: Any):
-    """The optimum of squares and pull together, found by another solver."""
+    """The optimum of squares and pull together, found by another solver.
+
+    And once again with the pull to each light in proportion to how much dimmer that has come out.
+    """
     basis = _basis(make_basis)
     target = _painted(basis, over_look=True)
     solution = lp.solve(basis, target, hold=0)
@@ -106,16 +109,19 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any):
         w = flat.reshape(-1, 3)
         missed = target.image - np.einsum("nhwc,nc->hwc", images, w)
         hue = w - (w @ LUMINANCE)[:, None] * colors
-        return float((D[..., None] * missed**2).sum() + GENTLE * D.mean() * (power * hue**2).sum())
+        pull = (dimming[:, None] * power * hue**2).sum()
+        return float((D[..., None] * missed**2).sum() + GENTLE * D.mean() * pull)
 
-    bounds = [(0, None)] * present.size
-    found = minimize(
-        cost,
-        present.ravel(),
-        bounds=bounds,
-        method="L-BFGS-B",
-        options={"ftol": 1e-15, "maxiter": 5000},
-    )
+    bounds, dimming, start = [(0, None)] * present.size, np.ones(4), present.ravel()
+    how = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
+    for _ in range(2):
+        found = minimize(cost, start, bounds=bounds, **how)
+        assert found.success
+        before, start = dimming, found.x
+        then = np.maximum(found.x.reshape(-1, 3) @ LUMINANCE, 1e-9)
+        dimming = np.clip(present @ LUMINANCE / then, 1, DIMMEST)
+    dimming = before
+    assert dimming.max() > 1.5
     assert cost(solution.weights.ravel()) <= found.fun * (1 + 1e-7)
     np.testing.assert_allclose(solution.weights.ravel(), found.x, rtol=1e-3, atol=1e-4)
     assert solution.certificate.converged

@@ -25,6 +25,7 @@ from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, gamuts_for, reduced_by
+from lightpaint.lighting.pull import dimming_of
 from lightpaint.lighting.reweighted import Asked, Led, change, rounds
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
@@ -109,6 +110,20 @@ def best_of_each(solution: Solution) -> dict[Colors, Doubles]:
 
 def _finder(solution: Solution) -> Callable[[Problem], Doubles]:
     """What finds the weights (n, 3) that are best for the same with other colours."""
+    once = _finder_once(solution)
+
+    def best(problem: Problem) -> Doubles:
+        weights = once(problem)
+        if problem.fit.colors != "gentle" or problem.dimming is not None:
+            return weights
+        dimming = dimming_of(problem.basis.present_weights, weights)
+        return once(replace(problem, dimming=dimming))
+
+    return best
+
+
+def _finder_once(solution: Solution) -> Callable[[Problem], Doubles]:
+    """The same with the pull to colours that a problem has."""
     loss, at, solved = solution.problem.loss, solution.weights, solution.problem.solved
 
     def squares(problem: Problem) -> tuple[Problem, Doubles]:
