@@ -24,6 +24,7 @@ from lightpaint.report.sentences import (
     spoken_percent,
     spoken_place,
     what_holds,
+    while_held,
 )
 from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
@@ -193,6 +194,7 @@ def why_not_closer(analysis: Analysis) -> list[str]:
         return [MET]
     problem = analysis.solution.problem
     words = PARTS | (ASKED if problem.asks or problem.fit.colors != "free" else {})
+    words |= {"unreachable": PARTS["unreachable"] + while_held(seen)}
     shares = ", ".join(f"{spoken_percent(share)} {words[part]}" for part, share in parts.items())
     said = [f"Of what is missed (great misses count most), {shares}."]
     if seen.place is None and found.place is not None:

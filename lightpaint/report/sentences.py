@@ -176,7 +176,7 @@ def what_is_missed(
     # What is kept has a bound of its own below.
     which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
-        "unreachable": f"no mix of {which} can reach",
+        "unreachable": f"no mix of {which} can reach{while_held(seen)}",
         "forbidden": "would need other limits of the lights or light below zero"
         if d.is_constrained
         else "only light below zero could",
@@ -190,6 +190,12 @@ def what_is_missed(
     if d.place is not None and not is_told and d.share(d.unreachable) >= SMALL:
         sentences.append(spoken_place(d.place))
     return [*sentences, *(what_holds(d, seen) if holds is None else holds)]
+
+
+def while_held(seen: Seen | None) -> str:
+    """` while the rest is held`, of what is out of reach, where that keeps the lights from it."""
+    is_held = seen is not None and any(reason.kind == "hold" for reason in seen.reasons)
+    return " while the rest is held" if is_held else ""
 
 
 def what_holds(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]:

@@ -9,6 +9,8 @@ import pytest
 
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import Place, diagnose
+from lightpaint.lighting.analysis.held_back import Reason
+from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.lighting.analysis.uncertainty import error_bars
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.solve import solve
@@ -115,6 +117,16 @@ def test_the_most_useful_comes_first(make_basis: Any):
     half = 0.5 * found.total
     held = replace(found, bounds=(_bound("zero", "key", gain=half, multiplier=(0, 1, 1)),))
     assert "Light key is off in green and blue and still too much" in what_is_missed(held)[-1]
+
+
+def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
+    *_, found = _solved(make_basis)
+    seen = Seen(12.0, 0.0, 20.0)
+    assert "no mix of the lights can reach," in what_is_missed(found, seen)[0]
+    held = replace(seen, reasons=(Reason("hold", (), 0.7),))
+    assert (
+        "no mix of the lights can reach while the rest is held," in what_is_missed(found, held)[0]
+    )
 
 
 @pytest.mark.parametrize(
