@@ -137,8 +137,9 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
         ((), "The painting is taken at its word: linear light, nothing held, any colour."),
         (
             ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
-            "Fitted as the eye sees it (srgb); what you did not paint is held (0.5); lamps are "
-            "drawn to their own colour (gentle); --literal for none of this.",
+            # Most of the painting is brighter than middle grey, a quarter brighter than white.
+            "Fitted as the eye sees it (srgb at -1.2 stops); what you did not paint is held (0.5); "
+            "lamps are drawn to their own colour (gentle); --literal for none of this.",
         ),
         (("--colors", "white"), "Lamps are white; --literal for none of this."),
         (
