@@ -9,11 +9,13 @@ from lightpaint.expected import SWITCH, Check, a, number, one_of, whole
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
-from lightpaint.scene.film import check_resolution
+from lightpaint.scene.film import MAX_SPP, check_resolution
 from lightpaint.scene.quality import Quality
 
 #: More rounds of rendering and solving again than this are a slip of the pen.
 MAX_REFINE = 100
+#: And lights that are suggested.
+MAX_SUGGEST = 100
 
 
 @keywords()
@@ -90,7 +92,7 @@ class Settings(Fit):
         **Fit.expected,
         "resize": SWITCH,
         # Two halves of the samples tell the noise.
-        "spp": whole(2),
+        "spp": whole(2, MAX_SPP),
         "time_s": number("seconds"),
         "seed": whole(0),
         "resolution": a(str, "a part of the film like '1/4' or '320x180'"),
@@ -99,10 +101,10 @@ class Settings(Fit):
         "exact_spp": SWITCH,
         "noise_correction": SWITCH,
         "refine": whole(0, MAX_REFINE),
-        "suggest": whole(0),
+        "suggest": whole(0, MAX_SUGGEST),
         "cd_per_unit": number("cd/m²"),
         "verify": SWITCH,
-        "verify_spp": whole(2),
+        "verify_spp": whole(2, MAX_SPP),
         "report": SWITCH,
         "force": SWITCH,
         "command": a(str, "the text of a shell command"),

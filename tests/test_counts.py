@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import refused
 
 import lightpaint as lp
 from lightpaint.batch.manifest import read_manifest
@@ -24,6 +25,7 @@ from lightpaint.progress import wanted, while_wanted
 from lightpaint.records import strict_toml
 from lightpaint.scene.choice import choose_lights
 from lightpaint.scene.lights_file import read_lights_file
+from lightpaint.settings import Settings
 from lightpaint.threads import side_by_side
 
 MANY = ["#ff0000", "#00ff00"] * 1500
@@ -116,6 +118,17 @@ def test_names_of_lights_have_an_end(make_basis: Any) -> None:
 def test_a_message_has_no_more_than_a_page_has_use_for(content: dict[str, Any]) -> None:
     with pytest.raises(PaintError, match=r"and at most \d+ are taken"):
         said_of({**content, "seq": 1}, [])
+
+
+def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
+    """Before passes are listed, which so many would fill the memory with."""
+    for key, most in (("spp", 2**20), ("verify_spp", 2**20), ("suggest", 100)):
+        Settings(**{key: most})
+        with pytest.raises(lp.LightpaintError, match=f"at most {most}"):
+            Settings(**{key: most + 1})
+    for option in ("--spp", "--verify-spp", "--suggest"):
+        given = (option, str(10**30), "r.xml", "a.png")
+        assert "at most" in refused(tmp_path, "solve", *given)
 
 
 # Work that is given up

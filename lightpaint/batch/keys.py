@@ -11,7 +11,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.expected import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, one_of, whole
 from lightpaint.files import one_line
 from lightpaint.relit.forms import FORMS
-from lightpaint.scene.film import check_resolution
+from lightpaint.scene.film import MAX_SPP, check_resolution
 from lightpaint.settings import Settings
 from lightpaint.target.read import Paint
 
@@ -143,7 +143,7 @@ class Final:
     seed: int = 0
 
 
-FINAL: dict[str, Check] = {"spp": whole(2), "resolution": TEXT, "seed": whole(0)}
+FINAL: dict[str, Check] = {"spp": whole(2, MAX_SPP), "resolution": TEXT, "seed": whole(0)}
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,7 @@ def add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
     """How many samples."""
     parser.add_argument(
         "--spp",
-        type=arguments.at_least(2),
+        type=arguments.at_least(2, most=2**20),
         metavar="N",
         help=f"samples per pixel (default: {default})",
     )

@@ -143,7 +143,7 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--suggest",
-        type=arguments.at_least(1),
+        type=arguments.at_least(1, most=100),
         nargs="?",
         const=3,
         default=0,
@@ -165,7 +165,7 @@ def add_verification(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--verify-spp",
-        type=arguments.at_least(2),
+        type=arguments.at_least(2, most=2**20),
         metavar="N",
         help="samples per pixel of that render, on the whole film, however long it takes",
     )

@@ -2,8 +2,10 @@
 
 import os
 import signal
+import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -366,3 +368,19 @@ def test_who_is_believed() -> None:
         assert (
             cache_folder.is_believed(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0]))) == believed
         )
+
+
+@pytest.mark.parametrize("jump_s", [-10 * 365 * 86400.0, 10 * 365 * 86400.0])
+def test_a_clock_that_jumps_costs_no_basis(
+    empty_cache: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, jump_s: float
+) -> None:
+    bases_of(make_basis, "hall.xml", "room.xml")
+    there = time.time() + jump_s
+    monkeypatch.setattr("lightpaint.basis.cache.time", SimpleNamespace(time=lambda: there))
+    bases_of(make_basis, "hall.xml")
+    assert len(cache.entries()) == 2
+    for entry in cache.entries():
+        os.utime(entry.path, (there, there))
+    assert len(cache.entries()) == 2
+    its = make_basis(2).origin
+    assert cache.find(f"{0:032x}", its.sensor, its.seed, make_basis(2).size) is not None
