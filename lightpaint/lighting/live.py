@@ -98,8 +98,7 @@ class Live:
             # What is not allowed may well be nearer to the painting.
             start = _nearest(start, views, self._reduction)
             self._is_kept_to = True
-        pull, rest_weight = self._pull(views, start), self._rest_weight(views)
-        reduction = self._with_gamuts(views)
+        rest_weight, reduction = self._rest_weight(views), self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             asked = equations if pull is None else equations + pull
@@ -109,7 +108,15 @@ class Live:
             return within_gamuts(reduction, snapped(reduction, weights))
 
         if self.mode == "linear":
-            return best(reduce(add, (x.tiles().equations(rest_weight) for x in views)), start)
+            equations = reduce(add, (x.tiles().equations(rest_weight) for x in views))
+            pull = self._pull(views, self._basis.present_weights)
+            found = best(equations, start)
+            if self._fit.colors != "gentle":
+                return found
+            # As a solve does: once more, with what came out dim drawn to its colour the more.
+            pull = self._pull(views, found)
+            return best(equations, found)
+        pull = self._pull(views, start)
         films = self._films_of(views)
         pixels = films.pixels(rest_weight, self._fit.transform)
         # A painting that another hand has changed may leave the answer before worse than none.
@@ -127,7 +134,7 @@ class Live:
     def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
         """What pulls at the weights, as of `Problem.pull`: the colours' part is found once.
 
-        before: (n, 3), the last answer, which says which lights are dim.
+        before: (n, 3), an answer that says which lights are dim.
         """
         if self._pulls is None or self._pulls[0] != views:
             power = _power(views)
