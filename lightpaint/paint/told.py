@@ -45,6 +45,9 @@ WAYS = (
 #: The same of an answer that is no closer to the paint than the present look.
 NOT_YET = "No closer than it is now"
 
+#: And of one that is farther from it.
+WORSE = "Farther from the paint than it is now, which undo brings back"
+
 #: What to do about what holds the lights; a page has a button for each, and for what was asked of
 #: lights.
 HELP: dict[str, str] = {
@@ -174,7 +177,7 @@ def _how_far(seen: Seen) -> str:
     """
     rest = seen.elsewhere if seen.changes_elsewhere else None
     if seen.share_met < 0.005:  # which would be said as 0 %
-        said = NOT_YET
+        said = WORSE if seen.is_worse else NOT_YET
     elif rest is not None and seen.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
         return f"{spoken_percent(seen.share_met)} of the way, at the cost of {cost}"

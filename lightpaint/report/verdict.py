@@ -84,7 +84,16 @@ def headline(seen: Seen) -> str:
     A cause is named only if a third of what the fit misses is due to it.
     """
     told = spoken_elsewhere(seen.elsewhere) if seen.changes_elsewhere else ""
-    return f"{_of_the_paint(seen)} {told}".rstrip()
+    present = f"{spoken_present(seen)} " if seen.is_worse else ""
+    return f"{present}{_of_the_paint(seen)} {told}".rstrip()
+
+
+def spoken_present(seen: Seen) -> str:
+    """Say that the present lighting comes closer than the answer, and offer it."""
+    return (
+        f"The lighting that there is comes closer to the paint (mean ΔE {seen.asked:.1f}) than "
+        f"this one ({seen.delta_e:.1f}): keep the scene as it is."
+    )
 
 
 def _of_the_paint(seen: Seen) -> str:

@@ -58,6 +58,13 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             23.0,
             {"reasons": (HOLD,)},
+            "Farther from the paint than it is now, which undo brings back: brighter light on the "
+            "floor is missing; what is not painted is held near how it is. Paint more, or loosen "
+            "it.",
+        ),
+        (
+            20.0,
+            {"reasons": (HOLD,)},
             "No closer than it is now: brighter light on the floor is missing; what is not "
             "painted is held near how it is. Paint more, or loosen it.",
         ),

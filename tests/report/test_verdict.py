@@ -235,3 +235,13 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
         told = verdict(solution, predicted, replace(checked, power=power))
         assert told.endswith(f"confirms it. It would probably have missed an error of {said}")
     assert verdict(solution, predicted, replace(checked, power={"sun": 0.5})).endswith("it.")
+
+
+def test_an_answer_that_is_worse_than_the_present_says_so_first():
+    worse = _seen(3.6, 3.4, there=("lamp",))
+    assert headline(worse).startswith(
+        "The lighting that there is comes closer to the paint (mean ΔE 3.4) than this one (3.6): "
+        "keep the scene as it is. "
+    )
+    # What nobody reads is no difference.
+    assert not headline(_seen(3.42, 3.4, there=("lamp",))).startswith("The lighting that there is")

@@ -149,6 +149,11 @@ class Seen:
         return self.delta_e - self.noise
 
     @property
+    def is_worse(self) -> bool:
+        """Whether the scene as it is comes closer to the paint, in numbers as people are told."""
+        return round(self.delta_e, 1) > round(self.asked, 1)
+
+    @property
     def share_met(self) -> float:
         """Share of what was asked that has come about: 1 − `delta_e` / `asked`, at least 0."""
         if self.asked > 0:
