@@ -34,7 +34,7 @@ def crowded(request: pytest.FixtureRequest, browser: Any, site: Any) -> Iterator
 @pytest.fixture
 def painter(crowded: Painter) -> Painter:
     crowded.page.evaluate(
-        "() => window.painter.store.set({ ...window.first, toasts: [], dialog: null })"
+        "() => window.painter.store.set({ ...window.first, toasts: [], preview: null })"
     )
     crowded.page.mouse.move(5, 5)
     crowded.still()
@@ -79,9 +79,14 @@ def longest(painter: Painter) -> None:
     painter.page.evaluate(
         """async () => {
           const { LONGEST } = await import('/fake/crowd.js');
-          window.painter.store.set({ headline: LONGEST, help: 'colors' });
+          window.painter.store.set({ headline: LONGEST });
         }"""
     )
+
+
+def preview(painter: Painter) -> None:
+    painter.page.locator(".answer .help").click()
+    painter.page.get_by_role("dialog").get_by_text("changes the annex").wait_for()
 
 
 def comparing(painter: Painter) -> None:
@@ -131,6 +136,7 @@ PANELS: tuple[Callable[[Painter], None], ...] = (
     importance,
     over_the_picture,
     longest,
+    preview,
     comparing,
     some_only,
     settings,
@@ -174,6 +180,14 @@ def test_all_that_is_said_of_an_answer_comes_into_sight(painter: Painter) -> Non
     side, panel = (painter.page.locator(x).bounding_box() for x in (".side", ".fold.is-truth"))
     assert panel["y"] >= side["y"] - 1
     assert panel["y"] + panel["height"] <= side["y"] + side["height"] + 1
+
+
+def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str) -> None:
+    longest(painter)
+    painter.page.evaluate("() => window.painter.store.set({ unfolded: [0, 40] })")
+    painter.page.evaluate(axe)
+    found = painter.page.evaluate("() => axe.run(document.querySelector('.lightpaint'))")
+    assert [(one["id"], [n["html"] for n in one["nodes"]]) for one in found["violations"]] == []
 
 
 def test_what_has_no_room_is_read_by_keyboard(painter: Painter) -> None:

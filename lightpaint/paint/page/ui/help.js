@@ -2,7 +2,7 @@
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, Dialog } from './controls.js';
-import { number } from './format.js';
+import { number, shortened } from './format.js';
 import { Icon } from './icons.js';
 import { put } from './thumb.js';
 
@@ -36,10 +36,14 @@ const OF_ALL = {
   prefer_current: 'Let lights change',
 };
 
-/** What is called so, with its lights. @param {Cause} cause */
-function nameOf({ kind, names }) {
+/** Characters of a light's name on a button, beside which a sentence stands. */
+const ON_BUTTON = 14;
+
+/** What is called so, with its lights. @param {Cause} cause @param {number} [most] characters of a
+ * light's name */
+function nameOf({ kind, names }, most = Infinity) {
   if (kind in OF_ALL) return OF_ALL[kind];
-  const which = names.length === 1 ? names[0] : `${names.length} lights`;
+  const which = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
   return `${WORDS[kind][names.length === 1 ? 0 : 1]} ${which}`;
 }
 
@@ -84,9 +88,8 @@ export function Help({ ui, hands }) {
   if (!help || !change) return null;
   const name = nameOf(help);
   const closes = help.closes === null ? '' : `: closes ${Math.round(100 * help.closes)} %`;
-  const label = `${name}${closes}`;
-  return html`<${Button} label=${label} class="help"
-    tip=${`${label}. Shows what it would do; nothing is done yet.`}
+  return html`<${Button} label=${`${nameOf(help, ON_BUTTON)}${closes}`} class="help"
+    tip=${`${name}${closes}. Shows what it would do; nothing is done yet.`}
     act=${() => hands.session.preview(titleOf(help, name), change)} />`;
 }
 

@@ -12,12 +12,16 @@ const named = (k) =>
   `${LONG}.${k % 2 ? 'wall_washer' : 'spot_on_the_second_picture'}_${String(k).padStart(2, '0')}`;
 
 export const HEADLINE =
-  `About half of the way, 46 %: slightly brighter and yellower light on the ${OBJECT} is missing; ` +
-  `what is not painted is held near how it is. Paint what may change too, or let it go.`;
+  `About half of the way, 46 %, and changes the annex by ΔE 12: slightly brighter light on the ` +
+  `${OBJECT} is missing; what is not painted is held near how it is. Paint more, or loosen it.`;
 
 export const LONGEST =
-  `No closer than it is now: darker and bluer shade on the ${OBJECT} is missing; ` +
+  `35 % of the way, at the cost of the ${OBJECT} (ΔE 49): darker and bluer shade on the ${OBJECT} ` +
+  `is missing; ` +
   `${named(12)} and ${named(13)} are held back by what you ask of them.`;
+
+/** What has a button, of the name of a light. */
+export const HELP = { kind: 'limits', names: [named(0)], closes: 0.57, hold: null };
 
 export const SENTENCES = [
   'Of what is missed (great misses count most), 41 % would need lights of other colours or levels ' +
@@ -91,7 +95,7 @@ export function crowd(host) {
       held: k % 12 < 4,
       unreached: k % 10 === 9,
     }));
-    const seen = { headline: HEADLINE, help: 'hold', delta_e: 11.24, delta_e_asked: 20.53 };
+    const seen = { headline: HEADLINE, help: HELP, delta_e: 11.24, delta_e_asked: 20.53 };
     return { ...made, ...seen, sentences: SENTENCES.slice(2), lights };
   };
   host.asks = () => {
