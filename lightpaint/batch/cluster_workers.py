@@ -108,7 +108,7 @@ class ClusterWorkers:
                 with dask.config.set({"distributed.comm.timeouts.connect": f"{GONE_S}s"}):
                     return in_time(work, SILENT_S, "")
             except GOING as error:
-                said = first_line(error)
+                said = _reason(error)
         self.is_gone = True
         raise BatchError(
             f"the scheduler at {self._address} is gone ({said}); the same command goes on once it "
@@ -161,6 +161,11 @@ class ClusterWorkers:
                 self._client.run(os._exit, 1, workers=[worker], wait=False, on_error="ignore")
 
 
+def _reason(error: BaseException) -> str:
+    """Return what an error says, without the system's number for it."""
+    return str(getattr(error, "strerror", None) or first_line(error))
+
+
 def _connected(address: str) -> Any:
     """A client of the scheduler there. Raises BatchError."""
     try:
@@ -182,6 +187,6 @@ def _connected(address: str) -> Any:
         raise
     except GOING as error:
         raise BatchError(
-            f"no scheduler answers at {address}: {first_line(error) or 'none is there'}; give its "
+            f"no scheduler answers at {address}: {_reason(error) or 'none is there'}; give its "
             "address, like tcp://host:8786 or tls://host:8786 (dask scheduler tells it)"
         ) from error
