@@ -55,24 +55,33 @@ class ColorHull:
         rgb /= luminance(rgb)[:, None]
         return rgb
 
-    def has(self, rgb: Floats) -> bool:
-        """Whether it has the colour of a light (3,); that of black is any."""
-        if not np.any(rgb):
-            return True
-        beyond = DIRECTIONS @ chromaticity(rgb) - self.reach
-        return bool((beyond <= ROUND_OFF).all())
+    @cached_property
+    def _sides(self) -> Doubles:
+        """(k, 3), by which a light has >= 0 that reaches no further: linear in it.
 
-    def nearest(self, rgb: Floats) -> Doubles:
+        u' = 4 X / W and v' = 9 Y / W with W = X + 15 Y + 3 Z, so that d·(u', v') <= r is
+        r W - 4 d₁ X - 9 d₂ Y >= 0.
+        """
+        X, Y, _ = to_xyz = rgb_to_xyz(REC709)
+        W = np.array([1.0, 15.0, 3.0]) @ to_xyz
+        one, other = DIRECTIONS.T
+        return np.asarray(
+            np.outer(self.reach, W) - np.outer(4 * one, X) - np.outer(9 * other, Y), np.float64
+        )
+
+    def has(self, rgb: Doubles) -> bool:
+        """Whether it has the colour of a light (3,); that of black is any."""
+        return bool((self._sides @ rgb >= -ROUND_OFF * rgb.sum()).all())
+
+    def nearest(self, rgb: Doubles) -> Doubles:
         """The colour on the way from its own to that of a light (3,) where it ends, as bright."""
         if self.has(rgb):
-            return np.array(rgb, np.float64)
-        own, to = chromaticity(self.own), chromaticity(rgb)
-        along = DIRECTIONS @ (to - own)
-        room = self.reach - DIRECTIONS @ own
-        t = float(np.min(room[along > 0] / along[along > 0], initial=1.0))
-        u, v = own + max(t, 0.0) * (1 - 1e-12) * (to - own)
-        found = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz_of((u, v / 1.5))), 0)
-        return np.asarray(found * (luminance(rgb) / luminance(found)))
+            return rgb
+        room, own = self._sides @ rgb, self._sides @ self.own
+        beyond = (room < 0) & (own > 0)
+        # With so much of its own colour beside it is within all sides.
+        mixed = rgb + float(np.max(-room[beyond] / own[beyond], initial=0.0)) * self.own
+        return np.asarray(mixed * (luminance(rgb) / luminance(mixed)), np.float64)
 
 
 def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:
