@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import enlarged
@@ -31,6 +31,8 @@ NOISY_DISPLAY = 0.035
 
 #: Sides of blocks that are tried, and blocks along the shorter side of a picture, at least.
 SIDES, FEWEST_BLOCKS = (1, 2, 3, 4, 6, 8), 16
+#: Pixels that are enough to know the noise of a picture, and rows of a strip of them.
+ENOUGH, STRIP_ROWS = 2**16, 24
 
 #: Strength of the pull to the present by what is noise of a light.
 PRIOR = 0.1
@@ -76,24 +78,31 @@ def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
     sides = [side for side in SIDES if shortest >= FEWEST_BLOCKS * side]
     if len(sides) < 2:
         return 1
-    halves = [
-        (basis.present_look, mix(basis.half_differences, basis.present_weights)) for basis in bases
-    ]
+    strips = [_strips(basis) for basis in bases]
     for side in sides:
-        noise = [
-            _display_noise(look, half, basis, transform, side)
-            for (look, half), basis in zip(halves, bases, strict=True)
-        ]
+        noise = [_display_noise(look, half, seen, transform, side) for look, half, seen in strips]
         if np.sqrt(np.mean(np.concatenate(noise))) <= NOISY_DISPLAY:
             return side
     return sides[-1]
 
 
+def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
+    """Return the present look of enough of a picture, half its difference, and where emitters are.
+
+    Of strips of whole blocks, whatever their side, all over the picture.
+    """
+    every = max(1, basis.emitters_seen.size // ENOUGH)
+    rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % every == 0)
+    weights = basis.present_weights
+    look, half = (mix(x[:, rows], weights) for x in (basis.images, basis.half_differences))
+    return look, half, basis.emitters_seen[rows]
+
+
 def _display_noise(
-    look: Floats, half: Floats, basis: Basis, transform: ViewTransform, side: int
+    look: Floats, half: Floats, seen: Bools, transform: ViewTransform, side: int
 ) -> Doubles:
     """Return squared half differences of what a display shows of blocks, (k,), without emitters."""
-    unseen = (~basis.emitters_seen).astype(np.float64)
+    unseen = (~seen).astype(np.float64)
     counts = block_sums(unseen, side)
     safe = np.where(counts > 0, counts, 1)[..., None]
     light, its = (block_sums(x * unseen[..., None], side) / safe for x in (look, half))
