@@ -31,7 +31,8 @@ def mixers_html(folder: Path, rows: Sequence[Row], bases: Mapping[str, str]) -> 
     for name, its in found.items():
         told = read_planes(folder / THUMBNAILS / f"{name}{SUFFIX}")
         if len(made) < MOST_MIXERS and told:
-            with suppress(LightpaintError, KeyError):
+            # A file that is damaged costs the mixer, and not the gallery.
+            with suppress(LightpaintError, AttributeError, LookupError, TypeError, ValueError):
                 made[name] = _mixer(folder, name, told, its)
     return made
 

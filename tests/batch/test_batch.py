@@ -459,3 +459,12 @@ def test_small_pictures_that_are_damaged_are_made_again(here: Path, damage: byte
     first.write_bytes(before[first][: len(before[first]) // 2] if damage is None else damage)
     do(here)
     assert {path: path.read_bytes() for path in pictures} == before
+
+
+@pytest.mark.parametrize("told", ['{"lights": 3}', '{"lights": [1]}', '{"lights": []}', "junk"])
+def test_planes_that_are_damaged_cost_no_gallery(here: Path, told: str) -> None:
+    do(here)
+    for path in (here / "out" / "thumbnails").glob("*.planes.json"):
+        path.write_text(told)
+    do(here)
+    assert (here / "out" / "index.html").is_file()
