@@ -339,7 +339,8 @@ def spoken_hold(bound: Bound) -> str:
     if bound.kind == "kept":
         return "kept as it is"
     if bound.kind != "zero":
-        return bound.held_by
+        tint = f"; would have to be {bound.tint}" if bound.tint else ""
+        return f"{bound.held_by}{tint}"
     if len(bound.multiplier) != 3:
         return "off"
     felt = zip(CHANNELS, bound.multiplier, strict=True)

@@ -87,6 +87,13 @@ def test_bounds_and_percents():
     assert [spoken_percent(x) for x in (0, 0.004, 0.07, 0.62)] == ["0 %", "0.4 %", "7 %", "62 %"]
 
 
+def test_whites_that_a_light_would_leave_are_told_with_the_side():
+    bound = replace(_bound("colour", "spot_tide"), held_by="2200 to 9000 K", tint="greener")
+    said = spoken_bound(bound, 0.4)
+    assert said.startswith("Light spot_tide would have to be greener than its whites (2200 to")
+    assert spoken_hold(bound) == "2200 to 9000 K; would have to be greener"
+
+
 def test_scatter_takes_four_times_the_samples_and_bias_twice(make_basis: Any):
     basis, _, found, _ = _solved(make_basis)
     scatter = replace(found, bias=np.zeros((3, 3)))
