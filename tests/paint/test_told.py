@@ -11,7 +11,7 @@ from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.paint.told import (
+from lightpaint.paint.told import (, unpainted_fields
     HELP,
     foreseen_fields,
     help_fields,
@@ -169,3 +169,12 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
     assert "Most of that out of reach is" in why_not_closer(unseen)[1]
     met = replace(analysis, diagnosis=replace(analysis.diagnosis, missed=0.009))
     assert why_not_closer(met) == ["The lights can do what is painted."]
+
+
+@pytest.mark.parametrize("is_asked", [False, True])
+def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: bool):
+    said = unpainted_fields(is_asked=is_asked, is_white=True)["headline"]
+    assert "nearest to its colour" in said
+    assert "present lighting" not in said
+    plain = unpainted_fields(is_asked=is_asked, is_white=False)["headline"]
+    assert ("present lighting" in plain) != is_asked
