@@ -11,12 +11,13 @@ from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.paint.told import (, unpainted_fields
+from lightpaint.paint.told import (
     HELP,
     foreseen_fields,
     help_fields,
     helped,
     sketched,
+    unpainted_fields,
     why_not_closer,
 )
 from lightpaint.report.sentences import spoken_cause
