@@ -119,7 +119,7 @@ class Job:
         # A painting is read beside the basis, and a mistake in it is said first.
         *targets, basis = side_by_side(content, [*self.targets, self.basis])
         basis = basis.basis if isinstance(basis, LightGroups) else basis
-        if basis is not None:
+        if basis is not None and basis.origin.is_light_groups:
             pairs = zip(self.targets, targets, strict=True)
             targets = [_over_look(given, target, basis) for given, target in pairs]
         scenes = [content(scene) for scene in self.scenes]

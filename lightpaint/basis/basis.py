@@ -79,6 +79,10 @@ class BasisLight:
         return f"BasisLight({self.name!r}, {what}{kept})"
 
 
+#: How the method of light groups begins; the renderer follows.
+LIGHT_GROUPS = "light groups of "
+
+
 @dataclass(frozen=True)
 class Origin:
     """Where a basis comes from: what makes two of them comparable, and one go on.
@@ -108,6 +112,11 @@ class Origin:
     def spp(self) -> int:
         """Samples per pixel in all."""
         return sum(self.halves)
+
+    @property
+    def is_light_groups(self) -> bool:
+        """Whether another renderer made it, of whose picture there is no template."""
+        return self.method.startswith(LIGHT_GROUPS)
 
 
 @keywords()

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, BasisLight, Origin, free_name
+from lightpaint.basis.basis import LIGHT_GROUPS, Basis, BasisLight, Origin, free_name
 from lightpaint.basis.lightgroups.beauty import NOTHING, shares, spoken_share, spoken_sum
 from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import FILES
@@ -249,7 +249,7 @@ def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> O
         scene_identity=digest.hexdigest()[:32],
         sensor=roles.view or "as rendered",
         seed=0,
-        method=f"light groups of {roles.renderer}",
+        method=f"{LIGHT_GROUPS}{roles.renderer}",
         halves=(0, 0),
         passes=(0, 0),
     )
