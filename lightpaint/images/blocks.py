@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Doubles, Floats
 
 Size = tuple[int, int]
 
@@ -58,6 +58,18 @@ def block_mean(image: Floats, factor: int) -> Floats:
     for k in range(1, factor * factor):
         total += whole[k // factor :: factor, k % factor :: factor]
     return np.asarray((total / factor**2).astype(image.dtype))
+
+
+def block_sums(image: npt.NDArray[Any], factor: int) -> Doubles:
+    """Return sums over blocks of factor x factor pixels of `image`, (h, w, …), in float64.
+
+    Here what is left at the right and at the bottom makes smaller blocks of its own.
+    """
+    values = np.asarray(image, np.float64)
+    if factor == 1:
+        return values
+    rows, columns = (np.arange(0, length, factor) for length in values.shape[:2])
+    return np.asarray(np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1))
 
 
 def block_pixels(image: Floats, factor: int) -> Floats:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import enlarged
+from lightpaint.images.blocks import block_sums, enlarged
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -45,10 +45,17 @@ class BinnedPixels:
     Attributes:
         basis: (n, 1, p, 3) images of the lights, means over each block of what counts in it.
         loss: What a picture of these blocks costs; one counts as much as all its pixels.
+        side: Pixels along the side of a block.
     """
 
     basis: Basis
     loss: PaintingLoss
+    side: int
+
+    @cached_property
+    def equations(self) -> NormalEquations:
+        """The linear problem of the painted light, each block as important as its pixels."""
+        return NormalEquations.of(self.basis, self.loss.painted, self.loss.importance[..., None])
 
     @cached_property
     def prior(self) -> NormalEquations:
@@ -138,7 +145,7 @@ def binned_pixels(views: Views, loss: PaintingLoss, side: int) -> BinnedPixels:
         features=None,
         objects=None,
     )
-    return BinnedPixels(basis, _joined(parts))
+    return BinnedPixels(basis, _joined(parts), side)
 
 
 def _binned_loss(loss: PaintingLoss, total: Doubles, safe: Doubles, side: int) -> PaintingLoss:
@@ -170,12 +177,3 @@ def _joined(parts: list[PaintingLoss]) -> PaintingLoss:
     names = ("painted", "importance", "share", "current", "at_least")
     rows: dict[str, Any] = {name: row(name) for name in names}
     return replace(parts[0], **rows)
-
-
-def block_sums(values: npt.NDArray[np.floating], side: int) -> Doubles:
-    """Return sums over blocks, (h', w', …) float64; at the border of what there is."""
-    if side == 1:
-        return np.asarray(values, np.float64)
-    rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
-    along = np.add.reduceat(np.asarray(values, np.float64), rows, axis=0)
-    return np.asarray(np.add.reduceat(along, columns, axis=1))

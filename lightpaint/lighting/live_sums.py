@@ -5,12 +5,11 @@ from contextlib import nullcontext
 from math import ceil
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import block_mean, enlarged
+from lightpaint.images.blocks import block_mean, block_sums, enlarged
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pixels import STRIP, Pixels, joined
 from lightpaint.lighting.reweighted import between
@@ -95,7 +94,7 @@ class SmallFilm:
         self._size = rows, columns
         # A block in which something else is seen shows no emitter.
         unseen = (~self._seen).astype(np.float64)
-        self._shown = np.where(_spread(_summed(unseen, side), side, unseen.shape) > 0, unseen, 1)
+        self._shown = np.where(_spread(block_sums(unseen, side), side, unseen.shape) > 0, unseen, 1)
         small = np.stack([self._average(x) for x in basis.images])
         # Singles are enough for what is averaged, and sums of them take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
@@ -111,8 +110,8 @@ class SmallFilm:
         """Return (h', w', 3) means over blocks of a picture (h, w, 3)."""
         if self._side == 1 or self._shown.all():
             return _averaged(image, self._side)
-        total = _summed(image * self._shown[..., None], self._side)
-        return np.asarray(total / _summed(self._shown, self._side)[..., None], np.float32)
+        total = block_sums(image * self._shown[..., None], self._side)
+        return np.asarray(total / block_sums(self._shown, self._side)[..., None], np.float32)
 
     def painted(self, region: Slices) -> None:
         """Average anew what a rectangle touches."""
@@ -127,7 +126,7 @@ class SmallFilm:
         a = self._importance[where] * self._shown[where]
         light = self._image[where] * a[..., None]
         rest = np.where(self._seen[where], 0, np.maximum(1 - a, 0))
-        total, lit, unpainted = (_summed(x, side) for x in (a, light, rest))
+        total, lit, unpainted = (block_sums(x, side) for x in (a, light, rest))
         rows = slice(top // side, -(-bottom // side))
         columns = slice(left // side, -(-right // side))
         some = total > 0
@@ -238,13 +237,6 @@ def _around(along: slice, side: int, length: int) -> tuple[int, int]:
     return start // side * side, min(-(-stop // side) * side, length)
 
 
-def _summed(values: npt.NDArray[np.floating], side: int) -> Doubles:
-    """Sums over blocks; those that the border cuts off are of what there is."""
-    height, width = values.shape[:2]
-    rows, columns = (np.arange(0, length, side) for length in (height, width))
-    return np.asarray(np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1))
-
-
 def _spread(blocks: Doubles, side: int, size: tuple[int, ...]) -> Doubles:
     """Return the value of its block for each pixel, (h, w)."""
     return np.asarray(enlarged(blocks, side)[: size[0], : size[1]])
@@ -257,8 +249,8 @@ def _averaged(image: Floats, side: int) -> Floats:
         return image
     if not (height % side or width % side):
         return block_mean(image, side)
-    ones = _summed(np.ones((height, width)), side)
-    return np.asarray(_summed(image.astype(np.float64), side) / ones[..., None], np.float32)
+    ones = block_sums(np.ones((height, width)), side)
+    return np.asarray(block_sums(image, side) / ones[..., None], np.float32)
 
 
 def _planes(image: Floats) -> Doubles:

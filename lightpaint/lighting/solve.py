@@ -10,7 +10,7 @@ from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.approach import near_optimum
-from lightpaint.lighting.binning import binned_pixels, block_side
+from lightpaint.lighting.binning import BinnedPixels, binned_pixels, block_side
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.on_locus import next_whites, solve_on_locus
@@ -102,7 +102,8 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     their colour and come out dim are drawn to it the more, and all is solved once again.
     """
     begin = problem.start if start is None else start
-    solution = _solved_once(problem, begin)
+    blocks = _blocks_of(problem)
+    solution = _solved_once(problem, begin, blocks)
     if not problem.keeps_color.any() or problem.fit.colors != "gentle":
         return solution
     dimming = dimming_of(problem.basis.present_weights, solution.weights)
@@ -112,21 +113,34 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     if problem.is_linear:
         nearer = _one(drawn, solution.weights)
     else:
-        nearer = _descended(drawn, solution.weights, solution.reached, is_near=True)
+        nearer = _descended(drawn, solution.weights, solution.reached, blocks, is_near=True)
     before = solution.certificate
     told = nearer.told(curve=before.curve, rounds=before.rounds + nearer.certificate.rounds)
     return replace(told, tried=solution.tried)
 
 
-def _solved_once(problem: Problem, begin: Doubles) -> Solution:
-    """The solution of a problem with the pull that it has. begin: (n, 3)."""
+def _blocks_of(problem: Problem) -> BinnedPixels | None:
+    """Return the blocks of pixels that are fitted; None where single pixels are."""
+    loss = problem.loss
+    if not isinstance(loss, PaintingLoss):
+        return None
+    side = block_side(problem.views.bases, loss.transform)
+    return binned_pixels(problem.views, loss, side) if side > 1 else None
+
+
+def _solved_once(problem: Problem, begin: Doubles, blocks: BinnedPixels | None) -> Solution:
+    """Return the solution of a problem with the pull that it has.
+
+    begin: (n, 3). blocks: as of `_blocks_of`.
+    """
     if problem.is_linear:
         return _linear(problem, begin)
     # The painting is first taken at its word, which also tells what lights reach.
     every = replace(problem, constraints=_of_all(problem.constraints))
     first = _linear(replace(every, loss=problem.squares), begin)
     reached = first.reached
-    solution = _descended(every.reduced(first.problem.reduction), first.weights, reached)
+    every = every.reduced(first.problem.reduction)
+    solution = _descended(every, first.weights, reached, blocks)
     if problem.constraints.sparse is not None:
         # The lights are chosen where all of them would lead.
         chosen = _linear(
@@ -135,7 +149,7 @@ def _solved_once(problem: Problem, begin: Doubles) -> Solution:
         its = chosen.problem
         held = replace(problem, reduction=its.reduction, full=its.full)
         reached = chosen.reached
-        solution = replace(_descended(held, chosen.weights, reached), tried=chosen.tried)
+        solution = replace(_descended(held, chosen.weights, reached, blocks), tried=chosen.tried)
         first = chosen
     return solution.told(curve=first.certificate.curve)
 
@@ -186,15 +200,21 @@ def _one(problem: Problem, start: Doubles, reached: Bools | None = None) -> Solu
 
 
 def _descended(
-    problem: Problem, start: Doubles, reached: Bools, *, is_near: bool = False
+    problem: Problem,
+    start: Doubles,
+    reached: Bools,
+    blocks: BinnedPixels | None,
+    *,
+    is_near: bool = False,
 ) -> Solution:
-    """From weights (n, 3) within what is asked to the least of the loss.
+    """Descend from weights (n, 3) within what is asked to the least of the loss.
 
-    reached: as of `_solution`. is_near: whether the start is near it. Which whites lights mix that
-    keep to a range of them, and which lights are kept within their gamuts, stays as the reduction
-    has it while the loss falls, and is asked again where it is least.
+    reached: as of `_solution`. blocks: as of `_blocks_of`. is_near: whether the start is near the
+    least. Which whites are mixed by lights that keep to a range of them, and which lights are kept
+    within their gamuts, stays as the reduction has it while the loss falls, and is decided anew
+    where it is least.
     """
-    solution = _descended_between(problem, start, reached, is_near=is_near)
+    solution = _descended_between(problem, start, reached, blocks, is_near=is_near)
     if not (problem.reduction.white_knobs or problem.reduction.gamut_knobs):
         return solution
     count, value = solution.certificate.rounds, _missed(solution)
@@ -204,10 +224,12 @@ def _descended(
         reduction, optimum = next_whites(equations, at.reduction, solution.weights)
         if all(a is b for a, b in zip(reduction.knobs, at.reduction.knobs, strict=True)):
             break
-        nearer = _descended_between(at.reduced(reduction), optimum.weights, reached, is_near=True)
+        kept_within = reduction.gamut_knobs != at.reduction.gamut_knobs
+        at = at.reduced(reduction)
+        nearer = _descended_between(at, optimum.weights, reached, blocks, is_near=True)
         count, missed = count + nearer.certificate.rounds, _missed(nearer)
         # What left its gamut may not, whatever that costs.
-        if reduction.gamut_knobs == at.reduction.gamut_knobs and missed > value * (1 - WORTH):
+        if not kept_within and missed > value * (1 - WORTH):
             break
         solution, value = nearer, missed
     return solution.told(rounds=count)
@@ -221,17 +243,18 @@ def _missed(solution: Solution) -> float:
 
 
 def _descended_between(
-    problem: Problem, start: Doubles, reached: Bools, *, is_near: bool = False
+    problem: Problem,
+    start: Doubles,
+    reached: Bools,
+    blocks: BinnedPixels | None,
+    *,
+    is_near: bool = False,
 ) -> Solution:
-    """The least of the loss over what the reduction is. is_near: whether the start is near it."""
-
+    """Descend to the least of the loss over what the reduction is. Others as of `_descended`."""
     basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
     assert isinstance(loss, PaintingLoss)
-    side = block_side(problem.views.bases, loss.transform)
-    if side > 1:
-        blocks = binned_pixels(problem.views, loss, side)
-        basis, loss = blocks.basis, blocks.loss
-        equations = NormalEquations.of(basis, loss.painted, loss.importance[..., None])
+    if blocks is not None:
+        basis, loss, equations = blocks.basis, blocks.loss, blocks.equations
         pull = blocks.prior if pull is None else pull + blocks.prior
 
     def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
@@ -248,18 +271,18 @@ def _descended_between(
         begin, from_clipping = (begin, not is_near) if near is None else (near, False)
         return descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
 
+    found = led_from(start)
+    present, lit = nearest_to_present(problem), LitPixels.of(basis, loss)
+
     def missed(weights: Doubles) -> float:
-        lit = LitPixels.of(basis, loss)
         return value_of(lit.pixels, Asked(pull), weights, lit.predicted(weights))
 
-    found = led_from(start)
-    present = nearest_to_present(problem)
     if missed(found.weights) > missed(present):
         # Another valley: from the present every step leads downhill.
         found = led_from(present)
     optimum = best_of(found.equations, found.reweighting.at)
-    if side > 1:
-        solved = _of_blocks(problem, found, blocks.prior, side)
+    if blocks is not None:
+        solved = _of_blocks(problem, found, blocks)
     else:
         solved = replace(problem, squares=found.squares, equations=found.equations)
     equations = solved.pulled(solved.solved)
@@ -276,8 +299,8 @@ def nearest_to_present(problem: Problem) -> Doubles:
     return solve_reduced(pull, problem.reduction, present).weights
 
 
-def _of_blocks(problem: Problem, found: Descent, prior: NormalEquations, side: int) -> Problem:
-    """The problem of all pixels with squares that stand for its loss where blocks of them led.
+def _of_blocks(problem: Problem, found: Descent, blocks: BinnedPixels) -> Problem:
+    """Return the problem of all pixels, with squares that stand for its loss where blocks led.
 
     What is solved are the equations of the blocks, and their prior: without most of the noise.
     """
@@ -291,9 +314,9 @@ def _of_blocks(problem: Problem, found: Descent, prior: NormalEquations, side: i
         problem,
         squares=squares,
         equations=NormalEquations.of(problem.basis, squares.image, squares.weight),
-        corrected=found.equations + prior,
-        noise_removed=1 - 1 / side**2,
-        block_side=side,
+        corrected=found.equations + blocks.prior,
+        noise_removed=1 - 1 / blocks.side**2,
+        block_side=blocks.side,
     )
 
 

@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.images.blocks import block_sums
 from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
 from lightpaint.lighting.analysis.hands import Hand, Hands
 from lightpaint.lighting.analysis.looking import Looking
-from lightpaint.lighting.binning import block_sums
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.painting import painted_and_rest, weight_between
