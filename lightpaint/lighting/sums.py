@@ -43,7 +43,7 @@ def why_not_by_sums(target: Target, fit: Fit) -> str:
     if meant.colors == "gentle":
         return "lights are held to their colours"
     if target.over_look and not fit.literal:
-        return "what paint over emitters means is seen by what is around them"
+        return "what paint over emitters means depends on what is around them"
     if target.at_least is not None and target.at_least[target.importance > 0].any():
         return "brighter than some of the painting is as good"
     return ""

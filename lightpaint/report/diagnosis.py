@@ -198,8 +198,8 @@ def _bounds(diagnosis: Diagnosis) -> str:
     more = diagnosis.bounds_left_out
     others = f"<p>{more} more seem to matter less, and were not looked into.</p>" if more else ""
     meaning = (
-        "<p>What would be gained if one of these alone were let go, and all others stayed, of all "
-        "that counts, also of what is held unpainted. "
+        "<p>What would be gained if one of these alone were let go, and all others stayed. It is a "
+        "share of everything that counts, including the unpainted parts that are held. "
         "A light that is kept, locked, limited, coloured or tied would then have any emission; one "
         "that is off for no other reason would go below zero and so take light away: a hint at "
         "which other lights spill where they should not.</p><p>At first: how the objective would "

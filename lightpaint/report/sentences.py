@@ -193,7 +193,7 @@ def what_is_missed(
 
 
 def while_held(seen: Seen | None) -> str:
-    """` while the rest is held`, of what is out of reach, where that keeps the lights from it."""
+    """Return ` while the rest is held` where that keeps the lights from the paint, else ""."""
     is_held = seen is not None and any(reason.kind == "hold" for reason in seen.reasons)
     return " while the rest is held" if is_held else ""
 
@@ -231,19 +231,19 @@ WITHOUT = {
 #: The same of all lights together.
 WITHOUT_ALL = {
     "colors": 'Lamps are not free in their colour; colors="free"',
-    "sparse": "Only so many lights may be on; more of them",
-    "prefer_current": "Lights are drawn to how they are now; not to do that",
+    "sparse": "Only so many lights may be on; allowing more",
+    "prefer_current": "Lights are pulled towards how they are now; leaving them free",
 }
 
 
 def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
-    """What keeps the lights from the paint, and what would come of letting it go; "" of views.
+    """Say what keeps the lights from the paint, and what letting it go would bring; "" of views.
 
     weaker: what stands before the strength of a weaker hold.
     """
     gained = f"would take away {spoken_percent(reason.share)} of the miss"
     if reason.is_joint:
-        gained += ", if what else is asked is let go, too"
+        gained += ", if the other conditions were lifted too"
     if reason.kind in WITHOUT:
         is_one = len(reason.names) == 1
         lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
@@ -261,12 +261,12 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
 
 
 def spoken_changed(rest: Elsewhere) -> str:
-    """`the annex by ΔE 12`: what changes most of what is not painted, and how much."""
+    """Say what changes most of what is not painted, and how much: `the annex by ΔE 12`."""
     return f"{spoken_part(rest)} by ΔE {spoken_amount(rest.worst)}"
 
 
 def spoken_elsewhere(rest: Elsewhere | None) -> str:
-    """`What is not painted changes too, most of all the annex, by ΔE 12.`; "" where all is."""
+    """Say `What is not painted changes too, most of all the annex, by ΔE 12.`; "" for None."""
     return f"What is not painted changes too, most of all {_spoken_most(rest)}." if rest else ""
 
 
@@ -276,14 +276,14 @@ def _spoken_most(rest: Elsewhere) -> str:
 
 
 def spoken_part(rest: Elsewhere) -> str:
-    """`the annex`, or what is in that part of the picture."""
+    """Name what changes most: `the annex`, or what is in that part of the picture."""
     if not rest.object:
         return f"what is {spoken_ninth(rest.region)}"
     return f"the {some_names([rest.object.replace('_', ' ').strip()])}"
 
 
 def spoken_amount(delta_e: float) -> str:
-    """`0.4`, `12`: a ΔE as it is said."""
+    """Return a ΔE as it is said: `0.4`, `12`."""
     return f"{delta_e:.0f}" if delta_e >= 9.5 else f"{delta_e:.1f}"
 
 
@@ -354,7 +354,7 @@ def spoken_region(place: Place) -> str:
 
 
 def spoken_ninth(region: tuple[int, int]) -> str:
-    """The same of row and column, 0 to 2."""
+    """Return the same for a row and a column, 0 to 2 each."""
     rows, columns = ("top", "middle", "bottom"), ("left", "middle", "right")
     row, column = rows[region[0]], columns[region[1]]
     if row == column == "middle":

@@ -72,12 +72,12 @@ def verification_table(verification: Verification | None) -> str:
 
 
 def _power(v: Verification) -> list[tuple[str, str]]:
-    """How likely an error in each light was to be seen, the least likely first."""
+    """Return a row: how likely an error in each light was to be seen, the least likely first."""
     if not v.power:
         return []
     in_order = sorted(v.power.items(), key=lambda its: its[1])
     told = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
-    return [(f"An error of {100 * ERROR:.0f} % would be seen", some_of(told, room=400))]
+    return [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(told, room=400))]
 
 
 def render_table(

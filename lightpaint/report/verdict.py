@@ -18,8 +18,8 @@ from lightpaint.report.sentences import (
 )
 from lightpaint.screen import some_names
 
-#: Lights that a sentence names.
-NAMED = 2
+#: Lights that are seen too little, of which a sentence gives the names.
+MAX_UNSEEN_NAMES = 2
 
 #: What is asked beside the painting, as what holds the lights back: of one light, and of several.
 HOLDING: dict[str, tuple[str, str]] = {
@@ -31,15 +31,15 @@ HOLDING: dict[str, tuple[str, str]] = {
     "colour": ("{} is held to a colour", "{} are held to their colours"),
     "tie": ("{} is on a dimmer with others", "{} are on one dimmer"),
     "sparse": ("only so many lights may be on",) * 2,
-    "prefer_current": ("lights are drawn to how they are now",) * 2,
+    "prefer_current": ("lights are pulled towards how they are now",) * 2,
     "views": ("view {} asks for other light", "views {} ask for other light"),
 }
 
 #: Names in one clause; of more it says how many.
-MOST_NAMED = 3
+MAX_NAMES = 3
 
 #: Where no third of what is missed has one cause.
-NO_ONE_CAUSE = "for several reasons, of which none is a third of it"
+NO_ONE_CAUSE = "for several reasons, none of which accounts for a third of it"
 
 
 @keywords()
@@ -79,7 +79,7 @@ def verdict(
 
 
 def headline(seen: Seen) -> str:
-    """Whether the lights make what was painted, what is missing and why, and what else changes.
+    """Say whether the lights make what was painted, what is missing and why, and what else changes.
 
     A cause is named only if a third of what the fit misses is due to it.
     """
@@ -91,8 +91,8 @@ def headline(seen: Seen) -> str:
 def spoken_present(seen: Seen) -> str:
     """Say that the present lighting comes closer than the answer, and offer it."""
     return (
-        f"The lighting that there is comes closer to the paint (mean ΔE {seen.asked:.1f}) than "
-        f"this one ({seen.delta_e:.1f}): keep the scene as it is."
+        f"The present lighting comes closer to the paint (mean ΔE {seen.asked:.1f}) than "
+        f"this answer ({seen.delta_e:.1f}): keep the scene as it is."
     )
 
 
@@ -117,7 +117,7 @@ def _manner(seen: Seen) -> str:
         return "Part of the way, but"
     # It would not be true of the lights where something else holds them.
     if seen.causes or _are_kept(seen):
-        return "What else is asked keeps the lights from this"
+        return "Other conditions keep the lights from this"
     return "These lights cannot make this" if seen.is_beyond else "The lights do not make this"
 
 
@@ -130,7 +130,7 @@ def spoken_missing(seen: Seen) -> str:
 
 
 def spoken_reason(seen: Seen) -> str:
-    """What keeps the lights from the place where most is missed: the main cause first."""
+    """Say what keeps the lights from the place where most is missed: the main cause first."""
     assert seen.place is not None
     if seen.causes:
         *most, last = (spoken_holding(reason) for reason in seen.causes)
@@ -152,11 +152,11 @@ def spoken_reason(seen: Seen) -> str:
 
 
 def spoken_holding(reason: Reason) -> str:
-    """`annex_window is switched off`: one thing that keeps the lights from the paint."""
+    """Say one thing that keeps the lights from the paint: `annex_window is switched off`."""
     one, several = HOLDING[reason.kind]
-    if len(reason.names) > MOST_NAMED and reason.kind == "views":
+    if len(reason.names) > MAX_NAMES and reason.kind == "views":
         return "other views ask for other light"
-    if len(reason.names) > MOST_NAMED:
+    if len(reason.names) > MAX_NAMES:
         which = f"{len(reason.names)} lights"
     else:
         *most, last = [some_names([name]) for name in reason.names] or [""]
@@ -165,7 +165,7 @@ def spoken_holding(reason: Reason) -> str:
 
 
 def spoken_noise(seen: Seen) -> str:
-    """Which noise a third of what is missed is; "" where it is less."""
+    """Say which noise a third of what is missed is; "" where it is less."""
     share = spoken_percent(seen.parts.get(seen.noise_that_counts, 0.0))
     if seen.noise_that_counts == "noise":
         return f"{share} of what is missed is noise of the samples"
@@ -200,13 +200,15 @@ def spoken_delta_e(seen: Seen, *, known: bool) -> str:
 
 
 def spoken_blindness(verification: Verification) -> str:
-    """`It would probably have missed an error of 5 % in bulb`: the lights that are seen least."""
+    """Name the lights seen least: `It would probably have missed an error of 5 % in bulb`."""
     unseen, power = verification.unseen, verification.power or {}
-    others, more = [name for name in power if name not in unseen], len(unseen) - NAMED
-    if more > 0 and len(others) <= NAMED:
+    others, more = [name for name in power if name not in unseen], len(unseen) - MAX_UNSEEN_NAMES
+    if more > 0 and len(others) <= MAX_UNSEEN_NAMES:
         names = "any light" + (f" but {some_names(others, joint=' and ')}" if others else "")
     else:
-        least = [some_names([name]) for name in unseen[:NAMED]] + [f"{more} more"] * (more > 0)
+        least = [some_names([name]) for name in unseen[:MAX_UNSEEN_NAMES]] + [f"{more} more"] * (
+            more > 0
+        )
         *most, last = least
         names = f"{', '.join(most)} and {last}" if most else last
     return f"It would probably have missed an error of {100 * ERROR:.0f} % in {names}"

@@ -64,7 +64,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(2.8, 3.0, reasons=(Reason("hold"),)),
-            "What else is asked keeps the lights from this: in the middle it is painted brighter "
+            "Other conditions keep the lights from this: in the middle it is painted brighter "
             "than they make it; what is not painted is held near how it is.",
         ),
         (
@@ -99,7 +99,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(14.0, there=("lamp",), kept_there=("lamp",)),
-            "What else is asked keeps the lights from this: in the middle it is painted brighter "
+            "Other conditions keep the lights from this: in the middle it is painted brighter "
             "than they make it; lamp is held back by what you ask of it.",
         ),
         (
@@ -142,7 +142,7 @@ def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float)
     named = [x for x in PARTS if SAID[x] in said]
     assert all(parts.get(x, 0) >= NAMED for x in named if x == part)
     assert (part in named) == (share >= NAMED)
-    assert ("of which none is a third" in said) == (share < NAMED)
+    assert ("none of which accounts for a third" in said) == (share < NAMED)
 
 
 @pytest.mark.parametrize(("share", "is_named"), [(0.3, False), (0.36, True)])
@@ -240,8 +240,8 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
 def test_an_answer_that_is_worse_than_the_present_says_so_first():
     worse = _seen(3.6, 3.4, there=("lamp",))
     assert headline(worse).startswith(
-        "The lighting that there is comes closer to the paint (mean ΔE 3.4) than this one (3.6): "
+        "The present lighting comes closer to the paint (mean ΔE 3.4) than this answer (3.6): "
         "keep the scene as it is. "
     )
     # What nobody reads is no difference.
-    assert not headline(_seen(3.42, 3.4, there=("lamp",))).startswith("The lighting that there is")
+    assert not headline(_seen(3.42, 3.4, there=("lamp",))).startswith("The present lighting")
