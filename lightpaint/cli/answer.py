@@ -13,7 +13,7 @@ from lightpaint.cli.options import BY_OPTION
 from lightpaint.cli.tables import spoken_agreement
 from lightpaint.cli.words import spoken
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
-from lightpaint.lighting.analysis.hands import KEYS
+from lightpaint.lighting.analysis.constraint_kinds import KEYS
 from lightpaint.lighting.analysis.held_back import Reason
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.report.colors import closer_choice

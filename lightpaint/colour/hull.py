@@ -22,18 +22,18 @@ ROUND_OFF = 1e-9
 
 
 def chromaticity(rgb: Floats) -> Doubles:
-    """CIE 1976 (u', v'), (…, 2), of linear Rec.709 colours (…, 3) that are not black."""
+    """Return CIE 1976 (u', v'), (…, 2), of linear Rec.709 colours (…, 3) that are not black."""
     return np.asarray(uv_of(np.asarray(rgb, np.float64) @ rgb_to_xyz(REC709).T) * [1, 1.5])
 
 
 def reach_of(rgb: Floats) -> Doubles:
-    """(k,), how far colours (n, 3) reach in each direction, the farthest of them."""
+    """Return how far the farthest of colours (n, 3), linear, reaches in each direction, (k,)."""
     return np.asarray((chromaticity(rgb) @ DIRECTIONS.T).max(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
 class ColorHull:
-    """The colours that reach no further than `reach`, (k,), in each direction.
+    """A set of colours: those that reach no further than `reach`, (k,), in each direction.
 
     own: (3,), one of them, linear.
     """
@@ -70,11 +70,11 @@ class ColorHull:
         )
 
     def has(self, rgb: Doubles) -> bool:
-        """Whether it has the colour of a light (3,); that of black is any."""
+        """Return whether the colour of a light (3,), linear, is in it; black is."""
         return bool((self._sides @ rgb >= -ROUND_OFF * rgb.sum()).all())
 
     def nearest(self, rgb: Doubles) -> Doubles:
-        """The colour on the way from its own to that of a light (3,) where it ends, as bright."""
+        """Return a light (3,), linear, mixed with its own colour until it is in it, as bright."""
         if self.has(rgb):
             return rgb
         room, own = self._sides @ rgb, self._sides @ self.own
@@ -85,7 +85,7 @@ class ColorHull:
 
 
 def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:
-    """The part of a convex polygon, (m, 2), that reaches no further (Sutherland and Hodgman)."""
+    """Return the part of a convex polygon, (m, 2), that reaches no further (Sutherland–Hodgman)."""
     room = reach - corners @ direction
     kept = []
     for k, (a, left) in enumerate(zip(corners, room, strict=True)):

@@ -23,7 +23,11 @@ STEP = 8.0
 
 @dataclass(frozen=True)
 class WhiteRange:
-    """The whites between two temperatures, in kelvin; duv: by how much greener all of them are."""
+    """The whites between two temperatures.
+
+    low, high: in kelvin. duv: by how much greener than Planck's locus all of them are, in CIE 1960
+    (u, v).
+    """
 
     low: float
     high: float
@@ -56,7 +60,7 @@ class WhiteRange:
         return np.asarray(self.colors @ rgb_to_xyz(REC709).T @ np.array([1.0, 15.0, 3.0]))
 
     def places(self, rgb: Floats) -> Doubles:
-        """(n,), where the nearest white is in CIE 1960 (u, v), by places between its whites.
+        """Return places of the nearest whites in CIE 1960 (u, v), (n,): k + t between k and k + 1.
 
         rgb: (n, 3), linear, >= 0. What is black is nearest to the middle.
         """
@@ -74,17 +78,17 @@ class WhiteRange:
         return np.where(lit, k + other / (one + other), self.last / 2)
 
     def at(self, places: Doubles) -> Doubles:
-        """(n, 3), the whites at places between those of the range, of luminance 1."""
+        """Return the whites at such places, (n,), as linear colours (n, 3) of luminance 1."""
         k = np.minimum(places.astype(np.intp), self.last - 1)
         part = (places - k)[:, None]
         return np.asarray((1 - part) * self.colors[k] + part * self.colors[k + 1])
 
     def nearest(self, rgb: Floats) -> Doubles:
-        """(n, 3), the whites nearest to colours (n, 3), as bright as these are."""
+        """Return the whites nearest to colours (n, 3), linear, as bright as these are."""
         return np.asarray(np.asarray(luminance(rgb))[:, None] * self.at(self.places(rgb)))
 
     def greener(self, rgb: Floats) -> Doubles:
-        """(n,), by how much colours (n, 3) are greener than the nearest white, in CIE 1960 (u, v).
+        """Return by how much colours (n, 3) are greener than the nearest white, (n,), in Duv.
 
         Below 0 they are pinker. What is black is neither.
         """
@@ -100,15 +104,15 @@ class WhiteRange:
         return np.where(lit, (apart * across).sum(axis=1), 0.0)
 
     def window(self, place: float, width: int) -> tuple[int, int]:
-        """The ends of so many pieces about a place, within the range."""
+        """Return the first and last white of `width` pieces about a place, within the range."""
         width = min(width, self.last)
         first = min(max(round(place - width / 2), 0), self.last - width)
         return first, first + width
 
     def tangent(self, window: tuple[int, int], reach: float) -> Doubles:
-        """(2, 3), the ends of a piece drawn out by `reach` mireds, no further than the range goes.
+        """Draw the straight line of a window out by `reach` mireds, within the range.
 
-        Its ends are of luminance 1 and never negative.
+        Return its ends, (2, 3) linear, of luminance 1 and never negative.
         """
         first, last = window
         a, b = self.colors[first], self.colors[last]
@@ -120,14 +124,14 @@ class WhiteRange:
 
 @lru_cache(64)
 def white_range(low: float, high: float, duv: float = 0.0) -> WhiteRange:
-    """The range, whose whites are found once. Raises ColorError as `kelvin_to_rgb` does."""
+    """Return the range, whose whites are found once. Raises ColorError as `kelvin_to_rgb` does."""
     made = WhiteRange(low, high, duv)
     made.colors.setflags(write=False)
     return made
 
 
 def _drawn(color: Doubles, way: Doubles) -> Doubles:
-    """A colour moved by `way`, or as far as it stays one."""
+    """Return a colour (3,) moved by `way`, (3,), or as much of it as leaves no channel below 0."""
     with np.errstate(divide="ignore"):
         room = np.where(way < 0, color / np.where(way < 0, -way, 1), np.inf)
     return np.asarray(np.maximum(color + min(1.0, float(room.min())) * way, 0))

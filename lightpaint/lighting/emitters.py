@@ -1,4 +1,4 @@
-"""What paint over an emitter in view says: what that lights, or that it glows, seldom less light.
+"""What paint over an emitter in view means: what that lights, or its glow, but seldom less light.
 
 A flame outshines every display. Somebody who paints a table and the lantern on it warm means no
 less light of the lantern, though each pixel of the flame is darker painted than it is. Only paint
@@ -13,12 +13,12 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import box_mean
 
-#: How far around an emitter's pixel is looked at the paint, beside the height of the picture, and
-#: in pixels at least.
-AROUND, LEAST = 1 / 30, 2
+#: How far around an emitter's pixel paint is looked at: a part of the picture's height, and pixels
+#: at least.
+RADIUS, MIN_RADIUS = 1 / 30, 2
 
 #: Stops from which on paint is darker than what it covers.
-DARKER = 0.5
+DARKER_STOPS = 0.5
 
 #: Light beside the picture's mean, below which a ratio says nothing.
 DARK = 0.01
@@ -32,9 +32,9 @@ def dark_of(look: Floats, seen: Bools) -> float:
     return DARK * float(luminance(look[~seen].mean(axis=0))) if not seen.all() else 0.0
 
 
-def around(size: tuple[int, int]) -> int:
-    """Return how many pixels around an emitter's are looked at."""
-    return max(LEAST, round(AROUND * size[0]))
+def paint_radius(size: tuple[int, int]) -> int:
+    """Return how far around an emitter's pixel paint is looked at, in pixels. size: (h, w)."""
+    return max(MIN_RADIUS, round(RADIUS * size[0]))
 
 
 def asks_no_less(
@@ -56,7 +56,7 @@ def asks_no_less(
     if not found.any():
         return found
     counts = importance * ~seen
-    radius = around(seen.shape)
+    radius = paint_radius(seen.shape)
     near, painted, now = (
         box_mean(np.asarray(x, np.float64), radius)
         for x in (counts, counts * _bright(image), counts * _bright(look))
@@ -66,12 +66,12 @@ def asks_no_less(
     # Of ratios of means, since single pixels are noise.
     change = _stops(painted + dark * near, now + dark * near)
     own = _stops(_bright(_shown(image, transform)) + dark, _bright(_shown(look, transform)) + dark)
-    return np.asarray(found & (np.where(is_near, change, own) > -DARKER))
+    return np.asarray(found & (np.where(is_near, change, own) > -DARKER_STOPS))
 
 
-def grown(region: Slices, size: tuple[int, int]) -> Slices:
+def grow(region: Slices, size: tuple[int, int]) -> Slices:
     """Return the rectangle in which paint within `region` may change what paint says."""
-    by = around(size)
+    by = paint_radius(size)
     (top, bottom, _), (left, right, _) = (
         part.indices(length) for part, length in zip(region, size, strict=True)
     )

@@ -53,7 +53,11 @@ class PaintedLight:
     def of(
         cls, views: Sequence[tuple[Basis, Floats, Floats]], most: int = LOOKED_AT
     ) -> "PaintedLight":
-        """Of views: of each the basis, painting (h, w, 3) and importance (h, w)."""
+        """Choose painted pixels of views, evenly spread.
+
+        views: of each the basis, the painting (h, w, 3), linear, and its importance (h, w). most:
+        pixels, about.
+        """
         its = [_painted_pixels(importance, most) for _, _, importance in views]
         step = max(1, sum(x.size for x in its) // most)
         rows, image, weight = [], [], []
@@ -66,7 +70,7 @@ class PaintedLight:
 
 
 def _painted_pixels(importance: Floats, most: int) -> Indices:
-    """Where pixels are painted: of some evenly spread ones, where these are enough."""
+    """Return places of painted pixels, (p,): of evenly spread ones, where these are enough."""
     every = importance.ravel()
     thin = max(1, every.size // SEARCHED) | 1
     found = np.flatnonzero(every[::thin]) * thin
@@ -74,7 +78,10 @@ def _painted_pixels(importance: Floats, most: int) -> Indices:
 
 
 def gamuts_of(light: PaintedLight, power: Doubles, present: Doubles) -> Gamuts:
-    """Of each lamp the colours that it may take. power, present: (n, 3), ‖Φᵢ‖², and weights now."""
+    """Return the colours that each lamp may take.
+
+    power, present: (n, 3), ‖Φᵢ‖² of the lamps' pictures, and their weights now.
+    """
     own = np.where(luminance(present)[:, None] > 0, present, 1.0)
     white = reach_of(white_range(*WHITES).colors)
     reach = np.maximum(chromaticity(own) @ DIRECTIONS.T, white)
@@ -83,7 +90,10 @@ def gamuts_of(light: PaintedLight, power: Doubles, present: Doubles) -> Gamuts:
 
 
 def _painted(light: PaintedLight, power: Doubles, present: Doubles) -> Doubles:
-    """(n, k), how far the light reaches in each direction that is painted where a lamp counts."""
+    """Return how far the light that is painted where a lamp counts reaches in each direction.
+
+    (n, k), in CIE 1976 (u', v'); -inf for a lamp that counts nowhere.
+    """
     size = np.sqrt(power.sum(axis=1))
     now = np.asarray(luminance(present))
     faint = FAINT * (now * size).mean() / np.where(size > 0, size, np.inf)
@@ -103,5 +113,7 @@ def _painted(light: PaintedLight, power: Doubles, present: Doubles) -> Doubles:
     for k, its in enumerate(order.T):
         sums = np.cumsum(share[:, its], axis=1)
         last = (sums < (1 - OUTLYING) * sums[:, -1:]).sum(axis=1)
-        reach[:, k] = np.where(sums[:, -1] > 0, along[its, k][np.minimum(last, its.size - 1)], -9)
+        reach[:, k] = np.where(
+            sums[:, -1] > 0, along[its, k][np.minimum(last, its.size - 1)], -np.inf
+        )
     return reach

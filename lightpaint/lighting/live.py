@@ -23,10 +23,10 @@ from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.binning import block_side
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.on_locus import (
-    around,
+    center_windows,
+    clip_to_gamuts,
     next_whites,
-    snapped,
-    within_gamuts,
+    snap_to_whites,
 )
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
@@ -105,7 +105,7 @@ class Live:
             return _best(asked, reduction, begin, self._fit.method)
 
         def allowed(weights: Doubles) -> Doubles:
-            return within_gamuts(reduction, snapped(reduction, weights))
+            return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
         if self.mode == "linear":
             equations = reduce(add, (x.tiles().equations(rest_weight) for x in views))
@@ -196,8 +196,8 @@ def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) 
 
     Lights that keep to a range of white get its nearest one, as bright as they are.
     """
-    weights = snapped(reduction, weights)
-    reduction = around(reduction, weights)
+    weights = snap_to_whites(reduction, weights)
+    reduction = center_windows(reduction, weights)
     return solve_reduced(to_present(_power(views), weights), reduction, weights).weights
 
 
@@ -207,8 +207,10 @@ def _best(
     """The best weights (n, 3) of what constraints leave, near those to begin with."""
     if not reduction.white_knobs:
         return next_whites(equations, reduction, start, method=method)[1].weights
-    start = snapped(reduction, start)
-    near = solve_reduced(equations, around(reduction, start, WHITE_WIDTH), start, method=method)
-    reduction = around(reduction, near.weights)
+    start = snap_to_whites(reduction, start)
+    near = solve_reduced(
+        equations, center_windows(reduction, start, WHITE_WIDTH), start, method=method
+    )
+    reduction = center_windows(reduction, near.weights)
     how: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
     return next_whites(equations, reduction, near.weights, **how)[1].weights

@@ -5,7 +5,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.lighting.emitters import asks_no_less, dark_of, grown
+from lightpaint.lighting.emitters import asks_no_less, dark_of, grow
 from lightpaint.lighting.live_sums import FILM, PaintedTiles, SmallFilm
 
 #: Pixels along the parts of rows that importance is summed over.
@@ -87,13 +87,13 @@ class LiveView:
 
         Emitters in view of which no less light is meant count nothing here.
         """
-        wide = grown(region, self._counted.shape)
+        wide = grow(region, self._counted.shape)
         seen = self.basis.emitters_seen[wide]
         if not seen.any():
             self._counted[region] = self._importance[region]
             return region, False
         # What is around the emitters in this rectangle lies in a wider one.
-        its = grown(wide, self._counted.shape)
+        its = grow(wide, self._counted.shape)
         importance = self._importance[its]
         glows = asks_no_less(
             self._image[its],

@@ -1,4 +1,4 @@
-"""What becomes of the rest: how far what nobody painted comes to look from how it did."""
+"""How much what nobody painted changes its look."""
 
 from dataclasses import dataclass
 
@@ -37,9 +37,9 @@ class Elsewhere:
 def what_changes(
     look: Looking, basis: Basis, painted: Bools, before: Floats, after: Floats
 ) -> Elsewhere | None:
-    """How far the unpainted part of one picture looks from that of another; None if there is none.
+    """Return how far the unpainted part looks from how it did; None if all is painted.
 
-    look: at the painting. painted: (h, w). before, after: (h, w, 3) linear.
+    look: at the painting. painted: (h, w). before, after: (h, w, 3) linear, the two pictures.
     """
     every = (slice(None, None, look.step), slice(None, None, look.step))
     rest = ~painted[every]
@@ -54,7 +54,7 @@ def what_changes(
 def _worst(
     basis: Basis, every: tuple[slice, slice], rest: Bools, changed: Doubles
 ) -> tuple[float, str, tuple[int, int]]:
-    """The largest mean of `changed` over one place, and which that is."""
+    """Return the largest mean of `changed` over one place: its ΔE, object and region."""
     rows, columns = (REGIONS * np.arange(n) // n for n in rest.shape)
     ninth = (REGIONS * rows[:, None] + columns[None, :])[rest]
     enough = LARGE_ENOUGH * rest.size
@@ -75,7 +75,11 @@ def _worst(
 def _largest_mean(
     index: Indices, values: Doubles, count: int, enough: float, among: Bools | None = None
 ) -> tuple[int, float]:
-    """Which of `count` places has the largest mean, of those with so many pixels; and that mean."""
+    """Return which of `count` places has the largest mean, and that mean.
+
+    index, values: (p,), the place of each pixel, and its value. enough: pixels that a place must
+    have. among: (count,), places that may be named; None for all.
+    """
     sizes = np.bincount(index, minlength=count)
     means = np.bincount(index, weights=values, minlength=count) / np.maximum(sizes, 1)
     means = np.where((sizes >= enough) & (True if among is None else among), means, 0)

@@ -5,7 +5,7 @@ minimises there; for each the problem is solved again, of enough of the pixels.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -15,8 +15,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.images.blocks import block_sums
+from lightpaint.lighting.analysis.constraint_kinds import ConstraintKind, ConstraintsByLight
 from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
-from lightpaint.lighting.analysis.hands import Hand, Hands
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
@@ -84,7 +84,7 @@ class Reason:
         loosening: Of a hold, what to do about it.
     """
 
-    kind: Literal["hold", "colors", "views"] | Hand
+    kind: Literal["hold", "colors", "views"] | ConstraintKind
     names: tuple[str, ...] = ()
     share: float = 1.0
     is_joint: bool = False
@@ -133,7 +133,7 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
 
 
 def _ordered(reasons: Sequence[Reason]) -> list[Reason]:
-    """What brings most first; of what ties with that, what a person asked of lights."""
+    """Sort by what brings most; of what ties with that, what a person asked of lights is first."""
     tied = TIED * max((reason.share for reason in reasons), default=0.0)
 
     def rank(reason: Reason) -> tuple[bool, float]:
@@ -144,9 +144,9 @@ def _ordered(reasons: Sequence[Reason]) -> list[Reason]:
 
 
 def _by_hand(few: "_Few") -> list[Reason]:
-    """What was asked of lights, each kind of it with the fewest lights that bring nearly all."""
-    hands, found = few.hands, []
-    for kind, lights in hands.kinds().items():
+    """Return what was asked of lights, by kind, with the fewest lights that bring nearly all."""
+    by_light, found = few.by_light, []
+    for kind, lights in by_light.kinds().items():
         whole = few.share_without(kind, lights)
         if whole < KNOWN:
             continue
@@ -164,19 +164,19 @@ def _by_hand(few: "_Few") -> list[Reason]:
             if part >= NEARLY * whole:
                 chosen, gained = tuple(some), part
                 break
-        found.append(Reason(kind, tuple(hands.lights[k].name for k in chosen), gained))
+        found.append(Reason(kind, tuple(by_light.lights[k].name for k in chosen), gained))
     return found
 
 
 def _joint(few: "_Few", everything: float) -> tuple[Reason, ...]:
-    """All that is asked, where it takes several to bring something."""
+    """Return all that is asked, where it takes several to bring something."""
     order = sorted(few.asked, key=lambda kind: few.share([x for x in few.asked if x != kind]))
     found: list[Reason] = []
     for kind in order:
         if kind == "constraints":
             found += [
                 Reason(hand, few.named(hand, lights), everything, is_joint=True)
-                for hand, lights in few.hands.kinds().items()
+                for hand, lights in few.by_light.kinds().items()
             ]
         else:
             names = few.others_that_matter(kind)
@@ -185,9 +185,9 @@ def _joint(few: "_Few", everything: float) -> tuple[Reason, ...]:
 
 
 def _loosened(solution: Solution, few: "_Few", most: float) -> Loosening | None:
-    """The strongest hold that brings `GRADUALLY` of `most`, which none would bring.
+    """Find the strongest hold that brings `GRADUALLY` of `most`, what no hold would bring.
 
-    None where what is not painted counts by the pixel.
+    Return None where what is not painted counts by the pixel.
     """
     fit = few.problem.fit
     if fit.unpainted or not fit.hold:
@@ -221,7 +221,7 @@ def _loosened(solution: Solution, few: "_Few", most: float) -> Loosening | None:
 
 
 def round_down(value: float) -> float:
-    """The nearest number of two digits that is not larger; `value` > 0."""
+    """Return the nearest number of two digits that is not larger; `value` > 0."""
     unit = 10.0 ** (np.floor(np.log10(value)) - 1)
     return float(f"{np.floor(value / unit * (1 + 1e-12)) * unit:.2g}")
 
@@ -241,6 +241,7 @@ class _Few:
     names: tuple[str, ...]
     look: Looking
     weights: Doubles
+    _shares: dict[tuple[frozenset[Held], tuple[int, ...]], float] = field(default_factory=dict)
 
     @staticmethod
     def of(solution: Solution) -> "_Few":
@@ -279,7 +280,7 @@ class _Few:
 
     @property
     def asked(self) -> tuple[Held, ...]:
-        """What is asked at all."""
+        """What is asked beside the painting."""
         fit = self.problem.fit
         on: dict[Held, bool] = {
             "hold": bool(fit.hold or fit.unpainted),
@@ -290,9 +291,9 @@ class _Few:
         return tuple(name for name, is_on in on.items() if is_on)
 
     @cached_property
-    def hands(self) -> Hands:
-        """What is asked of the lights."""
-        return Hands.of(self.problem.constraints, self.problem.basis.lights)
+    def by_light(self) -> ConstraintsByLight:
+        """What is asked of each light."""
+        return ConstraintsByLight.of(self.problem.constraints, self.problem.basis.lights)
 
     @cached_property
     def pull(self) -> Doubles:
@@ -311,31 +312,38 @@ class _Few:
         return self.cost(self.weights)
 
     def cost(self, weights: Doubles) -> float:
-        """What weights (n, 3) miss of the paint of the view, as the fit counts it."""
+        """Return what weights (n, 3) miss of the paint of the view, as the fit counts it."""
         look = self.look
         return look.mean(look.costs(look.of(self.bases[self.mine].mix(weights))))
 
     def share_of(self, weights: Doubles) -> float:
-        """The share of what is missed that these weights (n, 3) would not miss."""
+        """Return the share of what is missed that these weights (n, 3) would not miss."""
         return 1 - self.cost(weights) / self.now
 
     def share(self, without: Collection[Held], views: Sequence[int] | None = None) -> float:
-        """The same of the best weights without some of what is asked. views: that are let go."""
-        return self.share_of(self.solved(without, self.others if views is None else views))
+        """Return that share for the best weights without some of what is asked.
 
-    def share_without(self, kind: Hand, lights: Collection[int]) -> float:
-        """The same without one thing that is asked of some lights."""
-        asked = self.hands.without(kind, lights)
+        views: those let go where views are; all others by default. Each is solved for once.
+        """
+        views = self.others if views is None else views
+        key = frozenset(without), tuple(views)
+        if key not in self._shares:
+            self._shares[key] = self.share_of(self.solved(without, views))
+        return self._shares[key]
+
+    def share_without(self, kind: ConstraintKind, lights: Collection[int]) -> float:
+        """Return that share without one kind of constraint on some lights, by their places."""
+        asked = self.by_light.without(kind, lights)
         return self.share_of(self.solved((), self.others, constraints=asked))
 
-    def named(self, kind: Hand, lights: Collection[int]) -> tuple[str, ...]:
-        """The names of lights of which that is asked; none of what is asked of all."""
+    def named(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
+        """Return names of lights under one kind of constraint; none of what is asked of all."""
         if kind in ("sparse", "prefer_current"):
             return ()
-        return tuple(self.hands.lights[k].name for k in lights)
+        return tuple(self.by_light.lights[k].name for k in lights)
 
     def others_that_matter(self, kind: Held) -> tuple[str, ...]:
-        """The names of the views that hold, where others do."""
+        """Return names of the views that hold, where that is what holds."""
         if kind != "views":
             return ()
         its = self.others
@@ -352,9 +360,9 @@ class _Few:
         constraints: Constraints | None = None,
         hold: float | None = None,
     ) -> Doubles:
-        """The best weights, (n, 3), without some of what is asked.
+        """Solve for the best weights, (n, 3), without some of what is asked.
 
-        views: those that are let go. constraints, hold: instead of those there are.
+        views: those that are let go where views are. constraints, hold: instead of those there are.
         """
         gone = set(views) if "views" in without else set()
         left = [k for k in range(len(self.bases)) if k not in gone]
@@ -375,7 +383,7 @@ class _Few:
         return solution_of(begin).weights
 
     def _weight_of_rest(self, fit: Fit, left: Sequence[int]) -> float:
-        """What each of the few pixels that are not painted counts, of some views.
+        """Return the weight of each of the few unpainted pixels of some views.
 
         Together they count beside the painted ones what all there are do.
         """
@@ -391,7 +399,7 @@ class _Few:
 
 
 def _in_blocks(views: Views, side: int) -> Views:
-    """Views whose pixels are means of blocks, where single ones are mostly noise.
+    """Average the pixels of views in blocks, where single ones are mostly noise.
 
     What makes no whole block at the right and at the bottom is left out.
     """
@@ -424,7 +432,7 @@ def _in_blocks(views: Views, side: int) -> Views:
 
 
 def _in_a_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:
-    """Some of the pixels of a view. chosen: (p,), which."""
+    """Return some of the pixels of a view as one row. chosen: (p,), places of the pixels."""
 
     def cut(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return image.reshape(1, -1, *image.shape[2:])[:, chosen]

@@ -16,6 +16,7 @@ from lightpaint.colour.difference import ciede2000
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.objects import Objects
 from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.constraint_kinds import ConstraintKind, ConstraintsByLight
 from lightpaint.lighting.analysis.diagnosis import (
     REGIONS,
     Diagnosis,
@@ -24,7 +25,6 @@ from lightpaint.lighting.analysis.diagnosis import (
     parts_of_miss,
 )
 from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
-from lightpaint.lighting.analysis.hands import Hand, Hands
 from lightpaint.lighting.analysis.held_back import NAMED, Held, Reason, reasons_of
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.analysis.on_object import object_with_most
@@ -51,7 +51,7 @@ HALF = 0.5
 GETS_THERE, DOES_MUCH = 0.01, 0.1
 
 #: What holds a light at a level.
-HELD_THERE: tuple[Hand, ...] = ("off", "lock")
+HELD_THERE: tuple[ConstraintKind, ...] = ("off", "lock")
 
 #: Every so-many-th pixel of each side is enough to find the brightest.
 THINNED = 2
@@ -241,7 +241,7 @@ def _rest(solution: Solution, look: Looking, predicted: Estimate) -> Elsewhere |
     [target], basis = solution.problem.views.targets, solution.basis
     if not target.over_look or target.everything:
         return None
-    kinds = Hands.of(solution.problem.constraints, basis.lights).kinds()
+    kinds = ConstraintsByLight.of(solution.problem.constraints, basis.lights).kinds()
     before = basis.present_weights.copy()
     for kind in HELD_THERE:
         its = list(kinds.get(kind, ()))

@@ -65,17 +65,17 @@ class Knob:
         )
 
     def within(self, window: tuple[int, int]) -> "Knob":
-        """It as a mix of two other whites of its range."""
+        """Return the knob as a mix of two other whites of its range."""
         assert self.whites is not None
         return self._mixing(self.whites.colors[list(window)], window)
 
     def along_tangent(self, reach: float) -> "Knob":
-        """It on the straight line that its window is part of, by `reach` mireds further."""
+        """Return the knob on the straight line of its window, drawn out by `reach` mireds."""
         assert self.whites is not None
         return self._mixing(self.whites.tangent(self.window, reach), self.window)
 
     def within_gamut(self) -> "Knob":
-        """It as a mix of what its gamut is made of."""
+        """Return the knob as a mix of the primaries of its gamut."""
         assert self.gamut is not None
         [light], primaries = self.lights, self.gamut.primaries
         limit = self.limit

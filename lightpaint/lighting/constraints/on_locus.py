@@ -57,7 +57,9 @@ def solve_on_locus(
     steps: int = STEPS,
     **how: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
-    """`solve_reduced`, and the reduction with the whites that lights came to.
+    """Solve as `solve_reduced` does, and choose the two whites of each light.
+
+    Return the reduction with the whites that lights came to, and its optimum.
 
     start: (n, 3). A reduction whose lights may still mix the ends of their ranges is solved so
     first; one that has come to some whites goes on from those nearest to the start. steps: between
@@ -67,11 +69,11 @@ def solve_on_locus(
         return next_whites(equations, reduction, start, steps=steps, **how)
     groups, at = _groups(reduction), start
     if all(_is_whole(reduction, k) for k in reduction.white_knobs):
-        at = solve_reduced(equations, reduction, _snapped(groups, start), **how).weights
+        at = solve_reduced(equations, reduction, _snap(groups, start), **how).weights
     for width in WIDTHS:
-        reduction = reduction.with_windows(_around(groups, at, width))
-        at = solve_reduced(equations, reduction, _snapped(groups, at), **how).weights
-    return next_whites(equations, around(reduction, at, 1), at, steps=steps, **how)
+        reduction = reduction.with_windows(_windows_about(groups, at, width))
+        at = solve_reduced(equations, reduction, _snap(groups, at), **how).weights
+    return next_whites(equations, center_windows(reduction, at, 1), at, steps=steps, **how)
 
 
 def next_whites(
@@ -83,38 +85,41 @@ def next_whites(
     only: Collection[int] | None = None,
     **how: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
-    """The optimum of two whites for each light, and on from there to their neighbours.
+    """Solve for two whites of each light, and go on from there to their neighbours.
 
     only: the knobs that go on, if not all do. Other arguments and what is returned as of
     `solve_on_locus`.
     """
     groups = _groups(reduction, only)
-    found = solve_reduced(equations, reduction, _snapped(groups, start), **how)
+    found = solve_reduced(equations, reduction, _snap(groups, start), **how)
     for _ in range(steps):
         beyond = _beyond_gamuts(reduction, found.weights)
         windows = {} if beyond else _better(equations, reduction, groups, found)
         if not (windows or beyond):
             break
         reduction = reduction.with_windows(windows).kept_within(beyond)
-        found = solve_reduced(equations, reduction, _snapped(groups, found.weights), **how)
+        found = solve_reduced(equations, reduction, _snap(groups, found.weights), **how)
     return reduction, found
 
 
-def around(reduction: Reduction, weights: Doubles, width: int = 1) -> Reduction:
-    """The reduction with windows of so many pieces about the whites nearest to weights (n, 3)."""
-    return reduction.with_windows(_around(_groups(reduction), weights, width))
+def center_windows(reduction: Reduction, weights: Doubles, width: int = 1) -> Reduction:
+    """Return the reduction with windows of `width` pieces about the whites nearest to weights.
+
+    weights: (n, 3).
+    """
+    return reduction.with_windows(_windows_about(_groups(reduction), weights, width))
 
 
-def snapped(reduction: Reduction, weights: Doubles) -> Doubles:
-    """Weights (n, 3) with the nearest white of its range for each light that keeps to one.
+def snap_to_whites(reduction: Reduction, weights: Doubles) -> Doubles:
+    """Return weights (n, 3) with the nearest white of its range for each light that keeps to one.
 
     Lights stay as bright as they are.
     """
-    return _snapped(_groups(reduction), weights) if reduction.white_knobs else weights
+    return _snap(_groups(reduction), weights) if reduction.white_knobs else weights
 
 
 def _beyond_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
-    """The knobs of lights whose colours, of weights (n, 3), are not of their gamuts.
+    """Return places of knobs whose lights have colours, in weights (n, 3), beyond their gamuts.
 
     Lights first have any colour: where all of these are of their gamuts, the answer is the best
     of these, too, and has fewer unknowns.
@@ -128,8 +133,8 @@ def _beyond_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
     return found
 
 
-def within_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
-    """Weights (n, 3) with the nearest colour of its gamut for each light that keeps to one."""
+def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
+    """Return weights (n, 3) with the nearest colour of its gamut for lights that keep to one."""
     moved = weights.copy()
     for knob in reduction.knobs:
         if knob.gamut is not None:
@@ -138,7 +143,7 @@ def within_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
 
 
 def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_Lights]:
-    """The lights by their ranges. only: of these knobs."""
+    """Group lights by their ranges. only: the knobs, by their places, if not all count."""
     by_range: dict[WhiteRange, list[int]] = {}
     for k in reduction.white_knobs if only is None else only:
         whites = reduction.knobs[k].whites
@@ -165,7 +170,7 @@ def _is_whole(reduction: Reduction, k: int) -> bool:
     return knob.whites.last > 1 and knob.window == (0, knob.whites.last)
 
 
-def _around(groups: Sequence[_Lights], weights: Doubles, width: int) -> Windows:
+def _windows_about(groups: Sequence[_Lights], weights: Doubles, width: int) -> Windows:
     windows = {}
     for its in groups:
         places = its.whites.places(weights[its.lights])
@@ -174,7 +179,7 @@ def _around(groups: Sequence[_Lights], weights: Doubles, width: int) -> Windows:
     return windows
 
 
-def _snapped(groups: Sequence[_Lights], weights: Doubles) -> Doubles:
+def _snap(groups: Sequence[_Lights], weights: Doubles) -> Doubles:
     moved = weights.copy()
     for its in groups:
         moved[its.lights] = its.whites.nearest(weights[its.lights])
@@ -187,7 +192,7 @@ def _better(
     groups: Sequence[_Lights],
     found: ReducedOptimum,
 ) -> Windows:
-    """The windows of lights that would gain by other whites; none where no light would.
+    """Return windows of the lights that would gain by other whites; none where no light would.
 
     First all that go on from where they are, none of which has to give up what it has; only then
     the one light that gains most by leaving it.
@@ -211,7 +216,7 @@ def _better(
 
 
 def _onward(slopes: Doubles, window: tuple[int, int], x: Doubles, little: float) -> tuple[int, int]:
-    """The window that a light of mix x, (2,), goes on to. slopes: (k,), of all whites."""
+    """Return the window that a light of mix x, (2,), goes on to. slopes: (k,), of all whites."""
     first, last = window
     if not x.any():
         best = int(np.argmin(slopes))
@@ -232,7 +237,7 @@ def _elsewhere(
     found: ReducedOptimum,
     gradient: Doubles,
 ) -> Windows:
-    """The window of the one light that, moved alone, gains most by a white elsewhere."""
+    """Return the window of the one light that, moved alone, gains most by a white elsewhere."""
     best, windows = ROUND_OFF * float(np.abs(equations.target_norm2).sum()), {}
     for its in groups:
         colors, w = its.whites.colors, found.weights[its.lights]
@@ -257,7 +262,7 @@ def _elsewhere(
 
 
 def tangent(reduction: Reduction, reach: float) -> Reduction:
-    """The reduction with each such light on the straight line that its two whites are on.
+    """Return the reduction with each light that keeps to a range on the line of its two whites.
 
     reach: mireds by which it may go on along that. What is asked about an answer, how firmly it is
     known and what it is held by, is asked about the curve where it is, not about a piece of it.
@@ -271,7 +276,7 @@ def tangent(reduction: Reduction, reach: float) -> Reduction:
 
 
 def at_best_white(knob: Knob, gradient: Doubles) -> Knob:
-    """A knob that is off, at the white of its range that would help most. gradient: (n, 3)."""
+    """Return a knob that is off at the white of its range that helps most. gradient: (n, 3)."""
     if knob.whites is None:
         return knob
     best = int(np.argmin(knob.whites.colors @ gradient[knob.lights[0]]))

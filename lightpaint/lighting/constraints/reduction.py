@@ -73,7 +73,7 @@ class Reduction:
         return tuple(k for k, knob in its if knob.gamut is not None and knob.is_free)
 
     def with_gamuts(self, gamuts: Sequence[ColorHull]) -> "Reduction":
-        """The same with lights that may have any colour keeping to `gamuts`, one of each light."""
+        """Return the same with lights of any colour keeping to `gamuts`, one for each light."""
         knobs = [
             replace(knob, gamut=gamuts[knob.lights[0]]) if _has_any_colour(knob) else knob
             for knob in self.knobs
@@ -81,12 +81,12 @@ class Reduction:
         return replace(self, knobs=tuple(knobs))
 
     def kept_within(self, places: Collection[int]) -> "Reduction":
-        """The same with these knobs, by their places, within their gamuts."""
+        """Return the same with these knobs, by their places, within their gamuts."""
         knobs = [knob.within_gamut() if k in places else knob for k, knob in enumerate(self.knobs)]
         return replace(self, knobs=tuple(knobs))
 
     def with_windows(self, windows: Mapping[int, tuple[int, int]]) -> "Reduction":
-        """The same with knobs, by their places, between other whites of their ranges."""
+        """Return the same with knobs, by their places, between other whites of their ranges."""
         knobs = [*self.knobs]
         for k, window in windows.items():
             if knobs[k].window != window:
@@ -275,7 +275,7 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
 
 
 def _has_any_colour(knob: Knob) -> bool:
-    """Whether nothing is asked of a light's channels."""
+    """Return whether nothing is asked of the channels of a light."""
     return knob.is_free and all(x.lower == 0 and np.isinf(x.upper) for x in knob.unknowns)
 
 

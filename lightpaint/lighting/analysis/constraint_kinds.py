@@ -1,4 +1,4 @@
-"""What a person has asked of the lights, thing by thing, and constraints without some of it."""
+"""Constraints by kind and by light, and constraints without some of them."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,13 +8,13 @@ from lightpaint.basis.basis import BasisLight
 from lightpaint.lighting.constraints.addressing import asked_of_each, tied_lights
 from lightpaint.lighting.constraints.constraints import COLOURS, Constraints
 
-#: What is asked of single lights, of those on one dimmer, and of all together.
-Hand = Literal["off", "lock", "limits", "colour", "tie", "sparse", "prefer_current"]
+#: Kinds of constraints: of single lights, of those on one dimmer, and of all together.
+ConstraintKind = Literal["off", "lock", "limits", "colour", "tie", "sparse", "prefer_current"]
 
-#: Those of single lights.
-OF_ONE: tuple[Hand, ...] = ("off", "lock", "limits", "colour")
+#: Kinds of constraints on single lights.
+SINGLE_LIGHT: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour")
 
-#: The keys of a light that each of them stands for.
+#: The keys of a lights file that each of them stands for.
 KEYS: Mapping[str, tuple[str, ...]] = {
     "off": ("off",),
     "lock": ("lock",),
@@ -24,10 +24,10 @@ KEYS: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Hands:
-    """Everything asked of the lights, by light instead of by pattern.
+class ConstraintsByLight:
+    """Constraints on each light by itself, patterns resolved.
 
-    asked: of each light, keys and values. constraints: that say all of it.
+    asked: (n,), keys and values of each light. constraints: as they were given.
     """
 
     lights: Sequence[BasisLight]
@@ -35,20 +35,20 @@ class Hands:
     constraints: Constraints
 
     @staticmethod
-    def of(constraints: Constraints, lights: Sequence[BasisLight]) -> "Hands":
-        """Those of constraints."""
+    def of(constraints: Constraints, lights: Sequence[BasisLight]) -> "ConstraintsByLight":
+        """Resolve `constraints` on these lights."""
         asked = [
             {key: value for key, value in its.items() if value is not False}
             for its, _ in asked_of_each(constraints, lights)
         ]
-        return Hands(lights, asked, constraints)
+        return ConstraintsByLight(lights, asked, constraints)
 
-    def kinds(self) -> dict[Hand, tuple[int, ...]]:
-        """What is asked, and the lights that each is asked of."""
+    def kinds(self) -> dict[ConstraintKind, tuple[int, ...]]:
+        """Return the kinds of constraints that there are, and places of the lights under each."""
         tied = tied_lights(self.constraints, self.lights)
-        found: dict[Hand, tuple[int, ...]] = {
+        found: dict[ConstraintKind, tuple[int, ...]] = {
             kind: tuple(k for k, its in enumerate(self.asked) if set(KEYS[kind]) & set(its))
-            for kind in OF_ONE
+            for kind in SINGLE_LIGHT
         }
         found["tie"] = tuple(sorted(tied))
         every = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
@@ -56,8 +56,8 @@ class Hands:
         found["prefer_current"] = every if self.constraints.prefer_current else ()
         return {kind: its for kind, its in found.items() if its}
 
-    def without(self, kind: Hand, lights: Collection[int]) -> Constraints:
-        """The constraints without that, of these lights."""
+    def without(self, kind: ConstraintKind, lights: Collection[int]) -> Constraints:
+        """Return the constraints without one kind, for lights at these places."""
         if kind == "sparse":
             return replace(self.constraints, sparse=None)
         if kind == "prefer_current":
