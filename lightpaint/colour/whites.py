@@ -16,7 +16,7 @@ from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.locus import uv_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
-#: Mireds between two neighbours, at most. The chord is 1e-5 off the locus in the middle, and what
+#: Mireds between two neighbours, at most. The chord is less than 3e-5 off the locus, and what
 #: is white at both ends differs by less than two steps that an eye tells apart.
 STEP = 8.0
 

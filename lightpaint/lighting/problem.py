@@ -279,12 +279,13 @@ class Problem:
         at_least: npt.ArrayLike | None = None,
         view: int = 0,
     ) -> "Problem":
-        """This problem after a stroke: what is given replaces the painting within a rectangle.
+        """Return this problem after a stroke: what is given replaces the painting in a rectangle.
 
         region: slices of rows and columns of a view. image: (rows, columns, 3) linear, or one
         colour; importance: (rows, columns) or one number; at_least: (rows, columns, 3), whether
-        brighter is as good. The equations are updated tile by tile (Eq 7-9), and are to the last
-        bit those that painting in another order would have led to.
+        brighter is as good; without it paint on an emitter in view is taken at its word. The
+        equations are updated tile by tile (Eq 7-9), and are to the last bit those that painting in
+        another order would have led to.
 
         The pixels move on to the problem that is returned; this one keeps its equations, and
         cannot be painted on again. Raises ValueError for what does not fit the region.

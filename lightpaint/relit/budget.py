@@ -37,8 +37,9 @@ def verification_budget(
     sees more. A sample costs no more in an ordinary render than in a basis. Two halves of a film
     that no blocks fit into take two samples in each of its pixels at least, whatever the basis has.
 
-    basis_size: (height, width); basis_spp: samples per pixel. most_spp: samples per pixel that
-    nobody asked to exceed. asked_spp: samples per pixel of the whole film, whatever they cost.
+    basis_size: (height, width); basis_spp: samples per pixel. most_spp: samples per
+    pixel, at most, where no number is asked for. asked_spp: samples per pixel of the whole film,
+    whatever they cost.
     """
     samples = basis_spp * basis_size[0] * basis_size[1]
     whole = relit.size[0] * relit.size[1]
