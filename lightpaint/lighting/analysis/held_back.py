@@ -48,8 +48,8 @@ ALONE = 0.5
 #: named alone, and how many these are at most.
 NEARLY, FEW_LIGHTS = 0.75, 3
 
-#: Part of what no hold would bring that a weaker one must. Measured (docs/benchmarks.md): at a half
-#: the answer is nearer to what was meant than with the hold, at nine tenths it is farther.
+#: Part of what no hold would bring that a weaker one must. Measured (docs/benchmarks.md): in the
+#: mean of two scenes a half brings the answer nearer to what was meant than any other part tried.
 GRADUALLY = 0.5
 
 #: Steps in which the hold is sought, between itself and the part of it that is as good as none.
@@ -109,23 +109,23 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     What a person asked of lights goes before what ties with it. Where no single thing brings half
     of what all together do, it takes several: first the one beside which the others bring least.
     """
-    few = _Few.of(solution)
-    if not few.asked or few.now <= 0:
+    sample = _PixelSample.of(solution)
+    if not sample.asked or sample.now <= 0:
         return ()
-    everything = few.share(few.asked)
+    everything = sample.share(sample.asked)
     if everything < KNOWN:
         return ()
     found: list[Reason] = []
-    for kind in few.asked:
+    for kind in sample.asked:
         if kind == "constraints":
-            found += _by_hand(few)
+            found += _by_hand(sample)
         else:
-            found.append(Reason(kind, few.others_that_matter(kind), few.share([kind])))
+            found.append(Reason(kind, sample.others_that_matter(kind), sample.share([kind])))
     found = _ordered([reason for reason in found if reason.share >= KNOWN])
-    if (not found or found[0].share < ALONE * everything) and len(few.asked) > 1:
-        return _joint(few, everything)
+    if (not found or found[0].share < ALONE * everything) and len(sample.asked) > 1:
+        return _joint(sample, everything)
     return tuple(
-        replace(reason, loosening=_loosened(solution, few, reason.share))
+        replace(reason, loosening=_loosened(solution, sample, reason.share))
         if reason.kind == "hold"
         else reason
         for reason in found
@@ -143,24 +143,24 @@ def _ordered(reasons: Sequence[Reason]) -> list[Reason]:
     return sorted(reasons, key=rank)
 
 
-def _by_hand(few: "_Few") -> list[Reason]:
+def _by_hand(sample: "_PixelSample") -> list[Reason]:
     """Return what was asked of lights, by kind, with the fewest lights that bring nearly all."""
-    by_light, found = few.by_light, []
+    by_light, found = sample.by_light, []
     for kind, lights in by_light.kinds().items():
-        whole = few.share_without(kind, lights)
+        whole = sample.share_without(kind, lights)
         if whole < KNOWN:
             continue
         if kind in ("sparse", "prefer_current"):
             found.append(Reason(kind, (), whole))
             continue
         chosen, gained = lights, whole
-        likely = sorted(lights, key=lambda k: -few.pull[k])
+        likely = sorted(lights, key=lambda k: -sample.pull[k])
         # One by one, of those that would move the picture most.
-        alone = [(few.share_without(kind, [k]), k) for k in likely[: 2 * FEW_LIGHTS]]
+        alone = [(sample.share_without(kind, [k]), k) for k in likely[: 2 * FEW_LIGHTS]]
         best = [k for _, k in sorted(alone, key=lambda its: -its[0])]
         for count in range(1, min(FEW_LIGHTS, len(lights) - 1) + 1):
             some = sorted(best[:count])
-            part = max(alone)[0] if count == 1 else few.share_without(kind, some)
+            part = max(alone)[0] if count == 1 else sample.share_without(kind, some)
             if part >= NEARLY * whole:
                 chosen, gained = tuple(some), part
                 break
@@ -168,34 +168,36 @@ def _by_hand(few: "_Few") -> list[Reason]:
     return found
 
 
-def _joint(few: "_Few", everything: float) -> tuple[Reason, ...]:
+def _joint(sample: "_PixelSample", everything: float) -> tuple[Reason, ...]:
     """Return all that is asked, where it takes several to bring something."""
-    order = sorted(few.asked, key=lambda kind: few.share([x for x in few.asked if x != kind]))
+    order = sorted(
+        sample.asked, key=lambda kind: sample.share([x for x in sample.asked if x != kind])
+    )
     found: list[Reason] = []
     for kind in order:
         if kind == "constraints":
             found += [
-                Reason(hand, few.named(hand, lights), everything, is_joint=True)
-                for hand, lights in few.by_light.kinds().items()
+                Reason(constraint, sample.named(constraint, lights), everything, is_joint=True)
+                for constraint, lights in sample.by_light.kinds().items()
             ]
         else:
-            names = few.others_that_matter(kind)
+            names = sample.others_that_matter(kind)
             found.append(Reason(kind, names, everything, is_joint=True))
     return tuple(found)
 
 
-def _loosened(solution: Solution, few: "_Few", most: float) -> Loosening | None:
+def _loosened(solution: Solution, sample: "_PixelSample", most: float) -> Loosening | None:
     """Find the strongest hold that brings `GRADUALLY` of `most`, what no hold would bring.
 
     Return None where what is not painted counts by the pixel.
     """
-    fit = few.problem.fit
+    fit = sample.problem.fit
     if fit.unpainted or not fit.hold:
         return None
 
     def brought(hold: float) -> tuple[float, Doubles]:
-        weights = few.solved((), few.others, hold=hold)
-        return few.share_of(weights), weights
+        weights = sample.solved((), sample.others, hold=hold)
+        return sample.share_of(weights), weights
 
     # Between a hold that brings too little and one that brings enough, whose logarithms are halved.
     little, enough = float(fit.hold), float(fit.hold) * AS_GOOD_AS_NONE
@@ -227,7 +229,7 @@ def round_down(value: float) -> float:
 
 
 @dataclass(frozen=True)
-class _Few:
+class _PixelSample:
     """Some of the pixels of all views, each view in one row.
 
     problem: of all pixels of all views. mine: which of the views it is about. names: of the views.
@@ -244,7 +246,7 @@ class _Few:
     _shares: dict[tuple[frozenset[Held], tuple[int, ...]], float] = field(default_factory=dict)
 
     @staticmethod
-    def of(solution: Solution) -> "_Few":
+    def of(solution: Solution) -> "_PixelSample":
         problem = (solution.whole or solution).problem
         views = _in_blocks(problem.views, problem.block_side)
         mine = next(k for k, basis in enumerate(problem.views.bases) if basis is solution.basis)
@@ -263,7 +265,7 @@ class _Few:
         sensors = tuple(basis.origin.sensor for basis in views.bases)
         names = tuple(target.name for target in views.targets)
         alone = Problem.of(bases[mine], targets[mine], fit=problem.fit)
-        return _Few(
+        return _PixelSample(
             problem,
             bases,
             targets,
