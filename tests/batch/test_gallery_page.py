@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from accessible import axe_source
+from accessible import axe_source, violations
 from batches import NAMES, run_all, small_basis, write_batch
 from command import succeed
 from PIL import Image
@@ -280,23 +280,18 @@ def test_axe_finds_nothing(page: Any, batch: Path) -> None:
     source = axe_source()
     page.goto((batch / "index.html").as_uri())
     page.evaluate(source)
-
-    def found() -> list[Any]:
-        told = page.evaluate("() => axe.run()")
-        return [(one["id"], [n["html"] for n in one["nodes"]]) for one in told["violations"]]
-
-    assert found() == []
+    assert violations(page) == []
     page.get_by_label("p0 as A", exact=True).click()
-    assert found() == []
+    assert violations(page) == []
     page.get_by_label("third as B", exact=True).click()
     page.locator("#wipe").wait_for()
-    assert found() == []
+    assert violations(page) == []
     page.keyboard.press("Escape")
     page.get_by_role("tab", name="Lights").click()
-    assert found() == []
+    assert violations(page) == []
     page.get_by_role("tab", name="Mixer").click()
     page.locator(".mixer:not([hidden]) .mixer-body").wait_for()
-    assert found() == []
+    assert violations(page) == []
 
 
 def test_several_paintings_of_solve_are_mixed_as_well(page: Any, tmp_path: Path) -> None:

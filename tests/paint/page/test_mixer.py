@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from accessible import violations
 from interface import Finger
 
 import lightpaint as lp
@@ -273,8 +274,7 @@ def test_the_wipe(make_basis: Any, opened: Any) -> None:
 def test_axe_finds_nothing_in_the_mixer(make_basis: Any, opened: Any, axe: str) -> None:
     page = opened(report(lit(make_basis, 3)))
     page.evaluate(axe)
-    found = page.evaluate("() => axe.run(document.querySelector('.mixer'))")
-    assert [(one["id"], [n["html"] for n in one["nodes"]]) for one in found["violations"]] == []
+    assert violations(page, ".mixer") == []
 
 
 def test_without_scripts_a_report_is_as_it_was(
