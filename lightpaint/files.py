@@ -171,10 +171,11 @@ def _first_piece(path: Path) -> tuple[BinaryIO, bytes]:
     return file, file.read(PIECE)
 
 
-def in_time(work: Callable[[], _Made], patience_s: float, reason: str) -> _Made:
+def in_time(work: Callable[[], _Made], patience_s: float, reason: str = "") -> _Made:
     """Return what `work` returns, or raise what it raises; TimeoutError if it does not end in time.
 
-    It goes on in a thread of its own, which no one waits for at the end of the process.
+    patience_s: seconds to wait. reason: what the message of a TimeoutError adds. The work goes on
+    in a thread of its own, which no one waits for at the end of the process.
     """
     answers: SimpleQueue[tuple[_Made | None, BaseException | None]] = SimpleQueue()
 
@@ -195,7 +196,7 @@ def in_time(work: Callable[[], _Made], patience_s: float, reason: str) -> _Made:
 
 
 def _in_time(work: Callable[[], _Made]) -> _Made:
-    """`in_time`, for files."""
+    """Return what `work` does with a file, `in_time`."""
     return in_time(work, PATIENCE_S, "; is it on a drive that is away?")
 
 

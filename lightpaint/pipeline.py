@@ -227,7 +227,7 @@ def _finished(
         budget = _budget(settings, basis, relit)
         if relit.parameters and view is job.views[0]:
             given = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
-            listen.say(f"relit.xml has the scene's own defaults: give Mitsuba {given} with it, too")
+            listen.say(f"relit.xml keeps the scene's own defaults: give Mitsuba {given} with it")
     spp, size = basis.origin.spp, basis.size
     if budget is not None:
         spp, size = budget.spp, budget.scene.size
@@ -275,14 +275,14 @@ def _budget(settings: Settings, basis: Basis, relit: Scene) -> Budget:
 
 
 def _spoken(budget: Budget, basis: Basis) -> str:
-    """How long a verification takes, before it starts."""
+    """Return how long a verification takes, said before it starts."""
     height, width = budget.scene.size
     its = f"verification of {budget.spp} samples per pixel on {width}x{height}"
-    how = "(verify=False leaves it out)"
+    how = "(verify=False skips it)"
     if basis.render_s is not None:
         seconds = math.ceil(budget.share * basis.render_s)
         long = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
-        return f"{its}: {long} at most {how}"
+        return f"{its}: at most {long} {how}"
     if budget.share <= 1:
-        return f"{its}: no longer than so many samples of the basis took {how}"
-    return f"{its}: {budget.share:.2g} times as long as the basis took at most {how}"
+        return f"{its}: no longer than that many samples of the basis took {how}"
+    return f"{its}: at most {budget.share:.2g} times as long as the basis took {how}"

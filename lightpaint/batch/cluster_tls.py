@@ -29,7 +29,7 @@ def check_trust(address: str, connection: socket.socket) -> None:
         if security.require_encryption:
             raise BatchError(
                 f"Dask's configuration wants encryption here, and {address} has none: give a "
-                "scheduler's tls:// address, or take distributed.comm.require-encryption back"
+                "scheduler's tls:// address, or turn distributed.comm.require-encryption off"
             )
         return
     context = _context(address, security)

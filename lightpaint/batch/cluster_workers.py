@@ -106,7 +106,7 @@ class ClusterWorkers:
             try:
                 # Dask would try to reach one that has ended for 30 s.
                 with dask.config.set({"distributed.comm.timeouts.connect": f"{GONE_S}s"}):
-                    return in_time(work, SILENT_S, "")
+                    return in_time(work, SILENT_S)
             except GOING as error:
                 said = _reason(error)
         self.is_gone = True
@@ -182,7 +182,7 @@ def _connected(address: str) -> Any:
             check_trust(address, connection)
         # One that takes the connection and says nothing would be waited for without end.
         make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
-        return in_time(make, ANSWER_S + GONE_S, "")
+        return in_time(make, ANSWER_S + GONE_S)
     except LightpaintError:
         raise
     except GOING as error:

@@ -155,7 +155,7 @@ def _of_look(
     )
     made: list[Entry] = []
     try:
-        _painting(manifest, look, "")
+        _painting(manifest, look, "")  # its view is looked at, whatever else is wrong
         if len(mistakes.found) == before and not table.unclear:
             entry = replace(entry, basis=sources.basis(look))
             made = list(islice(_of_subject(manifest, sources, entry, look), MOST_LOOKS + 1))

@@ -15,7 +15,7 @@ from lightpaint.errors import ALONE, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.scene.quality import on_film
-from lightpaint.sources import check_nothing_idle
+from lightpaint.sources import check_nothing_idle, content
 
 
 def look_over(entry: Entry, held: Held, mistakes: Mistakes) -> None:
@@ -36,10 +36,10 @@ def look_over(entry: Entry, held: Held, mistakes: Mistakes) -> None:
 
     lights: Sequence[BasisLight] | None = None
     for scene in map(held.scene, entry.scenes):
-        found = tried(lambda scene=scene: scene.content)  # type: ignore[misc]
+        found = tried(partial(content, scene))
         if found is None:  # its lights are there through whichever sensor
             plain = held.scene(replace(scene, sensor=None))
-            found = tried(lambda plain=plain: plain.content)  # type: ignore[misc]
+            found = tried(partial(content, plain))
         if found is None:
             continue
         lights = basis_lights(found)
@@ -48,7 +48,7 @@ def look_over(entry: Entry, held: Held, mistakes: Mistakes) -> None:
             tried(partial(on_film, found, None, entry.final.resolution))
     if entry.basis is not None:
         saved = held.saved(replace(entry.basis))
-        found = tried(lambda: saved.content)
+        found = tried(partial(content, saved))
         if found is not None:
             lights = found.basis.lights if isinstance(found, LightGroups) else found.lights
         if not entry.scenes:

@@ -3,8 +3,8 @@
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: done, but not as asked
 (`verify` found a disagreement, an answer is not close enough); 2: something the user can mend, said
-in one line; 70: a fault of
-lightpaint's own; 130: interrupted, 143: told to end, 129: its terminal has closed.
+in one line; 70: a fault of lightpaint's own; 130: interrupted, 143: told to end, 129: its terminal
+has closed.
 """
 
 from collections.abc import Sequence

@@ -136,15 +136,15 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
     told = "; it is denoised" if is_denoised else ""
     lines = [f"{picture}: paint over it, in any program, and save the painting beside it{told}"]
     if CLEAN in {file.name for file in files}:
-        lines += [
+        lines.append(
             f"{output / CLEAN}: the same in linear light, to paint over in programs that know EXR"
-        ]
+        )
     its = "as it was rendered, with its grain" if is_denoised else "the same in linear light"
-    lines += [f"{output / LIGHT if is_tree else output}: {its}"]
+    lines.append(f"{output / LIGHT if is_tree else output}: {its}")
     if is_tree and (output / MATTES) in {file.parent for file in files}:
-        lines += [f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do"]
+        lines.append(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
     elif is_tree:
-        lines += [f"{output}/{LIGHTS}: what lights do"]
+        lines.append(f"{output}/{LIGHTS}: what lights do")
     return lines
 
 
