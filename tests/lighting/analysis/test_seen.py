@@ -182,8 +182,8 @@ def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
     look = _look(basis)
     target = _over(look, (slice(None), slice(0, 240)), 0.6)
     solution = solve(basis, target, hold=3.0)
-    few = held_back._Few.of(solution)
-    weights = few.solved((), few.others)
+    sample = held_back._PixelSample.of(solution)
+    weights = sample.solved((), sample.others)
     np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
 
 
@@ -205,9 +205,9 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     weaker = hold.loosening
     assert weaker is not None
     assert 0 < weaker.hold < 10
-    few = held_back._Few.of(solution)
+    sample = held_back._PixelSample.of(solution)
     holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
-    brought, less = (few.share_of(few.solved((), few.others, hold=h)) for h in holds)
+    brought, less = (sample.share_of(sample.solved((), sample.others, hold=h)) for h in holds)
     assert brought >= 0.5 * hold.share > less
     assert weaker.share == pytest.approx(brought)
     # And it harms less than none would: of the window, which nobody painted.
