@@ -97,7 +97,7 @@ def shown_through(basis: lp.Basis) -> lp.ViewTransform:
     from lightpaint.report.pictures import transform_of
 
     target, solution = solved(basis)
-    return transform_of(target, lp.combine(basis, solution.lighting).image, None)
+    return transform_of(target, basis, lp.combine(basis, solution.lighting).image)
 
 
 def move(page: Any, light: int, slider: int, value: float) -> None:
