@@ -1,7 +1,7 @@
 """The folder that bases are kept in, and which of its files are this program's own.
 
-Nothing is listed, believed or deleted there but files that have names of our own kind, the mark of
-our own formats inside, and an owner who may be believed: who names a folder of work as the cache
+Only files are listed, read or deleted there that have names of our own kind, the mark of our own
+formats inside, and an owner who may be trusted: somebody who names a folder of work as the cache
 loses nothing in it.
 """
 
