@@ -219,4 +219,4 @@ def matching(base: Path, path: str) -> list[str]:
     given = str(base / path)
     if not has_magic(path) or Path(given).is_file():
         return [given] if Path(given).is_file() else []
-    return sorted(files_matching(given))
+    return sorted(files_matching(path, base))

@@ -17,19 +17,19 @@ from lightpaint.errors import BatchError
 MOST_LOOKED_AT, DEEPEST = 20_000, 32
 
 
-def files_matching(pattern: str) -> list[str]:
-    """Return the files that a pattern names, each once, in no order.
+def files_matching(pattern: str, base: Path = Path()) -> list[str]:
+    """Return the files that a pattern names, relative to a folder, each once, in no order.
 
     `*`, `?` and `[...]` stand for characters of a name, and `**` for folders; neither for a name
-    that begins with a dot, nor `**` for a link. Raises BatchError where there is too much to look
-    at.
+    that begins with a dot, nor `**` for a link; in `base` they are themselves. Raises BatchError
+    where there is too much to look at.
     """
     parts = Path(pattern).parts
     fixed = next(k for k, part in enumerate(parts) if has_magic(part))
     # Several in a row say no more than one.
     whole = parts[fixed:]
     rest = [x for k, x in enumerate(whole) if x != "**" or whole[max(k - 1, 0) : k] != ("**",)]
-    start = os.path.join(*parts[:fixed]) if fixed else ""
+    start = os.path.join("" if base == Path() else base, *parts[:fixed])
     found = dict.fromkeys(_Search(pattern).below(start, tuple(rest), 0))
     return [path for path in found if os.path.isfile(path)]
 

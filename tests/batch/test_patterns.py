@@ -39,6 +39,12 @@ def test_they_find_what_glob_finds(here: Path, pattern: str) -> None:
         assert len(set(found)) == len(found)
 
 
+def test_brackets_of_the_manifests_folder_are_no_pattern(here: Path) -> None:
+    found = files_matching("*.exr", here / "x[1]")
+    assert found == [str(here / "x[1]" / "g.exr")]
+    assert files_matching(str(here / "x" / "*.exr"), here / "x[1]") == [str(here / "x" / "c.exr")]
+
+
 @pytest.mark.parametrize("pattern", ["/**/*", "/proc/**/*", "/usr/**/**", "/usr/**/**/**/*x*/**"])
 def test_one_that_means_the_whole_machine_ends_soon(here: Path, pattern: str) -> None:
     (here / "looks.toml").write_text(f'[[look]]\nscene = "room.xml"\npainting = "{pattern}"\n')
