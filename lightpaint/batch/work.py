@@ -27,7 +27,7 @@ from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline import run
 from lightpaint.progress import Listener
-from lightpaint.relit.forms import Source, exported, names_of_forms, writer_of
+from lightpaint.relit.forms import Source, names_of_forms, writers_of
 from lightpaint.renders import relight_look, relit_folder
 from lightpaint.result_folder import ResultFolder
 from lightpaint.results import view_names
@@ -196,10 +196,9 @@ def _export(task: Task, held: Held, listen: Listener) -> None:
     results = ResultFolder(folder, files, reads, (lighting,), force=force)
     results.check()
     answer = read_lighting(lighting)
-    elsewhere, remark = exported(answer, source)
-    if remark and set(names) != {"mitsuba"}:
+    writers, remark = writers_of(names, answer, source, folder, listen)
+    if remark:
         listen.say(remark)
     with results.filled() as stage:
-        for form, name in names.items():
-            its = answer if form == "mitsuba" else elsewhere
-            write_text(stage / name, writer_of(form, its, source, folder, listen)())
+        for name, make in writers.items():
+            write_text(stage / name, make())

@@ -8,7 +8,7 @@ from lightpaint.cli.manner import Outcome
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting.file import read_lighting
-from lightpaint.relit.forms import Source, exported, names_of_forms, writer_of
+from lightpaint.relit.forms import Source, names_of_forms, writers_of
 from lightpaint.sources import GroupsFile, SceneFile, content
 from lightpaint.staging import finish
 
@@ -28,13 +28,8 @@ def export(
     answer, folder = read_lighting(lighting), output or lighting.parent
     source, listen = Source(content(scene), content(groups), stage), terminal.Listener()
     names = names_of_forms(to, source)
-    elsewhere, remark = exported(answer, source)
-    made = {
-        folder / name: writer_of(
-            form, answer if form == "mitsuba" else elsewhere, source, folder, listen
-        )
-        for form, name in names.items()
-    }
+    writers, remark = writers_of(names, answer, source, folder, listen)
+    made = {folder / name: make for name, make in writers.items()}
     check_files(list(made), [lighting, *source.files])
     check_writable(folder)
     if not force and (there := [file for file in made if file.exists()]):
@@ -43,7 +38,7 @@ def export(
     for file, text in texts.items():
         write_text(file, text)
         terminal.write(str(file))
-    if remark and set(names) != {"mitsuba"}:
+    if remark:
         listen.say(remark)
     files = list(made)
     return Outcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))

@@ -1,6 +1,6 @@
 """The forms in which an answer goes elsewhere, by one word each: what each needs, and its text."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,7 +76,27 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
     return names
 
 
-def exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
+def writers_of(
+    names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
+) -> tuple[dict[str, Callable[[], str]], str]:
+    """Return what makes the text of each file, by its name, and a remark; "" where there is none.
+
+    names: of the files, by form, as of `names_of_forms`. folder: where they are to lie. listen:
+    hears what a form leaves out. Mitsuba gets the lighting itself, other programs what `_exported`
+    makes of it.
+
+    Raises LightpaintError where the lighting is of something else.
+    """
+    elsewhere, remark = lighting, ""
+    if set(names) != {"mitsuba"}:
+        elsewhere, remark = _exported(lighting, source)
+    return {
+        name: _writer_of(form, lighting if form == "mitsuba" else elsewhere, source, folder, listen)
+        for form, name in names.items()
+    }, remark
+
+
+def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     """Return the lighting as other programs get it: what cannot be told keeps its own colour.
 
     And what is to be said of that; "" where nothing is. Raises LightingError for a lighting of
@@ -94,15 +114,10 @@ def exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     )
 
 
-def writer_of(
+def _writer_of(
     form: str, lighting: Lighting, source: Source, folder: Path, listen: Listener
 ) -> Callable[[], str]:
-    """What makes the text of a form that `names_of_forms` has checked.
-
-    folder: where the file is to lie. listen: hears what it leaves out.
-
-    Raises LightpaintError where the lighting is of something else.
-    """
+    """Return what makes the text of one form; arguments as of `writers_of`."""
     if form in ("csv", "json"):
         return lambda: (fixtures_csv if form == "csv" else fixtures_json)(lighting)
     if source.light_groups is not None:
@@ -129,7 +144,7 @@ def writer_of(
 def _of_groups(
     form: str, lighting: Lighting, groups: LightGroups, folder: Path, listen: Listener
 ) -> Callable[[], str]:
-    """As `writer_of`, of light groups."""
+    """Return the same, of light groups."""
     lighting.weights_for(groups.basis)
     if form == "blender":
         return lambda: blender_script(groups, lighting)
