@@ -196,7 +196,7 @@ def _ignoring(*numbers: signal.Signals) -> None:
 def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> None:
     """Its shell has it ignored; what `nohup` has ignored stays ignored."""
     room = write_room(tmp_path, lights=LIGHTS["bulb"])
-    command = [sys.executable, "-m", "lightpaint", "basis", str(room), "--spp", "100000000"]
+    command = [sys.executable, "-m", "lightpaint", "basis", str(room), "--spp", "1000000"]
     with subprocess.Popen(
         command,
         cwd=tmp_path,
