@@ -17,11 +17,10 @@ CUT = """async (where) => {
 }"""
 
 
-@pytest.fixture(scope="module", params=SIZES, ids=["1280x720", "1440x900"])
-def crowded(request: pytest.FixtureRequest, browser: Any, site: Any) -> Iterator[Painter]:
-    """One page for all panels of one size; each of them is brought to how it begins."""
-    width, height = request.param
-    page = browser.new_page(viewport={"width": width, "height": height})
+@pytest.fixture(scope="module")
+def crowd(browser: Any, site: Any) -> Iterator[Painter]:
+    """One page for all panels and sizes; each of them is brought to how it begins."""
+    page = browser.new_page()
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.goto(f"{site.url}/fake/index.html?crowd&lights=69&size=48x27")
@@ -30,6 +29,13 @@ def crowded(request: pytest.FixtureRequest, browser: Any, site: Any) -> Iterator
     yield Painter(page)
     page.close()
     assert not wrong
+
+
+@pytest.fixture(scope="module", params=SIZES, ids=["1280x720", "1440x900"])
+def crowded(request: pytest.FixtureRequest, crowd: Painter) -> Painter:
+    width, height = request.param
+    crowd.page.set_viewport_size({"width": width, "height": height})
+    return crowd
 
 
 @pytest.fixture
