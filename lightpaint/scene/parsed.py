@@ -321,7 +321,8 @@ def render_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        if not _is_native(error):
+        # Python's own kinds of it, such as RecursionError, are faults, whoever raises them.
+        if type(error) is not RuntimeError or not _is_native(error):
             raise
         first: BaseException = error
         while first.__cause__ is not None:

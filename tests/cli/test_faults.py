@@ -9,6 +9,7 @@ from command import refused, run
 
 from lightpaint.cli import command
 from lightpaint.cli.fault import FAULT
+from lightpaint.scene.parsed import render_errors
 
 #: A camera that no particle hits: it loads, and Mitsuba throws in the middle of the render.
 SCENE = """<scene version="3.0.0">
@@ -35,6 +36,14 @@ def fails(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
         raise error
 
     monkeypatch.setattr(command, "_command", lambda name: doctor)
+
+
+def test_a_recursion_without_end_is_no_error_of_mitsuba() -> None:
+    """RecursionError is a RuntimeError, as all that Mitsuba throws."""
+    there = {"__name__": "lightpaint.somewhere"}
+    exec("def endless(): endless()", there)
+    with pytest.raises(RecursionError), render_errors(Path("room.xml")):
+        there["endless"]()  # type: ignore[operator]
 
 
 def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
