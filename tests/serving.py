@@ -1,9 +1,12 @@
 """A painter's server over real connections, and pages that speak to it byte by byte."""
 
+import asyncio
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from fake_session import FakeSession
@@ -119,3 +122,9 @@ def until(is_so: Callable[[], object], what: str) -> None:
     while not is_so():
         assert time.monotonic() < end, what
         time.sleep(0.01)
+
+
+def in_a_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Run a trial in another thread: where a browser is open for other tests, this one has a loop."""
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), 20))).result()

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import refused
+from serving import in_a_loop
 
 import lightpaint as lp
 from lightpaint.batch.manifest import read_manifest
@@ -154,7 +155,7 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
         with pytest.raises(PaintError, match="the painter has ended"):
             await work
 
-    asyncio.run(serve_and_end())
+    in_a_loop(serve_and_end)
 
 
 def test_ctrl_c_waits_for_no_job_beside() -> None:

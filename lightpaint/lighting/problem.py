@@ -79,9 +79,9 @@ class Problem:
         noise_removed: The part of the noise in `equations` that is not in `corrected`, where some
             was taken out.
         refinement: The last step by which an answer was improved, if one was.
-        block_side: Pixels along the side of the blocks that `corrected` is of; 1 for single pixels.
         dimming: (n,), by how much dimmer lights are than at present in an answer before, which the
             pull to their colours heeds; None where there was none.
+        block_side: Pixels along the side of the blocks that `corrected` is of; 1 for single pixels.
         painting: Where strokes go, once there are some.
         strokes: How many there had been.
 

@@ -5,8 +5,7 @@ import json
 import re
 import threading
 import time
-from collections.abc import Callable, Coroutine, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 from fake_session import FakeSession
 from keys import bearer, offered
+from serving import in_a_loop
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
@@ -548,12 +548,6 @@ class Scripted:
 
     async def close(self, code: int = 1000) -> None:
         """There is nothing to close."""
-
-
-def in_a_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """In a thread of its own: where a browser is open for other tests, this one has a loop."""
-    with ThreadPoolExecutor(1) as threads:
-        threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), 20))).result()
 
 
 HELLO = frame("hello", 0, version=VERSION)
