@@ -125,6 +125,6 @@ def until(is_so: Callable[[], object], what: str) -> None:
 
 
 def in_a_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a trial in another thread: where a browser is open for other tests, this one has a loop."""
+    """Run a trial in another thread: where other tests have a browser open, this one has a loop."""
     with ThreadPoolExecutor(1) as threads:
         threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), 20))).result()
