@@ -98,7 +98,7 @@ class ClusterWorkers:
         return list(self._asked(self._client.nthreads))
 
     def _asked(self, work: Callable[[], _Made]) -> _Made:
-        """What comes of asking the scheduler. Raises BatchError where it is gone."""
+        """Ask the scheduler, and return its answer. Raises BatchError where it is gone."""
         import dask
 
         said = self._client.status

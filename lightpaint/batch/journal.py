@@ -97,7 +97,7 @@ def _parts(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Read:
-    """What a file holds.
+    """Return what a file holds.
 
     damaged: how many lines say nothing. half: where in the file half of a line begins, if one does.
     lacks_end: whether nothing but its end is missing of the last one.

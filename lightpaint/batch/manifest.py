@@ -46,7 +46,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What stands there. looks: with the defaults in them.
+    """Contents of a manifest. looks: with the defaults in them.
 
     path: of the file, relative to whose folder all its paths are.
     """

@@ -1,4 +1,4 @@
-"""What is wrong with a look that cannot be planned: each thing by itself, so that none hides."""
+"""All mistakes of a look that cannot be planned: each is sought by itself, so that none hides."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -95,7 +95,7 @@ def _sentences(look: Look, table: Table) -> list[str]:
 
 
 def _what_holds(look: Look) -> list[str]:
-    """What keeps the lights from the paint, what would bring most first, and by which option."""
+    """Say what keeps the lights from the paint, the main reason first, each with its option."""
     if not look.analysis.seen.reasons:
         return what_holds(look.diagnosis)
     told = [_spoken_cause(look, reason) for reason in look.analysis.seen.reasons]

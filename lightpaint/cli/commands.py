@@ -118,7 +118,7 @@ def _template_of_basis(
 
 
 def _shown_template(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> Outcome:
-    """What to do with the files of a template."""
+    """Return lines that say what to do with the files of a template."""
     is_tree = is_folder(output)
     picture = output / SHOWN if is_tree else output.with_suffix(".png")
     linear = output / LIGHT if is_tree else output

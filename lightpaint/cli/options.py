@@ -95,7 +95,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
 
 
 def _source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
-    """What `template` shows: a scene, a saved basis, or light groups, also those of --lights."""
+    """Return what `template` is to show: a scene, a saved basis, or light groups."""
     given = ",".join(options.lights or ())
     if options.scene is None:
         if not given:

@@ -1,4 +1,4 @@
-"""What paint over an emitter in view means: what that lights, or its glow, but seldom less light.
+"""Paint over an emitter in view is paint for what that lights, or its glow, seldom for less light.
 
 A flame outshines every display. Somebody who paints a table and the lantern on it warm means no
 less light of the lantern, though each pixel of the flame is darker painted than it is. Only paint

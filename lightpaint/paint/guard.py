@@ -150,14 +150,14 @@ def _header(scope: Scope, name: bytes) -> list[str]:
 
 
 def _bearer(scope: Scope) -> str | None:
-    """What a request shows: a browser sends this header for nobody but the page's own script."""
+    """Return the key in a header, which a browser sends for nobody but the page's own script."""
     given = [value.partition(" ") for value in _header(scope, b"authorization")]
     [(scheme, _, shown)] = given if len(given) == 1 else [("", "", "")]
     return shown if scheme.lower() == "bearer" else None
 
 
 def _offered(scope: Scope) -> str | None:
-    """What a socket shows: a page's script cannot give it headers, but names of protocols."""
+    """Return the key among a socket's subprotocols: a page cannot give a socket headers."""
     # From the header itself: what servers make of it differs.
     names = ",".join(_header(scope, b"sec-websocket-protocol")).split(",")
     found = [name for x in names if (name := x.strip()).startswith(KEY_PROTOCOL)]

@@ -150,7 +150,7 @@ class Session:
         return Moment(self.version, bases, targets, asked, *how)
 
     def changed_by(self, change: protocol.Preview) -> Wishes:
-        """What would be asked after a change. Raises LightpaintError where it cannot be made."""
+        """Return the wishes after a change. Raises LightpaintError where it cannot be made."""
         self._check_names(change.asked)
         wishes = self.wishes.of_answer(change.values)
         for name, asked in change.asked.items():

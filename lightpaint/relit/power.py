@@ -1,4 +1,4 @@
-"""What a verification could have seen: its power for an error in each light.
+"""Power of a verification: how likely it was to see an error in each light.
 
 That prediction and render agree says little of a light whose part of the picture drowns in their
 noise. So it is computed how likely the render was to find it, had the light been a little off.

@@ -148,7 +148,7 @@ def _reason(reason: Reason) -> dict[str, Any]:
 
 
 def _elsewhere(rest: Elsewhere | None) -> dict[str, Any] | None:
-    """What becomes of what is not painted, in CIEDE2000."""
+    """Change of what is not painted, in CIEDE2000."""
     if rest is None:
         return None
     place = {"object": rest.object} if rest.object else {"region": rest.region}

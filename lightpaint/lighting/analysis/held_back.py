@@ -1,4 +1,4 @@
-"""What keeps the lights from what was painted, and what they would do without each of it.
+"""Reasons that keep the lights from what was painted, and what each of them costs.
 
 All shares are of what the answer misses of the paint, Σ D ‖V(ψ) − V(x)‖², which is what the fit
 minimises there; for each the problem is solved again, of enough of the pixels.

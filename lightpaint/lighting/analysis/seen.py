@@ -233,7 +233,7 @@ def what_is_seen(
 
 
 def _rest(solution: Solution, look: Looking, predicted: Estimate) -> Elsewhere | None:
-    """What becomes of what nobody painted; None where it was not to stay as it is.
+    """Return how much of what nobody painted changes; None where it was not to stay as it is.
 
     Both are sums of the same planes, so that noise is no change; nor is what a person did to
     lights, who holds them where they are.

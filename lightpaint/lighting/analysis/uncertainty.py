@@ -262,7 +262,7 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
 
 
 def _loss(solution: Solution, taken: NormalEquations) -> float:
-    """What a solution misses and what pulls at it, less the noise that is taken out."""
+    """Return what a solution misses and what pulls at it, less the noise that is taken out."""
     pull, weights = solution.problem.pull, solution.weights
     pulled = 0.0 if pull is None else float(pull.objective(weights).sum())
     # As of `NormalEquations.objective`, which knows of no squares below zero.
