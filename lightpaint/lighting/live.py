@@ -124,7 +124,7 @@ class Live:
         return films.nearer(pixels, starts, best, pull, allowed)
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
-        """What is left to solve for, with the colours that lights may take as it is painted."""
+        """Return the unknowns, with the colours that lights may take as the views are painted."""
         if self._fit.colors != "gentle":
             return self._reduction
         light = PaintedLight.of([view.painting for view in views], most=GAMUT_PIXELS)
@@ -132,7 +132,7 @@ class Live:
         return self._reduction.with_gamuts(gamuts)
 
     def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
-        """What pulls at the weights, as of `Problem.pull`: the colours' part is found once.
+        """Return the pull on the weights, as `Problem.pull`; the part of the colours is found once.
 
         before: (n, 3), an answer that says which lights are dim.
         """

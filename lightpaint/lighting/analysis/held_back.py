@@ -282,7 +282,7 @@ class _PixelSample:
 
     @property
     def asked(self) -> tuple[Held, ...]:
-        """What is asked beside the painting."""
+        """Names of what holds the lights beside the painting, those that are in force."""
         fit = self.problem.fit
         on: dict[Held, bool] = {
             "hold": bool(fit.hold or fit.unpainted),
@@ -294,7 +294,7 @@ class _PixelSample:
 
     @cached_property
     def by_light(self) -> ConstraintsByLight:
-        """What is asked of each light."""
+        """Constraints of each light."""
         return ConstraintsByLight.of(self.problem.constraints, self.problem.basis.lights)
 
     @cached_property
@@ -310,7 +310,7 @@ class _PixelSample:
 
     @cached_property
     def now(self) -> float:
-        """What the answer misses of the paint."""
+        """Loss of the answer over the painted pixels."""
         return self.cost(self.weights)
 
     def cost(self, weights: Doubles) -> float:

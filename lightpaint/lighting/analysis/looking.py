@@ -77,7 +77,7 @@ class Looking:
         return ciede2000(self.lab(pixels), self.lab_meant(pixels))
 
     def costs(self, pixels: Doubles) -> Doubles:
-        """What light (p, 3) misses of the paint as the fit counts it, (p,): ‖V(ψ) − V(x)‖².
+        """Return what light x, (p, 3), misses of the paint in the fit, (p,): ‖V(ψ) − V(x)‖².
 
         Importance is not in it.
         """

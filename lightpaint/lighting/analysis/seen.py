@@ -296,7 +296,7 @@ def _place(look: Looking, missed: Doubles, light: Doubles, grain: Doubles) -> tu
 
 
 def _costs(look: Looking, light: Doubles, grain: Doubles) -> Doubles:
-    """What is missed in each block as the fit counts it, (rows, columns), but for noise.
+    """Return what each block misses as the fit counts it, (rows, columns), less its noise.
 
     Noise explains no more than is left between the pixels, as in `_missed`.
     """
