@@ -31,6 +31,20 @@ def reach_of(rgb: Floats) -> Doubles:
     return np.asarray((chromaticity(rgb) @ DIRECTIONS.T).max(axis=0))
 
 
+def sides_of(reach: Doubles) -> Doubles:
+    """Return by what a light has >= 0 that reaches no further than (…, k): linear in it, (…, k, 3).
+
+    u' = 4 X / W and v' = 9 Y / W with W = X + 15 Y + 3 Z, so that d·(u', v') <= r is
+    r W - 4 d₁ X - 9 d₂ Y >= 0.
+    """
+    X, Y, _ = to_xyz = rgb_to_xyz(REC709)
+    W = np.array([1.0, 15.0, 3.0]) @ to_xyz
+    one, other = DIRECTIONS.T
+    return np.asarray(
+        reach[..., None] * W - np.outer(4 * one, X) - np.outer(9 * other, Y), np.float64
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class ColorHull:
     """A set of colours: those that reach no further than `reach`, (k,), in each direction.
@@ -55,19 +69,29 @@ class ColorHull:
         rgb /= luminance(rgb)[:, None]
         return rgb
 
+    def fan(self, side: int) -> Doubles:
+        """Return the three colours, (3, 3), of the triangle that a side makes with the middle.
+
+        Each of its colours is a mix of three of one triangle, and of two on the boundary.
+        """
+        its = self.primaries
+        return np.stack([its.mean(axis=0), its[side % len(its)], its[(side + 1) % len(its)]])
+
+    def side_towards(self, rgb: Doubles) -> int:
+        """Return the side in whose triangle a colour (3,), linear, lies, or beyond which."""
+        corners = chromaticity(self.primaries)
+        middle = chromaticity(self.primaries.mean(axis=0))
+        ways, way = corners - middle, chromaticity(rgb) - middle
+        turn = _cross(ways, way)
+        facing = _cross(ways, np.roll(ways, -1, axis=0)).sum()
+        # It is to the left of the one end of a side, and to the right of the other.
+        left = turn * facing >= 0
+        found = np.flatnonzero(left & ~np.roll(left, -1))
+        return int(found[0]) if found.size else 0
+
     @cached_property
     def _sides(self) -> Doubles:
-        """(k, 3), by which a light has >= 0 that reaches no further: linear in it.
-
-        u' = 4 X / W and v' = 9 Y / W with W = X + 15 Y + 3 Z, so that d·(u', v') <= r is
-        r W - 4 d₁ X - 9 d₂ Y >= 0.
-        """
-        X, Y, _ = to_xyz = rgb_to_xyz(REC709)
-        W = np.array([1.0, 15.0, 3.0]) @ to_xyz
-        one, other = DIRECTIONS.T
-        return np.asarray(
-            np.outer(self.reach, W) - np.outer(4 * one, X) - np.outer(9 * other, Y), np.float64
-        )
+        return sides_of(self.reach)
 
     def has(self, rgb: Doubles) -> bool:
         """Return whether the colour of a light (3,), linear, is in it; black is."""
@@ -82,6 +106,11 @@ class ColorHull:
         # With so much of its own colour beside it is within all sides.
         mixed = rgb + float(np.max(-room[beyond] / own[beyond], initial=0.0)) * self.own
         return np.asarray(mixed * (luminance(rgb) / luminance(mixed)), np.float64)
+
+
+def _cross(one: Doubles, other: Doubles) -> Doubles:
+    """Return the cross products of vectors (…, 2)."""
+    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
 
 
 def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:

@@ -6,26 +6,34 @@ is limited to mixes of its own colour, of whites, and of the light that the pain
 the lamp counts: painted Ψ, beside what white lamps as bright as those there are would make.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
-from lightpaint.colour.hull import DIRECTIONS, ColorHull, chromaticity, reach_of
+from lightpaint.colour.hull import (
+    DIRECTIONS,
+    ROUND_OFF,
+    ColorHull,
+    chromaticity,
+    reach_of,
+    sides_of,
+)
 from lightpaint.colour.whites import white_range
 from lightpaint.lighting.constraints.whites import WHITES
-
-#: One of each light.
-Gamuts = tuple[ColorHull, ...]
 
 #: Part of the painted light beyond which what is painted says nothing: noise, edges of strokes.
 OUTLYING = 0.05
 
 #: By how much colours may leave what is painted, in (u', v'): people paint hues that much off.
 MARGIN = 0.01
+
+#: What a bound is rounded to, in (u', v'): less than people see; it lasts while one paints.
+STEP = 0.001
 
 #: Painted pixels that are looked at, about.
 LOOKED_AT = 2**12
@@ -34,8 +42,8 @@ LOOKED_AT = 2**12
 #: bits the codes from 0 to 10.
 DARK = 0.003
 
-#: Pixels among which painted ones are looked for, where there are enough of them.
-SEARCHED = 2**16
+#: Times as many pixels among which painted ones are looked for, where there are enough of them.
+SEARCHED = 2**5
 
 #: Brightness, beside that of the mean lamp, at which a lamp counts that is off.
 FAINT = 0.01
@@ -72,48 +80,95 @@ class PaintedLight:
 def _painted_pixels(importance: Floats, most: int) -> Indices:
     """Return places of painted pixels, (p,): of evenly spread ones, where these are enough."""
     every = importance.ravel()
-    thin = max(1, every.size // SEARCHED) | 1
+    thin = max(1, every.size // (SEARCHED * most)) | 1
     found = np.flatnonzero(every[::thin]) * thin
     return found if thin == 1 or found.size >= most // 4 else np.flatnonzero(every)
 
 
-def gamuts_of(light: PaintedLight, power: Doubles, present: Doubles) -> Gamuts:
-    """Return the colours that each lamp may take.
+class Gamuts:
+    """The colours that each lamp may take.
 
-    power, present: (n, 3), ‖Φᵢ‖² of the lamps' pictures, and their weights now.
+    How far the painting lets them reach is found only where a lamp takes a colour that is none of
+    its own and of whites: most never do, and under a brush each answer would wait for it.
+
+    light: finds painted pixels; whoever paints on says so (`repainted`). power, present: (n, 3),
+    ‖Φᵢ‖² of the lamps' pictures, and their weights now.
     """
-    own = np.where(luminance(present)[:, None] > 0, present, 1.0)
-    white = reach_of(white_range(*WHITES).colors)
-    reach = np.maximum(chromaticity(own) @ DIRECTIONS.T, white)
-    reach = np.maximum(reach, _painted(light, power, present)) + MARGIN
-    return tuple(ColorHull(r, c) for r, c in zip(reach, own, strict=True))
+
+    def __init__(self, light: Callable[[], PaintedLight], power: Doubles, present: Doubles) -> None:
+        self._light, self._power, self._present = light, power, present
+        self._own = np.where(luminance(present)[:, None] > 0, present, 1.0)
+        white = reach_of(white_range(*WHITES).colors)
+        self._reach = np.maximum(chromaticity(self._own) @ DIRECTIONS.T, white)
+        self._sides = sides_of(self._reach + MARGIN - STEP)
+        self._wanted: _WantedLight | None = None
+        self._found: dict[int, ColorHull] = {}
+        self._before: dict[int, ColorHull] = {}
+
+    def __getitem__(self, light: int) -> ColorHull:
+        if light not in self._found:
+            if self._wanted is None:
+                self._wanted = _WantedLight.of(self._light(), self._power, self._present)
+            reach = np.maximum(self._reach[light], self._wanted.reach(light)) + MARGIN
+            reach = np.round(reach / STEP) * STEP
+            found, before = ColorHull(reach, self._own[light]), self._before.get(light)
+            is_same = before is not None and np.array_equal(before.reach, reach)
+            self._found[light] = before if before is not None and is_same else found
+        return self._found[light]
+
+    def repainted(self) -> None:
+        """Find anew what the painting asks for. What comes out the same is the same object."""
+        self._before |= self._found
+        self._found, self._wanted = {}, None
+
+    def beyond(self, weights: Doubles, lights: Indices) -> list[int]:
+        """Return which of some lights, (m,), have colours in weights (n, 3) beyond theirs."""
+        its = weights[lights]
+        room = np.einsum("mkc,mc->mk", self._sides[lights], its)
+        known = (room >= -ROUND_OFF * its.sum(axis=1, keepdims=True)).all(axis=1)
+        return [k for k in lights[~known].tolist() if not self[k].has(weights[k])]
 
 
-def _painted(light: PaintedLight, power: Doubles, present: Doubles) -> Doubles:
-    """Return how far the light that is painted where a lamp counts reaches in each direction.
+@dataclass(frozen=True)
+class _WantedLight:
+    """What is painted beside what white lamps as bright as those there are would make there.
 
-    (n, k), in CIE 1976 (u', v'); -inf for a lamp that counts nowhere.
+    along: (p, k), how far the colours of some painted pixels reach in each direction, in CIE 1976
+    (u', v'). share: (n, p), how much each pixel says of a lamp's light.
     """
-    size = np.sqrt(power.sum(axis=1))
-    now = np.asarray(luminance(present))
-    faint = FAINT * (now * size).mean() / np.where(size > 0, size, np.inf)
-    lit = np.maximum(now, faint)[:, None, None] * light.rows
-    total, painted = lit.sum(axis=0), np.asarray(luminance(light.image))
-    dark = DARK * np.percentile(luminance(total), 95) if len(total) else 0.0
-    counts = (total.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (painted > dark)
-    wanted = light.image[counts] / total[counts]
-    reach = np.full((len(present), len(DIRECTIONS)), -np.inf)
-    if not len(wanted):
-        return reach
-    along = chromaticity(wanted) @ DIRECTIONS.T
-    # What is dim is seen the more: display values are near the root of light.
-    weight = light.weight[counts] * np.sqrt(painted[counts])
-    share = luminance(lit[:, counts]) / luminance(total[counts]) * weight
-    order = np.argsort(along, axis=0)
-    for k, its in enumerate(order.T):
-        sums = np.cumsum(share[:, its], axis=1)
-        last = (sums < (1 - OUTLYING) * sums[:, -1:]).sum(axis=1)
-        reach[:, k] = np.where(
-            sums[:, -1] > 0, along[its, k][np.minimum(last, its.size - 1)], -np.inf
-        )
-    return reach
+
+    along: Doubles
+    share: Doubles
+
+    @classmethod
+    def of(cls, light: PaintedLight, power: Doubles, present: Doubles) -> "_WantedLight":
+        """Find it for lamps of such ‖Φᵢ‖² and weights now, (n, 3)."""
+        size = np.sqrt(power.sum(axis=1))
+        now = np.asarray(luminance(present))
+        faint = FAINT * (now * size).mean() / np.where(size > 0, size, np.inf)
+        lit = np.maximum(now, faint)[:, None, None] * light.rows
+        total, painted = lit.sum(axis=0), np.asarray(luminance(light.image))
+        dark = DARK * np.percentile(luminance(total), 95) if len(total) else 0.0
+        counts = (total.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (painted > dark)
+        wanted = light.image[counts] / total[counts]
+        # What is dim is seen the more: display values are near the root of light.
+        weight = light.weight[counts] * np.sqrt(painted[counts])
+        share = luminance(lit[:, counts]) / luminance(total[counts]) * weight
+        return cls(chromaticity(wanted) @ DIRECTIONS.T, np.asarray(share, np.float64))
+
+    @cached_property
+    def _order(self) -> Indices:
+        """(p, k), pixels by how far they reach."""
+        return np.argsort(self.along, axis=0)
+
+    def reach(self, lamp: int) -> Doubles:
+        """Return how far it reaches where a lamp counts, (k,), but for what is outlying.
+
+        -inf for a lamp that counts nowhere.
+        """
+        sums = np.cumsum(self.share[lamp][self._order], axis=0)
+        if not (len(sums) and sums[-1, 0] > 0):
+            return np.full(len(DIRECTIONS), -np.inf)
+        last = np.minimum((sums < (1 - OUTLYING) * sums[-1]).sum(axis=0), len(sums) - 1)
+        columns = np.arange(len(DIRECTIONS))
+        return np.asarray(self.along[self._order[last, columns], columns])

@@ -14,14 +14,14 @@ stroke in one costs no more than where there is no other.
 """
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 from typing import Any
 
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.binning import block_side
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.near_sides import solve_near_sides
 from lightpaint.lighting.constraints.on_locus import (
     center_windows,
     clip_to_gamuts,
@@ -31,7 +31,7 @@ from lightpaint.lighting.constraints.on_locus import (
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.fit import Fit, Space
-from lightpaint.lighting.gamuts import PaintedLight, gamuts_of
+from lightpaint.lighting.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.live_sums import FILM, Films, SmallFilm
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -45,7 +45,7 @@ WHITE_STEPS = 2
 WHITE_WIDTH = 8
 
 #: Painted pixels that say which colours lights may take, about.
-GAMUT_PIXELS = 2**9
+GAMUT_PIXELS = 2**8
 
 #: Of which views, and what pulls to the present and to its colours.
 _Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
@@ -69,6 +69,8 @@ class Live:
         reduction = reduced_by(constraints, self._basis, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._pulls: _Pulls | None = None
+        self._untouched: Doubles | None = None
+        self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # by the answer before
         for view in self._views:
             view.see_through(fit.transform)
@@ -93,7 +95,7 @@ class Live:
         """
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
-            return untouched(self._views, self._reduction)
+            return self._at_rest()
         if not self._is_kept_to:
             # What is not allowed may well be nearer to the painting.
             start = _nearest(start, views, self._reduction)
@@ -101,8 +103,7 @@ class Live:
         rest_weight, reduction = self._rest_weight(views), self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
-            asked = equations if pull is None else equations + pull
-            return _best(asked, reduction, begin, self._fit.method)
+            return self._best(equations if pull is None else equations + pull, begin)
 
         def allowed(weights: Doubles) -> Doubles:
             return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
@@ -120,16 +121,44 @@ class Live:
         films = self._films_of(views)
         pixels = films.pixels(rest_weight, self._fit.transform)
         # A painting that another hand has changed may leave the answer before worse than none.
-        starts = allowed(start), untouched(self._views, self._reduction)
+        starts = allowed(start), self._at_rest()
         return films.nearer(pixels, starts, best, pull, allowed)
 
+    def _at_rest(self) -> Doubles:
+        """Return the answer to no paint, (n, 3)."""
+        if self._untouched is None:
+            self._untouched = untouched(self._views, self._reduction)
+        return self._untouched
+
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
-        """Return the unknowns, with the colours that lights may take as the views are painted."""
+        """Return the unknowns, with the colours that lights may take as the views are painted.
+
+        Lights that the answer before had to keep within theirs are so from the beginning.
+        """
         if self._fit.colors != "gentle":
             return self._reduction
-        light = PaintedLight.of([view.painting for view in views], most=GAMUT_PIXELS)
-        gamuts = gamuts_of(light, _power(views), self._basis.present_weights)
-        return self._reduction.with_gamuts(gamuts)
+        within = self._within
+        if within.gamuts is None or self._gamuts_of != views:
+            painted = partial(PaintedLight.of, [x.painting for x in views], most=GAMUT_PIXELS)
+            gamuts = Gamuts(painted, _power(views), self._basis.present_weights)
+            within, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
+        else:
+            within.gamuts.repainted()
+        self._within = within
+        return within
+
+    def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
+        """Return the best weights (n, 3) of what constraints leave, near those to begin with."""
+        method, reduction = self._fit.method, self._within
+        if not reduction.white_knobs:
+            self._within, found = solve_near_sides(equations, reduction, start, method=method)
+            return found
+        start = snap_to_whites(reduction, start)
+        wide = center_windows(reduction, start, WHITE_WIDTH)
+        start = solve_reduced(equations, wide, start, method=method).weights
+        reduction = center_windows(reduction, start)
+        how: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
+        return next_whites(equations, reduction, start, **how)[1].weights
 
     def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`; the part of the colours is found once.
@@ -199,18 +228,3 @@ def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) 
     weights = snap_to_whites(reduction, weights)
     reduction = center_windows(reduction, weights)
     return solve_reduced(to_present(_power(views), weights), reduction, weights).weights
-
-
-def _best(
-    equations: NormalEquations, reduction: Reduction, start: Doubles, method: Method
-) -> Doubles:
-    """The best weights (n, 3) of what constraints leave, near those to begin with."""
-    if not reduction.white_knobs:
-        return next_whites(equations, reduction, start, method=method)[1].weights
-    start = snap_to_whites(reduction, start)
-    near = solve_reduced(
-        equations, center_windows(reduction, start, WHITE_WIDTH), start, method=method
-    )
-    reduction = center_windows(reduction, near.weights)
-    how: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
-    return next_whites(equations, reduction, near.weights, **how)[1].weights

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from lightpaint.lighting.constraints.on_locus import tangent
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.whites import white_where_free
 from lightpaint.lighting.fit import Fit, Space, meant_by
-from lightpaint.lighting.gamuts import Gamuts, PaintedLight, gamuts_of
+from lightpaint.lighting.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -325,7 +325,7 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
         (one, target.image, _with_colour(target))
         for one, target in zip(views.bases, views.targets, strict=True)
     ]
-    return gamuts_of(PaintedLight.of(its), basis.power, basis.present_weights)
+    return Gamuts(partial(PaintedLight.of, its), basis.power, basis.present_weights)
 
 
 def _with_colour(target: Target) -> Floats:

@@ -39,8 +39,8 @@ class Knob:
     limit: coefficients, least and most of a sum over its unknowns, if one is limited.
     whites: the range of white of a light that keeps to one. window: between which of these its two
     unknowns mix at present (on_locus.py).
-    gamut: the colours of a light that keeps to some, but has any as long as that makes no
-    difference (on_locus.py).
+    gamut: the colours that the light mixes, if it would otherwise leave them: all of them, or those
+    towards one `side` (near_sides.py).
     """
 
     lights: tuple[int, ...]
@@ -49,6 +49,7 @@ class Knob:
     whites: WhiteRange | None = None
     window: tuple[int, int] = (0, 0)
     gamut: ColorHull | None = None
+    side: int | None = None
 
     @cached_property
     def is_free(self) -> bool:
@@ -74,15 +75,15 @@ class Knob:
         assert self.whites is not None
         return self._mixing(self.whites.tangent(self.window, reach), self.window)
 
-    def within_gamut(self) -> "Knob":
-        """Return the knob as a mix of the primaries of its gamut."""
-        assert self.gamut is not None
-        [light], primaries = self.lights, self.gamut.primaries
+    def within_gamut(self, gamut: ColorHull, side: int | None = None) -> "Knob":
+        """Return the knob as a mix of the primaries of a gamut. side: of the part towards it."""
+        [light] = self.lights
+        primaries = gamut.primaries if side is None else gamut.fan(side)
         limit = self.limit
         if limit is not None:
             limit = ((1.0,) * len(primaries), *limit[1:])
         unknowns = tuple(Unknown(((light, rgb),)) for rgb in primaries)
-        return replace(self, unknowns=unknowns, limit=limit)
+        return replace(self, unknowns=unknowns, limit=limit, gamut=gamut, side=side)
 
     def _mixing(self, colors: Doubles, window: tuple[int, int]) -> "Knob":
         [light] = self.lights

@@ -93,7 +93,7 @@ def next_whites(
     groups = _groups(reduction, only)
     found = solve_reduced(equations, reduction, _snap(groups, start), **how)
     for _ in range(steps):
-        beyond = _beyond_gamuts(reduction, found.weights)
+        beyond = beyond_gamuts(reduction, found.weights)
         windows = {} if beyond else _better(equations, reduction, groups, found)
         if not (windows or beyond):
             break
@@ -118,27 +118,29 @@ def snap_to_whites(reduction: Reduction, weights: Doubles) -> Doubles:
     return _snap(_groups(reduction), weights) if reduction.white_knobs else weights
 
 
-def _beyond_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
+def beyond_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
     """Return places of knobs whose lights have colours, in weights (n, 3), beyond their gamuts.
 
     Lights first have any colour: where all of these are of their gamuts, the answer is the best
     of these, too, and has fewer unknowns.
     """
-    found = []
-    for k in reduction.gamut_knobs:
-        knob = reduction.knobs[k]
-        assert knob.gamut is not None
-        if not knob.gamut.has(weights[knob.lights[0]]):
-            found.append(k)
-    return found
+    if not (its := reduction.gamut_knobs):
+        return []
+    assert reduction.gamuts is not None
+    lights = [reduction.knobs[k].lights[0] for k in its]
+    beyond = reduction.gamuts.beyond(weights, np.array(lights))
+    return [k for k, light in zip(its, lights, strict=True) if light in beyond]
 
 
 def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) with the nearest colour of its gamut for lights that keep to one."""
+    its, gamuts = reduction.gamut_knobs + reduction.kept_knobs, reduction.gamuts
+    if gamuts is None or not its:
+        return weights
     moved = weights.copy()
-    for knob in reduction.knobs:
-        if knob.gamut is not None:
-            moved[knob.lights[0]] = knob.gamut.nearest(weights[knob.lights[0]])
+    lights = np.array([reduction.knobs[k].lights[0] for k in its])
+    for light in gamuts.beyond(weights, lights):
+        moved[light] = gamuts[light].nearest(weights[light])
     return moved
 
 

@@ -22,6 +22,9 @@ from lightpaint.threads import side_by_side
 #: Pull of what reaches nothing in one channel towards its start, beside its other channels.
 FAINT = 1e-8
 
+#: Determinant of the colours that a light mixes, beside their size, below which they are too alike.
+SINGULAR = 1e-6
+
 #: Distance from a bound, beside the light's other values, that is round-off of a start.
 NEAR = 1e-12
 
@@ -203,9 +206,18 @@ def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
             its = wanted / np.square(kind.columns).sum(axis=2)
         else:
             squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
-            begin = np.clip(0, low, high)
-            found = minimise_each(squares, wanted, lower=low, upper=high, start=begin)
-            its = np.stack([optimum.x for optimum in found])
+            its = _mixed_of(kind.columns, present)
+            out = np.flatnonzero(~((its >= low) & (its <= high)).all(axis=1))
+            if out.size:
+                low_out, high_out = low[out], high[out]
+                found = minimise_each(
+                    squares[out],
+                    wanted[out],
+                    lower=low_out,
+                    upper=high_out,
+                    start=np.clip(0, low_out, high_out),
+                )
+                its[out] = np.stack([optimum.x for optimum in found])
         x[kind.places] = _within(its, low, high)
     for stack in reduction.stacks:
         a, its, now = stack.coefficients, stack.its, (stack.coefficients * x[stack.its]).sum(axis=1)
@@ -217,6 +229,20 @@ def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
             knob = reduction.knobs[k]
             if not (knob.is_free or reached[knob.lights[0]]):
                 x[list(reduction.places[k])] = _limited(knob, start)
+    return x
+
+
+def _mixed_of(columns: Doubles, emission: Doubles) -> Doubles:
+    """Return the x (k, u) with C x = emission, (k, e); nan where C is not square or singular.
+
+    columns: (k, u, e), C transposed.
+    """
+    x = np.full(columns.shape[:2], np.nan)
+    if columns.shape[1] == columns.shape[2]:
+        size = np.abs(columns).max(axis=(1, 2)) ** columns.shape[1]
+        regular = np.abs(np.linalg.det(columns)) > SINGULAR * size
+        C = columns[regular].swapaxes(1, 2)
+        x[regular] = np.linalg.solve(C, emission[regular, :, None])[..., 0]
     return x
 
 

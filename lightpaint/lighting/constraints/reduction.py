@@ -16,7 +16,6 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.basis import BasisLight
-from lightpaint.colour.hull import ColorHull
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
 from lightpaint.lighting.constraints.blocks import Alike, Block, Entries, Kind, Stack
@@ -29,6 +28,7 @@ from lightpaint.lighting.constraints.knobs import (
     mix_of,
     tie_of,
 )
+from lightpaint.lighting.gamuts import Gamuts
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,14 @@ class Reduction:
     labels: for each light what is asked of it in few words; "" for nothing.
     knobs: their unknowns one after the other are the x.
     is_joined: whether something beside these couples the channels, a pull to colours.
+    gamuts: colours that lights keep to of which nothing else is asked.
     """
 
     held: Doubles
     labels: tuple[str, ...]
     knobs: tuple[Knob, ...]
     is_joined: bool = False
+    gamuts: Gamuts | None = None
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -67,22 +69,33 @@ class Reduction:
         )
 
     @cached_property
+    def kept_knobs(self) -> tuple[int, ...]:
+        """Places of the knobs that are kept within their gamuts."""
+        return tuple(k for k, knob in enumerate(self.knobs) if knob.gamut is not None)
+
+    @cached_property
     def gamut_knobs(self) -> tuple[int, ...]:
         """Places of the knobs that keep to a gamut, and as yet have any colour."""
-        its = enumerate(self.knobs)
-        return tuple(k for k, knob in its if knob.gamut is not None and knob.is_free)
+        if self.gamuts is None:
+            return ()
+        return tuple(k for k, knob in enumerate(self.knobs) if _has_any_colour(knob))
 
-    def with_gamuts(self, gamuts: Sequence[ColorHull]) -> "Reduction":
-        """Return the same with lights of any colour keeping to `gamuts`, one for each light."""
-        knobs = [
-            replace(knob, gamut=gamuts[knob.lights[0]]) if _has_any_colour(knob) else knob
-            for knob in self.knobs
-        ]
-        return replace(self, knobs=tuple(knobs))
+    def with_gamuts(self, gamuts: Gamuts) -> "Reduction":
+        """Return the same with lights of any colour keeping to `gamuts`."""
+        return replace(self, gamuts=gamuts)
 
     def kept_within(self, places: Collection[int]) -> "Reduction":
         """Return the same with these knobs, by their places, within their gamuts."""
-        knobs = [knob.within_gamut() if k in places else knob for k, knob in enumerate(self.knobs)]
+        return self.kept_near(dict.fromkeys(places))
+
+    def kept_near(self, sides: Mapping[int, int | None]) -> "Reduction":
+        """Return the same with knobs, by their places, within their gamuts towards some side."""
+        if not sides:
+            return self
+        knobs = [*self.knobs]
+        for k, side in sides.items():
+            assert self.gamuts is not None
+            knobs[k] = knobs[k].within_gamut(self.gamuts[knobs[k].lights[0]], side)
         return replace(self, knobs=tuple(knobs))
 
     def with_windows(self, windows: Mapping[int, tuple[int, int]]) -> "Reduction":
