@@ -31,6 +31,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from http.client import HTTPConnection
@@ -55,6 +56,9 @@ from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
 ARGUMENTS = ["--no-sandbox"]
+
+#: Paint, as what it multiplies light by: the lamps' own colours make the first, not the other.
+BRIGHTER, GREENER = (1.05, 1.05, 1.05), (0.95, 1.08, 0.95)
 
 #: Watches a page: when the last move or press of the pointer was, of which of them an answer knows,
 #: and when that is drawn.
@@ -157,20 +161,27 @@ def print_session(case: tuple[int, ...]) -> None:
     basis = made_up(n, height, width)
     held = {"light 0": {"lock": True}, "light 1": {"limits": {"min": 0.2, "max": 0.7}}}
     print(f"Python's part of a stroke, {n} lights at {width}x{height}, 64 x 64 pixels, ms")
-    print(f"{'':28s} {'colour':>8s} {'importance':>11s}")
-    for name, fit, asked in (
-        ("literal", {"literal": True}, {}),
-        ("linear, held, gentle", {"space": "linear"}, {}),
-        ("linear, a lock, a limit", {"space": "linear"}, held),
-        ("display, as by default", {}, {}),
-        ("display, a lock, a limit", {}, held),
+    print(f"{'':30s} {'colour':>6s} {'importance':>11s}")
+    for name, fit, asked, paint in (
+        ("literal", {"literal": True}, {}, BRIGHTER),
+        ("linear, held, gentle", {"space": "linear"}, {}, BRIGHTER),
+        ("linear, a lock, a limit", {"space": "linear"}, held, BRIGHTER),
+        ("linear, beyond lamps' colours", {"space": "linear"}, {}, GREENER),
+        ("display, as by default", {}, {}, BRIGHTER),
+        ("display, a lock, a limit", {}, held, BRIGHTER),
+        ("display, beyond lamps' colours", {}, {}, GREENER),
+        ("white", {"colors": "white"}, {}, BRIGHTER),
     ):
-        colour, importance = (stroke_ms(basis, fit, asked, x) for x in (False, True))
-        print(f"{name:28s} {colour:8.1f} {importance:11.1f}")
+        colour, importance = (stroke_ms(basis, fit, asked, paint, x) for x in (False, True))
+        print(f"{name:30s} {colour:6.1f} {importance:11.1f}", flush=True)
 
 
-def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance: bool) -> float:
-    """Median of what `Live` takes for one more piece of a stroke."""
+def stroke_ms(
+    basis: lp.Basis, fit: dict[str, Any], asked: Any, paint: Sequence[float], with_importance: bool
+) -> float:
+    """Return the median of what `Live` takes for one more piece of a stroke, which multiplies the
+    light by `paint`, (3,).
+    """
     height = basis.size[0]
     image, importance = basis.present_look.copy(), np.zeros(basis.size, np.float32)
     importance[: height // 2] = 0.5
@@ -185,7 +196,7 @@ def stroke_ms(basis: lp.Basis, fit: dict[str, Any], asked: Any, with_importance:
     for k in range(40):
         region = slice(8 + 3 * k, 72 + 3 * k), slice(8 + 5 * k, 72 + 5 * k)
         begin = time.perf_counter()
-        image[region] *= 1.05
+        image[region] *= paint
         if with_importance:
             importance[region] = 0.5 + 0.01 * k
         view.painted(region, with_importance=with_importance)

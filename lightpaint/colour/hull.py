@@ -14,8 +14,12 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.locus import uv_of, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
-#: Directions in which a polygon is bounded, (k, 2), of length 1.
-DIRECTIONS = np.stack([(np.cos(a), np.sin(a)) for a in np.arange(12) * (np.pi / 6)])
+#: Directions in which a polygon is bounded, in degrees: closer where it is the curve of whites that
+#: ends it towards green.
+DEGREES = (0, 30, 60, 90, 120, 135, 150, 165, 180, 210, 240, 270, 300, 330)
+
+#: The same as vectors, (k, 2), of length 1.
+DIRECTIONS = np.stack([np.cos(np.deg2rad(DEGREES)), np.sin(np.deg2rad(DEGREES))], axis=1)
 
 #: Distance beyond a bound that is round-off, in (u', v').
 ROUND_OFF = 1e-9

@@ -3,7 +3,7 @@
 A lamp that hardly shines, or whose light comes off a coloured surface, can lower what is missed by
 colours that nobody painted: a little green that makes up for other lamps. So of each lamp the light
 is limited to mixes of its own colour, of whites, and of the light that the painting asks for where
-the lamp counts: painted Ψ, beside what white lamps as bright as those there are would make.
+the lamp counts: as much redder or bluer than the lamps' light there as painted Ψ is than the look.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,8 +29,12 @@ from lightpaint.lighting.constraints.whites import WHITES
 #: Part of the painted light beyond which what is painted says nothing: noise, edges of strokes.
 OUTLYING = 0.05
 
-#: By how much colours may leave what is painted, in (u', v'): people paint hues that much off.
-MARGIN = 0.01
+#: By how much a lamp's colour may leave its own and whites, in (u', v'): less than is called green.
+MARGIN = 0.004
+
+#: By how much it may leave what is painted, at most: people paint hues that much off. It is twice
+#: as far as the paint itself leaves whites, since whoever paints white means white.
+PAINTED_MARGIN = 0.01
 
 #: What a bound is rounded to, in (u', v'): less than people see; it lasts while one paints.
 STEP = 0.001
@@ -109,7 +113,9 @@ class Gamuts:
         if light not in self._found:
             if self._wanted is None:
                 self._wanted = _WantedLight.of(self._light(), self._power, self._present)
-            reach = np.maximum(self._reach[light], self._wanted.reach(light)) + MARGIN
+            own, wanted = self._reach[light], self._wanted.reach(light)
+            beside = np.clip(2 * (wanted - own), MARGIN, PAINTED_MARGIN)
+            reach = np.maximum(own + MARGIN, wanted + beside)
             reach = np.round(reach / STEP) * STEP
             found, before = ColorHull(reach, self._own[light]), self._before.get(light)
             is_same = before is not None and np.array_equal(before.reach, reach)
@@ -131,10 +137,10 @@ class Gamuts:
 
 @dataclass(frozen=True)
 class _WantedLight:
-    """What is painted beside what white lamps as bright as those there are would make there.
+    """The light that some painted pixels ask for.
 
-    along: (p, k), how far the colours of some painted pixels reach in each direction, in CIE 1976
-    (u', v'). share: (n, p), how much each pixel says of a lamp's light.
+    along: (p, k), how far its colours reach in each direction, in CIE 1976 (u', v'). share: (n, p),
+    how much each pixel says of a lamp's light.
     """
 
     along: Doubles
@@ -142,19 +148,19 @@ class _WantedLight:
 
     @classmethod
     def of(cls, light: PaintedLight, power: Doubles, present: Doubles) -> "_WantedLight":
-        """Find it for lamps of such ‖Φᵢ‖² and weights now, (n, 3)."""
-        size = np.sqrt(power.sum(axis=1))
-        now = np.asarray(luminance(present))
+        """Find it for lamps of such ‖Φᵢ‖² and weights now, (n, 3); one that is off is faint."""
+        size, now = np.sqrt(power.sum(axis=1)), np.asarray(luminance(present))
         faint = FAINT * (now * size).mean() / np.where(size > 0, size, np.inf)
-        lit = np.maximum(now, faint)[:, None, None] * light.rows
-        total, painted = lit.sum(axis=0), np.asarray(luminance(light.image))
-        dark = DARK * np.percentile(luminance(total), 95) if len(total) else 0.0
-        counts = (total.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (painted > dark)
-        wanted = light.image[counts] / total[counts]
+        lamps = np.where(now[:, None] > 0, present / np.where(now > 0, now, 1)[:, None], 1.0)
+        lit = (np.maximum(now, faint)[:, None] * lamps)[:, None] * light.rows
+        look, painted = lit.sum(axis=0), np.asarray(luminance(light.image))
+        dark = DARK * np.percentile(luminance(look), 95) if len(look) else 0.0
+        counts = (look.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (painted > dark)
+        share = np.asarray(luminance(lit[:, counts]) / luminance(look[counts]), np.float64)
+        wanted = light.image[counts] / look[counts] * (share.T @ lamps)
         # What is dim is seen the more: display values are near the root of light.
         weight = light.weight[counts] * np.sqrt(painted[counts])
-        share = luminance(lit[:, counts]) / luminance(total[counts]) * weight
-        return cls(chromaticity(wanted) @ DIRECTIONS.T, np.asarray(share, np.float64))
+        return cls(chromaticity(wanted) @ DIRECTIONS.T, share * weight)
 
     @cached_property
     def _order(self) -> Indices:

@@ -41,3 +41,21 @@ def test_black_and_its_own_colour_are_as_they_are() -> None:
     assert hull.has(np.zeros(3))
     for rgb in (np.zeros(3), WHITE, 3 * kelvin_to_rgb(2700)):
         np.testing.assert_array_equal(hull.nearest(rgb), rgb)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_colour_is_a_mix_of_one_fan_or_beyond_its_side(seed: int) -> None:
+    """The middle and both ends of a side mix it; what is beyond takes less than 0 of the middle."""
+    hull, rng = _hull(), np.random.default_rng(seed)
+    for _ in range(100):
+        rgb = rng.exponential(1, 3)
+        mixed = np.linalg.solve(hull.fan(hull.side_towards(rgb)).T, rgb)
+        assert (mixed[1:] >= -1e-9).all()
+        assert hull.has(rgb) == (mixed[0] >= -1e-9)
+
+
+def test_fans_share_their_ends() -> None:
+    hull = _hull()
+    for side in range(-1, len(hull.primaries)):
+        np.testing.assert_array_equal(hull.fan(side)[2], hull.fan(side + 1)[1])
+        np.testing.assert_array_equal(hull.fan(side)[0], hull.primaries.mean(axis=0))

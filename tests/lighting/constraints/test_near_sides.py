@@ -1,0 +1,88 @@
+"""Lamps at the bounds of their gamuts under the brush: side by side to the same optimum."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.colour.hull import ColorHull, reach_of
+from lightpaint.colour.whites import white_range
+from lightpaint.lighting.constraints import near_sides
+from lightpaint.lighting.constraints.near_sides import solve_near_sides
+from lightpaint.lighting.constraints.on_locus import next_whites
+from lightpaint.lighting.constraints.reduced_problem import nearest, solve_reduced
+from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.problem import reduced_by
+
+SIZE = (9, 8)
+
+
+def _problem(make_basis: Any, seed: int, n: int = 5) -> tuple[NormalEquations, Reduction, Any]:
+    """A painting of colours that whites do not reach, under a basis of lamps that keep to some."""
+    rng = np.random.default_rng(seed)
+    basis = make_basis(n, SIZE, seed=seed, emission=rng.uniform(0.5, 1, (n, 3)).tolist())
+    wanted = basis.mix(rng.exponential(1, (n, 3)) * (1, 1, 0.3)).astype(np.float32)
+    weight = rng.random(SIZE).astype(np.float32)
+    present = basis.present_weights
+    gamuts = Gamuts(
+        # The look is what is painted: no colours but their own, and whites.
+        lambda: PaintedLight.of([(basis, basis.present_look, weight)]),
+        basis.power,
+        present,
+    )
+    reduction = reduced_by(lp.Constraints(), basis, lp.Fit(colors="gentle"), gamuts)
+    equations = NormalEquations.of(basis, wanted, weight)
+    return equations, reduction, present
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_sides_lead_to_the_optimum_over_whole_gamuts(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """That of mixes of all corners, which is certified."""
+    monkeypatch.setattr(near_sides, "TURNS", 60)
+    equations, reduction, present = _problem(make_basis, seed)
+    whole, best = next_whites(equations, reduction, present)
+    assert best.converged
+    assert whole.kept_knobs  # else there is nothing to keep within anything
+    kept, weights = solve_near_sides(equations, reduction, present, method="polished")
+    assert not (reduction.gamuts or Gamuts).beyond(weights, np.arange(len(present)))  # type: ignore[arg-type]
+    value, least = (equations.objective(w).sum() for w in (weights, best.weights))
+    round_off = 1e-9 * equations.target_norm2.sum()
+    assert value == pytest.approx(least, abs=round_off)
+    # And from there it stays.
+    again, same = solve_near_sides(equations, kept, weights, method="polished")
+    assert [knob.side for knob in again.knobs] == [knob.side for knob in kept.knobs]
+    np.testing.assert_allclose(same, weights, rtol=1e-9, atol=1e-9)
+
+
+def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
+    equations, reduction, present = _problem(make_basis, 1)
+    gamuts = reduction.gamuts
+    assert gamuts is not None
+    kept, before = solve_near_sides(equations, reduction, present, method="polished")
+    k = kept.kept_knobs[0]
+    gamuts.repainted()
+    same, _ = solve_near_sides(equations, kept, before, method="polished")
+    assert same.knobs[k].gamut is kept.knobs[k].gamut  # nothing else was painted
+    # Now whites alone, without its own colour and the margin.
+    narrow = reach_of(white_range(3000, 6500).colors)
+    gamuts.repainted()
+    gamuts._found[kept.knobs[k].lights[0]] = ColorHull(narrow, np.ones(3))
+    after, weights = solve_near_sides(equations, kept, before, method="polished")
+    light = after.knobs[k].lights[0]
+    assert gamuts[light].has(weights[light])
+    assert not gamuts[light].has(before[light])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mixes_of_three_colours_are_found_again(make_basis: Any, seed: int) -> None:
+    """The x of an emission that three colours make are those that it was made with."""
+    equations, reduction, present = _problem(make_basis, seed)
+    kept, weights = solve_near_sides(equations, reduction, present, method="polished")
+    found = solve_reduced(equations, kept, weights)
+    x = nearest(kept, kept.weights(found.x), np.ones(len(present), bool))
+    np.testing.assert_allclose(kept.weights(x), kept.weights(found.x), rtol=1e-9, atol=1e-12)
