@@ -3,7 +3,8 @@
 A lamp that hardly shines, or whose light comes off a coloured surface, can lower what is missed by
 colours that nobody painted: a little green that makes up for other lamps. So of each lamp the light
 is limited to mixes of its own colour, of whites, and of the light that the painting asks for where
-the lamp counts: as much redder or bluer than the lamps' light there as painted Ψ is than the look.
+the lamp counts: as much redder or bluer than the lamps' light there as painted Ψ is than the look,
+and no more so than Ψ is than the surface.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +30,7 @@ from lightpaint.lighting.constraints.whites import WHITES
 #: Part of the painted light beyond which what is painted says nothing: noise, edges of strokes.
 OUTLYING = 0.05
 
-#: By how much a lamp's colour may leave its own and whites, in (u', v'): less than is called green.
+#: By how much a lamp's colour may leave whites, in (u', v'): less than is called green.
 MARGIN = 0.004
 
 #: By how much it may leave what is painted, at most: people paint hues that much off. It is twice
@@ -52,14 +53,22 @@ SEARCHED = 2**5
 #: Brightness, beside that of the mean lamp, at which a lamp counts that is off.
 FAINT = 0.01
 
+#: Albedo below which painted light is not known by it.
+BLACK = 0.02
+
 
 @dataclass(frozen=True)
 class PaintedLight:
-    """Some of the painted pixels. rows: (n, p, 3), Φ. image: (p, 3), Ψ. weight: (p,)."""
+    """Some of the painted pixels.
+
+    rows: (n, p, 3), Φ. image: (p, 3), Ψ. weight: (p,). albedo: (p, 3), of what is seen, 1 where it
+    is not known.
+    """
 
     rows: Floats
     image: Floats
     weight: Floats
+    albedo: Floats
 
     @classmethod
     def of(
@@ -72,13 +81,20 @@ class PaintedLight:
         """
         its = [_painted_pixels(importance, most) for _, _, importance in views]
         step = max(1, sum(x.size for x in its) // most)
-        rows, image, weight = [], [], []
+        rows, image, weight, albedo = [], [], [], []
         for (basis, painting, importance), where in zip(views, its, strict=True):
             some = where[::step]
             rows.append(basis.images.reshape(len(basis.images), -1, 3)[:, some])
             image.append(painting.reshape(-1, 3)[some])
             weight.append(importance.ravel()[some])
-        return cls(np.concatenate(rows, axis=1), np.concatenate(image), np.concatenate(weight))
+            known = None if basis.features is None else basis.features.albedo.reshape(-1, 3)[some]
+            albedo.append(np.ones((some.size, 3), np.float32) if known is None else known)
+        return cls(
+            np.concatenate(rows, axis=1),
+            np.concatenate(image),
+            np.concatenate(weight),
+            np.concatenate(albedo),
+        )
 
 
 def _painted_pixels(importance: Floats, most: int) -> Indices:
@@ -102,9 +118,10 @@ class Gamuts:
     def __init__(self, light: Callable[[], PaintedLight], power: Doubles, present: Doubles) -> None:
         self._light, self._power, self._present = light, power, present
         self._own = np.where(luminance(present)[:, None] > 0, present, 1.0)
-        white = reach_of(white_range(*WHITES).colors)
-        self._reach = np.maximum(chromaticity(self._own) @ DIRECTIONS.T, white)
-        self._sides = sides_of(self._reach + MARGIN - STEP)
+        # Its own colour is within its gamut, and not at the edge of it.
+        own = chromaticity(self._own) @ DIRECTIONS.T + 2 * STEP
+        self._reach = np.maximum(own, reach_of(white_range(*WHITES).colors) + MARGIN)
+        self._sides = sides_of(self._reach - STEP)
         self._wanted: _WantedLight | None = None
         self._found: dict[int, ColorHull] = {}
         self._before: dict[int, ColorHull] = {}
@@ -114,8 +131,8 @@ class Gamuts:
             if self._wanted is None:
                 self._wanted = _WantedLight.of(self._light(), self._power, self._present)
             own, wanted = self._reach[light], self._wanted.reach(light)
-            beside = np.clip(2 * (wanted - own), MARGIN, PAINTED_MARGIN)
-            reach = np.maximum(own + MARGIN, wanted + beside)
+            beside = np.clip(2 * (wanted - own + MARGIN), MARGIN, PAINTED_MARGIN)
+            reach = np.maximum(own, wanted + beside)
             reach = np.round(reach / STEP) * STEP
             found, before = ColorHull(reach, self._own[light]), self._before.get(light)
             is_same = before is not None and np.array_equal(before.reach, reach)
@@ -160,7 +177,14 @@ class _WantedLight:
         wanted = light.image[counts] / look[counts] * (share.T @ lamps)
         # What is dim is seen the more: display values are near the root of light.
         weight = light.weight[counts] * np.sqrt(painted[counts])
-        return cls(chromaticity(wanted) @ DIRECTIONS.T, share * weight)
+        along = chromaticity(wanted) @ DIRECTIONS.T
+        # What makes up for light off coloured surfaces was not painted: the paint itself is no
+        # greener than that.
+        albedo = light.albedo[counts]
+        known = albedo.min(axis=1) > BLACK
+        itself = light.image[counts][known] / albedo[known]
+        along[known] = np.minimum(along[known], chromaticity(itself) @ DIRECTIONS.T)
+        return cls(along, share * weight)
 
     @cached_property
     def _order(self) -> Indices:

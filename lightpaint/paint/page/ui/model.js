@@ -190,7 +190,7 @@ export function first() {
     about: 'spot',
     colour: ofKelvin(3200),
     stops: 0,
-    second: { colour: [0.35, 0.6, 1], stops: 0 },
+    second: { colour: ofKelvin(12000), stops: 0 },
     recent: [],
     mixer: 'white',
     asking: null,
