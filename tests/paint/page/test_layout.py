@@ -277,6 +277,17 @@ def test_nothing_is_cut_off(opened: Any, size: tuple[int, int]) -> None:
         assert cut_off(painter) == []
 
 
+@pytest.mark.parametrize("size", [(1280, 720), (1024, 768)])
+def test_numbers_show_all_their_digits(opened: Any, size: tuple[int, int]) -> None:
+    """Also the second colour that a painter begins with, 12000 K."""
+    painter = opened("", viewport={"width": size[0], "height": size[1]})
+    painter.page.keyboard.press("x")
+    fields = painter.page.locator(".lightpaint .number input:visible")
+    assert "12000" in fields.evaluate_all("(all) => all.map((one) => one.value)")
+    cut = "(all) => all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.value)"
+    assert fields.evaluate_all(cut) == []
+
+
 @pytest.mark.parametrize("size", [(853, 480), (1024, 768), (1280, 720), (1600, 900)])
 def test_without_panels_pictures_have_all_there_is(opened: Any, size: tuple[int, int]) -> None:
     painter = opened(viewport=dict(zip(("width", "height"), size, strict=True)))
