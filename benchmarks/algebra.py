@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced

@@ -24,8 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file import write_basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.bases import InParts
 from lightpaint.batch.cluster import Cluster
 from lightpaint.batch.engine import Engine, InProcess

@@ -16,7 +16,8 @@ import argparse
 import numpy as np
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.lights import BasisLight
 
 SIZE = (36, 64)
 

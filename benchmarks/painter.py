@@ -43,8 +43,9 @@ import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 import lightpaint as lp
-from lightpaint.basis.basis import BasisLight, Origin
-from lightpaint.lighting.fit import meant_by
+from lightpaint.basis.basis import Origin
+from lightpaint.basis.lights import BasisLight
+from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.paint.launch import at_hand
@@ -53,7 +54,6 @@ from lightpaint.paint.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings
-from lightpaint.target.target import Target
 
 ARGUMENTS = ["--no-sandbox"]
 
@@ -185,11 +185,7 @@ def stroke_ms(
     height = basis.size[0]
     image, importance = basis.present_look.copy(), np.zeros(basis.size, np.float32)
     importance[: height // 2] = 0.5
-    one = np.ones((1, 1), np.float32)
-    transform = lp.ViewTransform()
-    over = Target("", np.zeros((1, 1, 3), np.float32), one, False, transform=transform,
-                  through_view=True, over_look=True)  # fmt: skip
-    meant = meant_by(Settings(**fit), [over])
+    meant = resolve_fit(Settings(**fit), over_look=True, through_view=True)
     view = LiveView(basis, image, importance)
     live = Live([view], fit=meant, constraints=lp.Constraints.of(asked))
     weights, times = live.answer(basis.present_weights), []

@@ -1,10 +1,12 @@
 """Types of the arrays that walk between the rooms. No library stands behind them but NumPy."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+_Kind = TypeVar("_Kind", bound=np.generic)
 
 #: Pixels and what is computed of them, of whichever precision.
 Floats = npt.NDArray[np.floating[Any]]
@@ -29,6 +31,12 @@ def largest(image: Floats) -> Floats:
     """The largest of the three channels, (…), of (…, 3): a fifth of the time of max(axis=-1)."""
     red, green, blue = (image[..., c] for c in range(3))
     return np.asarray(np.maximum(np.maximum(red, green), blue))
+
+
+def read_only(array: npt.NDArray[_Kind]) -> npt.NDArray[_Kind]:
+    """Return `array`, which none of those who share it may change from now on."""
+    array.flags.writeable = False
+    return array
 
 
 def as_rgb(values: Iterable[Any]) -> RGB:

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file import write_basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.images.exr import write_rgb
 
 #: Looks of every kind that needs no renderer.

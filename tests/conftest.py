@@ -18,7 +18,8 @@ from hypothesis import settings
 from renderer import write_room
 from threadpoolctl import threadpool_limits
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.render import render_basis
 from lightpaint.scene.scene import Scene, load_scene
 

@@ -3,80 +3,29 @@
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import RGB, Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, read_only
+from lightpaint.basis.lights import Lights
 from lightpaint.colour.color import luminance
 from lightpaint.colour.exposure import choose_exposure
 from lightpaint.errors import BasisError
-from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
 from lightpaint.images.denoise import Features
 from lightpaint.images.objects import Objects
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights_file import Asked
-from lightpaint.screen import Listed, Shown, some_names, some_of
+from lightpaint.screen import Shown, some_names, some_of
 from lightpaint.tables import CHANNELS, by_channel, pandas, xarray
 from lightpaint.version import __version__
-
-_Kind = TypeVar("_Kind", bound=np.generic)
 
 #: Pixels of all lights that are brought to double precision at a time.
 BLOCK = 2**13
 
 #: Most samples of a pixel, which is beyond any render.
 MAX_SAMPLES = 2**40
-
-
-@dataclass(frozen=True)
-class BasisLight:
-    """What a basis knows of a light.
-
-    parameter, unit: what one unit of weight is (`radiance`, `W/(m² sr)`).
-    emission: its present RGB emission in the scene, in that unit.
-    form: its place and size, for people.
-    is_scalar: whether it can only be scaled as a whole, and has one weight for all channels.
-    is_fixed: whether it is what stays as it is: its weight is 1, whatever is painted.
-    members: names of the emitters it consists of; itself if none are given.
-    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
-    """
-
-    name: str
-    plugin: str
-    parameter: str
-    unit: str
-    emission: RGB
-    form: str = ""
-    is_scalar: bool = False
-    is_fixed: bool = False
-    members: tuple[str, ...] = ()
-    unit_flux: RGB | None = None
-
-    def __post_init__(self) -> None:
-        if len(self.name) > MAX_NAME:
-            raise BasisError(f"a light has a name of more than {MAX_NAME} characters")
-        if not self.members:
-            object.__setattr__(self, "members", (self.name,))
-        if self.is_fixed and self.emission != (1, 1, 1):
-            raise BasisError(f"light {self.name!r} is kept, and its emission is not 1")
-        if not all(map(is_amount, self.emission)):
-            raise BasisError(
-                f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
-                f"from 0 to {BRIGHTEST:g}"
-            )
-        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
-            raise BasisError(
-                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: need "
-                f"three numbers from 0 to {BRIGHTEST:g}"
-            )
-
-    def __repr__(self) -> str:
-        emission = " ".join(f"{v:.4g}" for v in self.emission)
-        kept = ", kept" if self.is_fixed else ""
-        what = " ".join(filter(None, (self.plugin, self.parameter, emission, self.unit)))
-        return f"BasisLight({self.name!r}, {what}{kept})"
 
 
 #: How the method of light groups begins; the renderer follows.
@@ -125,7 +74,8 @@ class Basis(Shown):
     """The images of a scene lit by one light at a time.
 
     Attributes:
-        lights: n of them; their order is the order of everything else.
+        lights: The table of n lights, which may be given as a sequence of them; their order is the
+            order of everything else.
         images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
         half_differences: (n, h, w, 3) float32, half the difference of two independent halves of the
             samples: the noise of `images`. Where an interrupt left the halves unequal, it
@@ -134,8 +84,6 @@ class Basis(Shown):
         origin: Where it comes from: scene, sensor, seed, samples.
         learned: (2, cells, emitters) float32, what the renderer found out on the way about which
             emitter matters where, or None. Going on needs it, nobody else.
-        asked: What the lights file of the scene asks of the lights, for whoever solves; of memory
-            only, since that file may change.
         features: Albedo and normals of what is seen, to denoise pictures by, or None.
         objects: Whose surfaces are seen, or None.
         source: Path of the file that it was read from, or of the scene that it was rendered of, for
@@ -150,13 +98,12 @@ class Basis(Shown):
         (16, 16, 3)
     """
 
-    lights: tuple[BasisLight, ...]
+    lights: Lights
     images: Floats
     half_differences: Floats
     emitters_seen: Bools
     origin: Origin
     learned: Floats | None = None
-    asked: Asked = field(default_factory=Asked)
     features: Features | None = None
     objects: Objects | None = None
     source: str = field(default="", compare=False)
@@ -164,7 +111,7 @@ class Basis(Shown):
 
     def __post_init__(self) -> None:
         n = len(self.lights)
-        object.__setattr__(self, "lights", Listed(self.lights))
+        object.__setattr__(self, "lights", Lights.of(self.lights))
         if self.images.ndim != 4 or self.images.shape[0] != n or self.images.shape[3] != 3:
             shape = self.images.shape
             raise BasisError(f"images of shape {shape} for {n} lights: need (n, h, w, 3)")
@@ -176,8 +123,6 @@ class Basis(Shown):
             raise BasisError("albedo and normals have another size than the images")
         if self.objects is not None and self.objects.size != self.size:
             raise BasisError("the picture of objects has another size than the images")
-        if len(set(self.names)) != n:
-            raise BasisError(f"light names repeat: {some_names(self.names)}")
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 
@@ -234,10 +179,10 @@ class Basis(Shown):
             },
         )
 
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the lights, in the order of the images."""
-        return tuple(light.name for light in self.lights)
+        return self.lights.names
 
     def image(self, name: str) -> Floats:
         """The image of the light called `name`, (h, w, 3). Raises BasisError if there is none."""
@@ -247,7 +192,12 @@ class Basis(Shown):
 
     def asking(self, asked: Asked) -> "Basis":
         """This basis, of whose lights that is asked."""
-        return self if self.asked == asked else replace(self, asked=asked)
+        return self if self.asked == asked else replace(self, lights=self.lights.asking(asked))
+
+    @property
+    def asked(self) -> Asked:
+        """What the lights file of its scene asks of the lights."""
+        return self.lights.asked
 
     @property
     def size(self) -> tuple[int, int]:
@@ -259,31 +209,31 @@ class Basis(Shown):
         """Whether `half_differences` tell the noise: not where nobody knows of any samples."""
         return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
-    @cached_property
+    @property
     def present_weights(self) -> Doubles:
         """(n, 3) weights of the scene as it is."""
-        return _kept(np.array([light.emission for light in self.lights], dtype=np.float64))
+        return self.lights.present_weights
 
     @cached_property
     def present_look(self) -> npt.NDArray[np.float32]:
         """The scene as it is, (h, w, 3)."""
-        return _kept(self.mix(self.present_weights))
+        return read_only(self.mix(self.present_weights))
 
-    @cached_property
+    @property
     def is_fixed(self) -> Bools:
         """(n,), which lights stay as they are, with weight 1."""
-        return _kept(np.array([light.is_fixed for light in self.lights], dtype=bool))
+        return self.lights.is_fixed
 
     @cached_property
     def power(self) -> Doubles:
         """‖Φᵢ‖² over the picture, (n, 3) float64; where an emitter is seen, nothing counts."""
         counted = (~self.emitters_seen.ravel()).astype(np.float64)
-        return _kept(self._sums(counted, is_squared=True))
+        return read_only(self._sums(counted, is_squared=True))
 
     @cached_property
     def totals(self) -> Doubles:
         """Σ_pixels Φᵢ, (n, 3) float64, over all of the picture."""
-        return _kept(self._sums(np.ones(self.images[0, ..., 0].size)))
+        return read_only(self._sums(np.ones(self.images[0, ..., 0].size)))
 
     def _sums(self, counted: Doubles, *, is_squared: bool = False) -> Doubles:
         """Σ_pixels counted · Φᵢ, or its square, (n, 3). counted: (pixels,)."""
@@ -326,12 +276,6 @@ def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
     rows = images.reshape(n, height, width * 3)
     mixed = np.einsum("nhk,nk->hk", rows, along_row)
     return np.asarray(mixed.reshape(height, width, 3), np.float32)
-
-
-def _kept(array: npt.NDArray[_Kind]) -> npt.NDArray[_Kind]:
-    """Not to be changed by one of those who share it."""
-    array.flags.writeable = False
-    return array
 
 
 def free_name(name: str, taken: Collection[str]) -> str:

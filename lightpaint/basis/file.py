@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, BasisLight, Origin, free_name
+from lightpaint.basis.basis import Basis, Origin, free_name
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
+from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
 from lightpaint.images.denoise import Features
@@ -142,7 +143,7 @@ def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
         check(checksums.origin, "origin", head[ORIGIN_KEY], {})
     try:
         basis = Basis(
-            lights=tuple(lights[k] for k in order),
+            lights=Lights(tuple(lights[k] for k in order)),
             images=_stacked([lit[k] for k in order]),
             half_differences=_stacked([lit[k] for k in order], HALF_DIFFERENCE),
             emitters_seen=seen[0] > 0,

@@ -22,8 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import cache as bases
-from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache_folder import KNOWN, folder, is_own
+from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
 from lightpaint.records import read_record, strict_json
@@ -32,7 +33,7 @@ from lightpaint.scene.lights_file import Asked
 from lightpaint.scene.scene import Scene
 from lightpaint.version import __version__
 
-FORMAT = "lightpaint-known 1"
+FORMAT = "lightpaint-known 2"
 
 #: Seconds before a scene was read in which none of its files may have been written: clocks of
 #: disks are as coarse as that.
@@ -50,7 +51,7 @@ class Known:
     """What is known of a scene without loading it.
 
     identity, sensor, size: by which its basis is kept. spp: samples that it asks for. path: as
-    `Scene.path`. lights: as its basis has them. asked: what it asks of them. remarks: what was
+    `Scene.path`. lights: as its basis has them. remarks: what was
     worth saying of it when it was loaded.
     """
 
@@ -59,8 +60,7 @@ class Known:
     size: tuple[int, int]
     spp: int
     path: str
-    lights: tuple[BasisLight, ...]
-    asked: Asked
+    lights: Lights
     remarks: tuple[str, ...]
 
 
@@ -84,10 +84,11 @@ def recall(key: str) -> Known | None:
                 continue
             said = strict_json(file.read_text("utf-8"))
             if said["format"] == FORMAT and _is_as_it_was(said["places"], said["texts"]):
-                its = {**said["known"], "asked": Asked(**said["known"]["asked"])}
+                its = said["known"]
                 its |= {name: tuple(its[name]) for name in ("size", "remarks")}
-                lights = (read_record(BasisLight, light) for light in its["lights"])
-                return Known(**{**its, "lights": tuple(lights)})
+                lights = tuple(read_record(BasisLight, light) for light in its["lights"]["each"])
+                asked = Asked(**its["lights"]["asked"])
+                return Known(**{**its, "lights": Lights(lights, asked)})
     return None
 
 
@@ -111,8 +112,7 @@ def remember(
         scene.size,
         scene.spp,
         str(scene.path),
-        basis.lights,
-        scene.asked,
+        basis.lights.asking(scene.asked),
         tuple(remarks),
     )
     try:
@@ -129,7 +129,7 @@ def remember(
             "known": asdict(known),
         }
         text = json.dumps(said, allow_nan=False)
-        if strict_json(text)["known"]["asked"] != asdict(known.asked):
+        if strict_json(text)["known"]["lights"]["asked"] != asdict(scene.asked):
             return False  # TOML knows values that JSON does not
         write_text(bases.place_beside(basis, f".{key}{KNOWN}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
 from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.linear import solve_linear
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of
 from lightpaint.relit.relight import relight, settle
@@ -15,25 +17,34 @@ from lightpaint.relit.relight import relight, settle
 def answer_by_sums(job: Job, basis: Basis) -> None:
     """Solve with a basis that is at hand, of which nothing but sums is looked at."""
     [view] = job.views
+    basis = basis if view.scene is None else basis.asking(view.scene.asked)
+    if not basis.knows_noise:
+        # Only pixels tell what rounding alone has made (see lighting/traces.py).
+        problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
+        leave_lighting(job, solution_of(problem).lighting)
+        return
     sums = sums_of(basis, view.target, slice(None), job.fit)
-    pixel = np.zeros((len(basis.lights), 1, 1, 3), np.float32)
-    about = replace(
-        basis,
-        images=pixel,
-        half_differences=pixel,
-        emitters_seen=np.zeros((1, 1), bool),
-        learned=None,
-        features=None,
-        objects=None,
+    origin = basis.origin
+    leave_lights(job, basis.lights, sums, scene_identity=origin.scene_identity, spp=origin.spp)
+
+
+def leave_lights(job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int) -> None:
+    """Solve, and leave the lighting. Others as of `problem_of_sums`."""
+    problem = problem_of_sums(
+        lights,
+        job.views[0].target.name,
+        sums,
+        constraints=job.asked,
+        fit=job.fit,
+        scene_identity=scene_identity,
+        spp=spp,
     )
-    leave_lights(job, about if view.scene is None else about.asking(view.scene.asked), sums)
+    leave_lighting(job, solve_linear(problem, problem.start).lighting)
 
 
-def leave_lights(job: Job, about: Basis, sums: Sums) -> None:
-    """Solve, and write the lighting, and the scene that has it. about: as of `problem_of_sums`."""
+def leave_lighting(job: Job, lighting: Lighting) -> None:
+    """Write the lighting, and the scene that has it."""
     [view] = job.views
-    problem = problem_of_sums(about, view.target.name, sums, constraints=job.asked, fit=job.fit)
-    lighting = solution_of(problem).lighting
     lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
     with job.results.filled() as folder:
         write_lighting(folder / "lighting.json", lighting)

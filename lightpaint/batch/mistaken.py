@@ -5,8 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from lightpaint.basis.basis import BasisLight
 from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.batch.entries import Entry
 from lightpaint.batch.held import Held

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import IN_PARTS, basis_lights, origin_of
 from lightpaint.basis.render.sums import mean_and_half_difference
@@ -10,7 +9,6 @@ from lightpaint.batch.errands import SumsOfRows
 from lightpaint.batch.held import Held
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.sums import Sums, sums_of
-from lightpaint.scene.scene import Scene
 
 
 def sums_of_rows(errand: SumsOfRows, held: Held) -> list[Sums]:
@@ -27,21 +25,9 @@ def sums_of_rows(errand: SumsOfRows, held: Held) -> list[Sums]:
     assert seen is not None
     images, half_differences = mean_and_half_difference(halves, spp)
     rows = slice(errand.parts[0].top, errand.parts[0].bottom)
-    basis = about_lights(scene, errand.seed, (spp[0], spp[1]), images, half_differences, seen > 0)
+    origin = origin_of(scene, errand.seed, IN_PARTS, (spp[0], spp[1]), (1, 1))
+    basis = Basis(basis_lights(scene), images, half_differences, seen > 0, origin)
     return [
         sums_of(basis, held.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
         for wanted in errand.paintings
     ]
-
-
-def about_lights(
-    scene: Scene,
-    seed: int,
-    halves: tuple[int, int],
-    images: Floats,
-    half_differences: Floats,
-    seen: Bools,
-) -> Basis:
-    """A basis of the scene's lights, of these pixels. halves: samples per pixel of each."""
-    origin = origin_of(scene, seed, IN_PARTS, halves, (1, 1))
-    return Basis(basis_lights(scene), images, half_differences, seen, origin, asked=scene.asked)

@@ -4,16 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from lightpaint.basis.render.parts import Part, plan_parts
+from lightpaint.basis.render.render import basis_lights
 from lightpaint.batch.bases import lesson_by
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.errands import Done, Film, SumsOfRows, Wanted
 from lightpaint.batch.estimate import rendered_s
 from lightpaint.batch.held import Held
 from lightpaint.batch.lights import leave_lights
-from lightpaint.batch.rows import about_lights
 from lightpaint.batch.spool import Spool
 from lightpaint.batch.task import Task
 from lightpaint.batch.work import attempted, fields_of
@@ -103,9 +101,7 @@ def _write(job: Job, sums: Sums) -> None:
     assert scene is not None
     asked = samples(job.settings.quality, spp=job.settings.spp, time_s=None)
     half = -(-(scene.spp if asked is None else asked) // 2)
-    nothing = np.zeros((len(scene.lights), 1, 1, 3), np.float32)
-    seed, seen = job.settings.seed, np.zeros((1, 1), bool)
-    leave_lights(job, about_lights(scene, seed, (half, half), nothing, nothing, seen), sums)
+    leave_lights(job, basis_lights(scene), sums, scene_identity=scene.identity, spp=2 * half)
 
 
 def _file_of(job: Job) -> Painting:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.cli import terminal
 from lightpaint.cli.options import BY_OPTION
 from lightpaint.cli.tables import spoken_agreement

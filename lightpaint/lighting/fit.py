@@ -1,6 +1,6 @@
 """What it is to be close to a painting, and how the closest lighting is found."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, TypeVar
 
@@ -106,8 +106,28 @@ def meant_by(fit: F, targets: Sequence[Target]) -> F:
     Raises TargetError if they were seen through different transforms, and it does not say which
     counts.
     """
-    over_look = not fit.literal and any(target.over_look for target in targets)
-    on_display = not fit.literal and any(target.through_view for target in targets)
+    return resolve_fit(
+        fit,
+        over_look=any(target.over_look for target in targets),
+        through_view=any(target.through_view for target in targets),
+        display=lambda: _display_of(targets),
+    )
+
+
+def resolve_fit(
+    fit: F,
+    *,
+    over_look: bool = False,
+    through_view: bool = False,
+    display: Callable[[], ViewTransform] = ViewTransform,
+) -> F:
+    """Return `fit` with all that it leaves open decided, by how something is painted.
+
+    over_look: over the current look. through_view: through a view of a display. display: the view
+    transform, asked for where it matters.
+    """
+    over_look = over_look and not fit.literal
+    on_display = through_view and not fit.literal
     is_seen = on_display or (fit.transform is not None and not fit.literal)
     space: Space = fit.space or ("display" if is_seen else "linear")
     return replace(
@@ -115,7 +135,7 @@ def meant_by(fit: F, targets: Sequence[Target]) -> F:
         space=space,
         hold=fit.hold if fit.hold is not None else HOLD * (over_look and not fit.unpainted),
         colors=fit.colors or ("gentle" if over_look or on_display else "free"),
-        transform=None if space == "linear" else fit.transform or _display_of(targets),
+        transform=None if space == "linear" else fit.transform or display(),
     )
 
 

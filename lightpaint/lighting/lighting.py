@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
-from lightpaint.basis.basis import Basis, BasisLight, mix
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.expected import BRIGHTEST
@@ -206,18 +207,21 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     @keywords()
     def of_weights(
         cls,
-        basis: Basis,
+        lights: Basis | Lights,
         weights: Doubles,
         *,
         asked: Sequence[tuple[str, bool]] | None = None,
         reached: Bools | None = None,
         **about: Any,
     ) -> "Lighting":
-        """From weights (n, 3) in the order of `basis`.
+        """From weights (n, 3) in the order of `lights`, which may be those of a basis.
 
         asked: of each light its `constraint` and whether that `is_active`. reached: (n, 3).
         """
-        lights, count = basis.lights, len(basis.lights)
+        if isinstance(lights, Basis):
+            about.setdefault("scene_identity", lights.origin.scene_identity)
+            lights = lights.lights
+        count = len(lights)
         told = np.ones((count, 3), dtype=bool) if reached is None else reached
         settings = tuple(
             _setting(light, as_rgb(weight), one, (bool(its[0]), bool(its[1]), bool(its[2])))
@@ -225,7 +229,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 lights, weights, asked or [("", False)] * count, told, strict=True
             )
         )
-        return cls(settings, scene_identity=basis.origin.scene_identity, **about)
+        return cls(settings, **about)
 
     @classmethod
     @keywords()
@@ -233,27 +237,29 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         """The scene's lighting as it is."""
         return cls.of_weights(basis, basis.present_weights)
 
-    def weights_for(self, basis: Basis) -> Doubles:
-        """(n, 3) weights in the order of `basis`.
+    def weights_for(self, lights: Basis | Lights) -> Doubles:
+        """(n, 3) weights in the order of `lights`, which may be those of a basis.
 
         Raises LightingError if the two do not name the same lights.
         """
         given = {light.name: light.weight for light in self.lights}
-        if set(given) != set(basis.names):
-            missing = sorted(set(basis.names) - set(given))
-            unknown = sorted(set(given) - set(basis.names))
+        if isinstance(lights, Basis):
+            lights = lights.lights
+        if set(given) != set(lights.names):
+            missing = sorted(set(lights.names) - set(given))
+            unknown = sorted(set(given) - set(lights.names))
             raise LightingError(
                 "lighting and basis name different lights: "
                 f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
             )
-        for light in basis.lights:
+        for light in lights:
             if set(light.members) != set(self.members[light.name]):
                 raise LightingError(
                     f"light {light.name!r} is not the same in both: of "
                     f"{some_names(self.members[light.name])} in the lighting, of "
                     f"{some_names(light.members)} in the basis"
                 )
-        return np.array([given[name] for name in basis.names], dtype=np.float64)
+        return np.array([given[name] for name in lights.names], dtype=np.float64)
 
 
 @keywords()

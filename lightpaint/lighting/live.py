@@ -32,10 +32,10 @@ from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.live_sums import FILM, Films, SmallFilm
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import reduced_by
 from lightpaint.lighting.pull import dimming_of, drawn_more, pull_of, to_present
 
 #: Steps between whites for one answer, at most: the next answer goes on.
@@ -66,7 +66,7 @@ class Live:
 
     def asks(self, fit: Fit, constraints: Constraints) -> None:
         """Go on with these. Raises ConstraintError for what is impossible."""
-        reduction = reduced_by(constraints, self._basis, fit)
+        reduction = reduced_by(constraints, self._basis.lights, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._pulls: _Pulls | None = None
         self._untouched: Doubles | None = None

@@ -10,15 +10,17 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
+from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.on_locus import tangent
-from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
-from lightpaint.lighting.constraints.whites import white_where_free
+from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.fit import Fit, Space, meant_by
 from lightpaint.lighting.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.linear_problem import LinearProblem, reduced_by
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -32,7 +34,7 @@ from lightpaint.lighting.painting import (
     what_counts,
     with_emitters_read,
 )
-from lightpaint.lighting.pull import pull_of
+from lightpaint.lighting.traces import without_traces
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
@@ -60,7 +62,7 @@ class Refinement:
 
 @keywords()
 @dataclass(frozen=True)
-class Problem:
+class Problem(LinearProblem):
     """A loss over the pictures that a basis can make, and what the lights may do.
 
     Attributes:
@@ -154,7 +156,7 @@ class Problem:
             painted=lambda: painted_light(views),
             current=lambda: whole.mix(whole.present_weights),
         )
-        reduction = reduced_by(asked, whole, fit, gamuts_for(whole, views, fit))
+        reduction = reduced_by(asked, whole.lights, fit, gamuts_for(whole, views, fit))
         return cls(
             basis=whole,
             views=views,
@@ -172,6 +174,35 @@ class Problem:
     def name(self) -> str:
         """What was painted, for people."""
         return " + ".join(target.name for target in self.views.targets)
+
+    @property
+    def lights(self) -> Lights:
+        """Those of the basis."""
+        return self.basis.lights
+
+    @property
+    def power(self) -> Doubles:
+        """‖Φᵢ‖² over the picture, (n, 3)."""
+        return self.basis.power
+
+    @property
+    def scene_identity(self) -> str:
+        """The scene that the basis is of."""
+        return self.basis.origin.scene_identity
+
+    @property
+    def spp(self) -> int | None:
+        """Samples per pixel of the basis, of the first of several; None where nobody knows."""
+        return self.basis.origin.spp if self.basis.knows_noise else None
+
+    @property
+    def transform(self) -> ViewTransform | None:
+        """The view transform through which the loss is seen; None for linear light."""
+        return self.loss.transform
+
+    def without_traces(self, weights: Doubles, is_asked: Bools) -> Doubles:
+        """Weights (n, 3) in which what shows in no pixel is 0. is_asked: (n,), whose are kept."""
+        return without_traces(self.basis, weights, self.squares.image, is_asked=is_asked)
 
     @property
     def is_linear(self) -> bool:
@@ -193,50 +224,11 @@ class Problem:
         """`reduction` where an answer is asked about: whites of a range along a straight line."""
         return tangent(self.reduction, REACH)
 
-    def reduced(self, reduction: Reduction) -> "Problem":
-        """This problem with that reduction, which differs in the whites that lights came to."""
-        if self.reduction is self.full:
-            return replace(self, reduction=reduction, full=reduction)
-        windows = {k: reduction.knobs[k].window for k in reduction.white_knobs}
-        return replace(self, reduction=reduction, full=self.full.with_windows(windows))
-
-    @property
-    def solved(self) -> NormalEquations:
-        """The equations that the weights are to solve, noise taken out where that was asked."""
-        return self.equations if self.corrected is None else self.corrected
-
     @cached_property
     def painted_share(self) -> float:
         """Importance of all that is painted, beside the number of pixels."""
         painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
         return painted / sum(x.importance.size for x in self.views.targets)
-
-    @property
-    def pull_strength(self) -> float:
-        """That of the pull to the present, of light as bright as the view transform makes it."""
-        return self.constraints.prefer_current * self.fit.brightness
-
-    @property
-    def keeps_color(self) -> Bools:
-        """(n,), the lights that are pulled to their colour: free to leave it, and seen to."""
-        return self.full.is_free & self.equations.reached.any(axis=1)
-
-    @cached_property
-    def pull(self) -> NormalEquations | None:
-        """What pulls to the present, or to the present colours, adds; None where none is asked."""
-        return pull_of(
-            self.basis.power,
-            self.basis.present_weights,
-            self.fit,
-            prefer_current=self.constraints.prefer_current,
-            painted_share=self.painted_share,
-            keeps_color=self.keeps_color,
-            dimming=self.dimming,
-        )
-
-    def pulled(self, equations: NormalEquations) -> NormalEquations:
-        """`equations` with what pulls at the weights, if something does."""
-        return equations if self.pull is None else equations + self.pull
 
     @property
     def norm2(self) -> Doubles:
@@ -298,7 +290,7 @@ class Problem:
         painting.paint(view, region, image, importance, at_least)
         word, reduction = replace(painting.word), self.full
         if (gamuts := gamuts_for(self.basis, painting.views, self.fit)) is not None:
-            reduction = reduced_by(self.constraints, self.basis, self.fit, gamuts)
+            reduction = reduced_by(self.constraints, self.lights, self.fit, gamuts)
         return replace(
             self,
             views=painting.views,
@@ -333,20 +325,6 @@ def _with_colour(target: Target) -> Floats:
     if target.at_least is None:
         return target.importance
     return np.where(target.at_least.any(axis=-1), np.float32(0), target.importance)
-
-
-def reduced_by(
-    asked: Constraints, basis: Basis, fit: Fit, gamuts: Gamuts | None = None
-) -> Reduction:
-    """What constraints leave of the lights, and the fit of their colours.
-
-    gamuts: as of `gamuts_for`. Raises ConstraintError for a light that is to be white and cannot be
-    what else is asked of it.
-    """
-    if fit.colors == "white":
-        asked = white_where_free(asked, basis.lights)
-    reduction = replace(reduce_to(asked, basis.lights), is_joined=fit.colors == "gentle")
-    return reduction if gamuts is None else reduction.with_gamuts(gamuts)
 
 
 def _bases(given: Any) -> list[Basis]:

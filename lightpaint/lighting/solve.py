@@ -4,25 +4,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from lightpaint.arrays import Bools, Doubles, as_rgb
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.approach import near_optimum
 from lightpaint.lighting.binning import BinnedPixels, binned_pixels, block_side
-from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.on_locus import next_whites, solve_on_locus
+from lightpaint.lighting.constraints.on_locus import next_whites
 from lightpaint.lighting.constraints.reduced_problem import (
     ReducedOptimum,
-    problems,
     solve_reduced,
 )
-from lightpaint.lighting.constraints.reduction import only
-from lightpaint.lighting.constraints.sparse import best_knobs
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.linear import Answer, answer_of, solve_linear, solve_reduction
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import PaintingLoss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -30,13 +25,8 @@ from lightpaint.lighting.pixels import image_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.pull import dimming_of, to_present
 from lightpaint.lighting.reweighted import Asked, Descent, descend, value_of
-from lightpaint.lighting.software import Software
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.traces import without_traces
 from lightpaint.target.target import Target
-
-#: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
-PULL = 1e-7
 
 #: Times that lights go on to other whites, of a loss that is no linear problem, at most, and the
 #: part of it that this has to gain.
@@ -173,30 +163,16 @@ def again(solution: Solution, problem: Problem) -> Solution:
 
 def _linear(problem: Problem, start: Doubles) -> Solution:
     """The solution of the squares. With `sparse`, of the best lights in it."""
-    count = problem.constraints.sparse
-    if count is None or not problem.full.knobs:
-        return _one(problem, start)
-    equations, curve = problem.pulled(problem.solved), []
-    path = best_knobs(problems(equations, problem.full), problem.full, count)
-    for chosen in path:
-        _, found = solve_on_locus(equations, only(problem.full, chosen), start)
-        curve.append((len(chosen), found.weights))
-    best = max((chosen for chosen in path if len(chosen) <= count), key=len)
-    solution = _one(replace(problem, reduction=only(problem.full, best)), start)
-    # What was chosen and has come out dark is left out as well.
-    on = [k for k, x in enumerate(problem.full.knobs) if solution.weights[list(x.lights)].any()]
-    left = replace(solution.problem, reduction=only(solution.problem.full, on))
-    solution = replace(solution, problem=left, tried=tuple(curve))
-    norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
-    told = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
-    return solution.told(curve=tuple(told))
+    return _solution(solve_linear(problem, start))
 
 
 def _one(problem: Problem, start: Doubles, reached: Bools | None = None) -> Solution:
-    """The solution of the squares as the reduction has the lights. reached: as of `_solution`."""
-    equations, method = problem.pulled(problem.solved), problem.fit.method
-    reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
-    return _solution(problem.reduced(reduction), optimum, optimum.weights, equations, reached)
+    """The solution of the squares as the reduction has the lights. reached: as of `answer_of`."""
+    return _solution(solve_reduction(problem, start, reached))
+
+
+def _solution(answer: Answer[Problem]) -> Solution:
+    return Solution(answer.problem, answer.lighting, answer.tried)
 
 
 def _descended(
@@ -209,7 +185,7 @@ def _descended(
 ) -> Solution:
     """Descend from weights (n, 3) within what is asked to the least of the loss.
 
-    reached: as of `_solution`. blocks: as of `_blocks_of`. is_near: whether the start is near the
+    reached: as of `answer_of`. blocks: as of `_blocks_of`. is_near: whether the start is near the
     least. Which whites are mixed by lights that keep to a range of them, and which lights are kept
     within their gamuts, stays as the reduction has it while the loss falls, and is decided anew
     where it is least.
@@ -286,7 +262,7 @@ def _descended_between(
     else:
         solved = replace(problem, squares=found.squares, equations=found.equations)
     equations = solved.pulled(solved.solved)
-    solution = _solution(solved, optimum, found.weights, equations, reached)
+    solution = _solution(answer_of(solved, optimum, found.weights, equations, reached))
     converged = optimum.converged and found.reweighting.converged
     told = solution.told(converged=converged, rounds=1 + found.reweighting.rounds)
     return replace(told, reweighting=found.reweighting)
@@ -318,64 +294,6 @@ def _of_blocks(problem: Problem, found: Descent, blocks: BinnedPixels) -> Proble
         noise_removed=1 - 1 / blocks.side**2,
         block_side=blocks.side,
     )
-
-
-def _solution(
-    problem: Problem,
-    optimum: ReducedOptimum,
-    weights: Doubles,
-    equations: NormalEquations,
-    reached: Bools | None = None,
-) -> Solution:
-    """The weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull.
-
-    reached: (n, 3), what lights reach where that is known from before: in the last linear problem
-    of a loss it may be less.
-    """
-    reached = optimum.reached if reached is None else reached
-    transform, names = problem.loss.transform, problem.basis.names
-    labels = problem.reduction.labels
-    is_asked = np.array([bool(label) for label in labels], dtype=bool)
-    weights = without_traces(problem.basis, weights, problem.squares.image, is_asked=is_asked)
-    certificate = Certificate(
-        kkt_residual=as_rgb(optimum.kkt_residual),
-        objective=(0, 0, 0),
-        relative_objective=(0, 0, 0),
-        sweeps=optimum.sweeps,
-        converged=optimum.converged,
-        unreached=tuple(n for n, ok in zip(names, reached, strict=True) if not ok.any()),
-        display="" if transform is None else transform.spoken,
-        hold=problem.fit.hold or 0.0,
-        colors=problem.fit.colors or "free",
-        noise_removed=problem.noise_removed,
-        software=Software.here(),
-        basis_spp=problem.basis.origin.spp if problem.basis.knows_noise else None,
-    ).of(problem.objective(weights), problem.norm2)
-    asked = [(label, False) for label in labels]
-    if any(labels):
-        held = _held_back(equations, problem.basis, optimum.weights)
-        asked = [(label, bool(label) and bool(h)) for label, h in zip(labels, held, strict=True)]
-    about: dict[str, Any] = {"target": problem.name, "certificate": certificate}
-    lighting = Lighting.of_weights(problem.basis, weights, asked=asked, reached=reached, **about)
-    return Solution(problem, lighting)
-
-
-def _held_back(equations: NormalEquations, basis: Basis, weights: Doubles) -> Bools:
-    """(n,), whether a light would change if it alone were let go.
-
-    The gradient g = M w − b must vanish for a free light that is on, and may not be
-    negative for one that is off; where it does not do so, something holds the light.
-    """
-    lit = equations.reached
-    power = np.where(lit, np.einsum("cii->ic", equations.M), 0)
-    g = np.where(lit, equations.gradient(weights), 0)
-    size = np.abs(equations.b.T[lit] / np.sqrt(power[lit])).max(initial=0) or 1.0
-    # Of what has one weight for all channels they pull together.
-    scalar = np.array([light.is_scalar for light in basis.lights], dtype=bool)
-    g[scalar], power[scalar] = (x[scalar].sum(axis=1, keepdims=True) for x in (g, power))
-    root = np.sqrt(np.where(power > 0, power, 1))
-    violation = np.abs(np.minimum(weights * root, g / root))
-    return np.asarray((violation > PULL * size).any(axis=1))
 
 
 def _of_all(constraints: Constraints) -> Constraints:

@@ -10,15 +10,14 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
-from lightpaint.lighting.fit import Fit, meant_by
-from lightpaint.lighting.loss import Squares
+from lightpaint.lighting.fit import Fit, meant_by, resolve_fit
+from lightpaint.lighting.linear_problem import SummedProblem, reduced_by
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.painting import left_out
-from lightpaint.lighting.problem import Problem, reduced_by
-from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
 
@@ -68,34 +67,37 @@ def importance_of(target: Target, seen: Bools, rows: slice, fit: Fit) -> Floats:
 
 
 def problem_of_sums(
-    about: Basis, name: str, sums: Sums, *, constraints: Constraints, fit: Fit
-) -> Problem:
-    """The problem whose sums these are.
+    lights: Lights,
+    name: str,
+    sums: Sums,
+    *,
+    constraints: Constraints,
+    fit: Fit,
+    scene_identity: str = "",
+    spp: int | None = None,
+) -> SummedProblem:
+    """Return the problem whose sums these are.
 
-    about: what is known of the lights, with images of one pixel, which mean nothing.
-    name: of the target. Raises TargetError if nothing counts.
+    name: of the target. scene_identity, spp: as of `LinearProblem`. Raises TargetError if nothing
+    counts.
     """
     if not sums.equations.target_norm2.any() and not sums.equations.M.any():
         raise TargetError(
             f"target {name}: no light reaches a painted pixel that counts; paint others, too, or "
             'pass emitters="count"'
         )
-    vars(about)["power"] = sums.power
-    nothing, counts = np.zeros((1, 1, 3), np.float32), np.ones((1, 1), np.float32)
-    target = Target(name, nothing, counts, everything=False)
-    fit = meant_by(fit, [target])
-    asked = constraints_of(about.asked).and_then(constraints)
-    word = Squares(nothing, counts[..., None], 0 * counts[..., None])
-    reduction = reduced_by(asked, about, fit)
-    return Problem(
-        basis=about,
-        views=Views((about,), (target,)),
-        loss=word,
-        squares=word,
+    asked, fit = constraints_of(lights.asked).and_then(constraints), resolve_fit(fit)
+    reduction = reduced_by(asked, lights, fit)
+    return SummedProblem(
+        name=name,
+        lights=lights,
+        power=sums.power,
         equations=sums.equations,
         constraints=asked,
         reduction=reduction,
         full=reduction,
-        start=about.present_weights,
         fit=fit,
+        start=lights.present_weights,
+        scene_identity=scene_identity,
+        spp=spp,
     )

@@ -1,21 +1,17 @@
 """What is asked in a session beside the paint, and the answer that follows both under the hand."""
 
 from collections.abc import Sequence
-from typing import Any
-
-import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
-from lightpaint.lighting.fit import meant_by
+from lightpaint.lighting.fit import resolve_fit
+from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
-from lightpaint.lighting.problem import reduced_by
 from lightpaint.paint.wishes import Wishes
 from lightpaint.settings import Settings
-from lightpaint.target.target import Target
 
 
 class Answering:
@@ -83,7 +79,7 @@ class Answering:
 
     def check(self, wishes: Wishes) -> None:
         """Raise LightpaintError for what cannot be asked, before anything is changed."""
-        reduced_by(self._constraints(wishes), self._basis, self._fit(wishes))
+        reduced_by(self._constraints(wishes), self._basis.lights, self._fit(wishes))
 
     def ask(self, wishes: Wishes) -> None:
         """This from now on; a slider that moved has come to rest."""
@@ -112,11 +108,10 @@ class Answering:
         self.weights = self._live.answer(self.weights)
 
     def _fit(self, wishes: Wishes) -> Settings:
-        # A target as those of a session are, for what follows from that.
-        one, black = np.ones((1, 1), np.float32), np.zeros((1, 1, 3), np.float32)
-        how: dict[str, Any] = {"through_view": True, "over_look": True}
-        target = Target("painting", black, one, False, transform=self._transform, **how)
-        return meant_by(wishes.settings(self._settings), [target])
+        settings = wishes.settings(self._settings)
+        return resolve_fit(
+            settings, over_look=True, through_view=True, display=lambda: self._transform
+        )
 
     def _constraints(self, wishes: Wishes) -> Constraints:
         asked = constraints_of(self._basis.asked).and_then(self._given)

@@ -75,7 +75,7 @@ def subject_of(
     file_length(Path(source.path), "scene file", SceneError)
     opening = Opening(source, settings)
     if (known := opening.known) is not None:
-        reduce_to(constraints_of(known.asked).and_then(constraints), known.lights)
+        reduce_to(constraints_of(known.lights.asked).and_then(constraints), known.lights)
 
     def check(scene: Scene) -> None:
         from lightpaint.basis.render.render import basis_lights

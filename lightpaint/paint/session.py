@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import LightpaintError, NothingToUndoError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints

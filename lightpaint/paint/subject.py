@@ -123,7 +123,7 @@ class Subject:
             return None
         if kept.features is None or kept.objects is None:  # by an earlier version
             return None
-        return replace(kept, lights=known.lights, asked=known.asked)
+        return replace(kept, lights=known.lights)
 
     def _obtained(self, spp: int, progress: Progress) -> Basis:
         from lightpaint.basis.render.obtain import obtain_basis

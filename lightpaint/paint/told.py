@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, as_rgb
-from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analyse import Analysis

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.addressing import asked_of_each, tied_lights
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -9,7 +9,8 @@ from html import escape
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats
-from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.photometry import Photometry

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis, BasisLight
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.browser import bundled, styles
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display import to_8_bit

@@ -77,7 +77,6 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
         scene.spp,
         str(scene.path),
         basis_lights(scene),
-        scene.asked,
         ("one",),
     )
     [entry] = cache.entries()

@@ -19,7 +19,8 @@ from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.solve import solution_of, solve
+from lightpaint.lighting.linear import solve_linear
+from lightpaint.lighting.solve import solve
 from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of, why_not_by_sums
 from lightpaint.scene.threads import limit_threads
 from lightpaint.target.target import Target
@@ -38,10 +39,10 @@ def cut(basis: Basis, rows: slice) -> Basis:
 
 
 def of_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
-    about = cut(basis, slice(0, 1))
     constraints = asked.pop("constraints", Constraints())
     fit = Fit(literal=True, **asked)
-    return solution_of(problem_of_sums(about, "it", sums, constraints=constraints, fit=fit)).weights
+    problem = problem_of_sums(basis.lights, "it", sums, constraints=constraints, fit=fit)
+    return solve_linear(problem, problem.start).weights
 
 
 @pytest.mark.parametrize(

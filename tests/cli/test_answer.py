@@ -12,8 +12,8 @@ import pytest
 from command import run, succeed
 from rich.cells import cell_len
 
-from lightpaint.basis.basis import BasisLight
 from lightpaint.basis.file import write_basis
+from lightpaint.basis.lights import BasisLight
 from lightpaint.cli import main, terminal
 from lightpaint.cli.answer import _what_holds, change
 from lightpaint.cli.options import BY_OPTION

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from light_groups import pictures
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.traces import without_traces

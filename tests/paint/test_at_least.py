@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import lightpaint as lp
-from lightpaint.basis.basis import BasisLight, Origin
+from lightpaint.basis.basis import Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.images.exr import Part, write_parts
 from lightpaint.paint import cells, protocol
 from lightpaint.paint.looks import Looks

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.basis.basis import BasisLight, Origin
+from lightpaint.basis.basis import Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.cli.spelling import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import LIGHT_GROUPS, Basis, BasisLight, Origin, free_name
+from lightpaint.basis.basis import LIGHT_GROUPS, Basis, Origin, free_name
 from lightpaint.basis.lightgroups.beauty import NOTHING, shares, spoken_share, spoken_sum
 from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import FILES
 from lightpaint.basis.lightgroups.roles import Roles, roles_of
+from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
@@ -226,7 +227,7 @@ def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.
         )
         images[-1] = first.in_rec709(rest)
     return Basis(
-        lights=tuple(made),
+        lights=Lights(tuple(made)),
         images=images,
         half_differences=np.zeros_like(images),
         emitters_seen=np.zeros(holes.shape, dtype=bool),

@@ -57,8 +57,7 @@ def obtain_basis(
 
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
-        lights, source = basis_lights(scene), str(scene.path)
-        start = replace(start, lights=lights, asked=scene.asked, source=source)
+        start = replace(start, lights=basis_lights(scene), source=str(scene.path))
     basis = render(
         scene,
         spp=spp,

@@ -259,7 +259,7 @@ class PartSums:
                 origin_of(scene, self._seed, method_of(scene), (0, 0), (0, 0)),
                 **self._lights.counts(),
             )
-            made = Basis(lights, images, half_differences, seen, origin, asked=scene.asked)
+            made = Basis(lights, images, half_differences, seen, origin)
         else:
             halves = (self._spp[0], self._spp[1])
             images, half_differences = mean_and_half_difference(self._halves, halves)
@@ -270,7 +270,7 @@ class PartSums:
             plan = plan_passes(height * width, sum(halves))
             counts = sum(half == 0 for half, _ in plan), sum(half == 1 for half, _ in plan)
             origin = origin_of(scene, self._seed, IN_PARTS, halves, counts)
-            made = Basis(lights, images, half_differences, seen, origin, learned, scene.asked)
+            made = Basis(lights, images, half_differences, seen, origin, learned)
         if start is not None:
             made = replace(made, features=start.features, objects=start.objects)
         return with_first_hits(made, scene, self._seed)

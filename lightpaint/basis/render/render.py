@@ -4,7 +4,8 @@ import gc
 from collections.abc import Callable
 from dataclasses import replace
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.render.budget import Budget, Keeper, passes
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.separate import (
@@ -201,9 +202,9 @@ def origin_of(
     )
 
 
-def basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
-    """What a basis says of the lights of `scene`."""
-    return tuple(
+def basis_lights(scene: Scene) -> Lights:
+    """Return what a basis says of the lights of `scene`, and what its lights file asks of them."""
+    lights = tuple(
         BasisLight(
             x.name,
             x.plugin,
@@ -218,6 +219,7 @@ def basis_lights(scene: Scene) -> tuple[BasisLight, ...]:
         )
         for x in scene.lights
     )
+    return Lights(lights, scene.asked)
 
 
 @MITSUBA.taken()
@@ -248,7 +250,6 @@ def _render_together(
             sums.emitters_seen(),
             origin_of(scene, seed, ONE_PASS, halves, passes),
             tracer.guide.learned(),
-            scene.asked,
             source=str(scene.path),
         )
 
@@ -296,8 +297,8 @@ def _render_one_by_one(
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
         lights = basis_lights(scene)
-        asked, source = scene.asked, str(scene.path)
-        return Basis(lights, images, half_differences, seen, origin, asked=asked, source=source)
+        source = str(scene.path)
+        return Basis(lights, images, half_differences, seen, origin, source=source)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

@@ -21,10 +21,11 @@ from lightpaint.lighting.constraints.on_locus import next_whites, solve_on_locus
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.fit import Colors
+from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Squares
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, gamuts_for, reduced_by
+from lightpaint.lighting.problem import Problem, gamuts_for
 from lightpaint.lighting.pull import dimming_of
 from lightpaint.lighting.reweighted import Asked, Led, change, rounds
 from lightpaint.lighting.solution import Solution
@@ -169,7 +170,7 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     """
     fit = replace(problem.fit, colors=colors)
     gamuts = gamuts_for(problem.basis, problem.views, fit)
-    full = reduced_by(problem.constraints, problem.basis, fit, gamuts)
+    full = reduced_by(problem.constraints, problem.lights, fit, gamuts)
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.addressing import asked_of_each, tied_lights
 from lightpaint.lighting.constraints.constraints import COLOURS, Constraints
 

@@ -3,7 +3,8 @@
 from dataclasses import replace
 
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.problem import gamuts_for, reduced_by
+from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.problem import gamuts_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 
@@ -17,7 +18,7 @@ def without_constraints(solution: Solution) -> Solution | None:
     if not problem.constraints or solution.whole is not None:
         return None
     gamuts = gamuts_for(problem.basis, problem.views, problem.fit)
-    free = reduced_by(Constraints(), solution.basis, problem.fit, gamuts)
+    free = reduced_by(Constraints(), problem.lights, problem.fit, gamuts)
     anew = replace(
         problem,
         constraints=Constraints(),

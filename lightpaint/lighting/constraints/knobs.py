@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.colour.hull import ColorHull
 from lightpaint.colour.whites import WhiteRange

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint

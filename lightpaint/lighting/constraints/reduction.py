@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
 from lightpaint.lighting.constraints.blocks import Alike, Block, Entries, Kind, Stack

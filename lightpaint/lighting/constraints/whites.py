@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lightpaint.basis.basis import BasisLight
+from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
 from lightpaint.lighting.constraints.constraints import Constraints
 

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, BasisLight, Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.analysis.ambiguity import ambiguities, indistinguishable
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target

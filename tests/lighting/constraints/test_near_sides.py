@@ -15,7 +15,7 @@ from lightpaint.lighting.constraints.reduced_problem import nearest, solve_reduc
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import reduced_by
+from lightpaint.lighting.linear_problem import reduced_by
 
 SIZE = (9, 8)
 
@@ -33,7 +33,7 @@ def _problem(make_basis: Any, seed: int, n: int = 5) -> tuple[NormalEquations, R
         basis.power,
         present,
     )
-    reduction = reduced_by(lp.Constraints(), basis, lp.Fit(colors="gentle"), gamuts)
+    reduction = reduced_by(lp.Constraints(), basis.lights, lp.Fit(colors="gentle"), gamuts)
     equations = NormalEquations.of(basis, wanted, weight)
     return equations, reduction, present
 

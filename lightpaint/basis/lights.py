@@ -1,0 +1,126 @@
+"""The lights of a basis without a pixel: what they are, what they emit, what is asked of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import overload
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Bools, Doubles, read_only
+from lightpaint.errors import BasisError
+from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
+from lightpaint.scene.lights_file import Asked
+from lightpaint.screen import Listed, some_names
+
+
+@dataclass(frozen=True)
+class BasisLight:
+    """What a basis knows of a light.
+
+    parameter, unit: what one unit of weight is (`radiance`, `W/(m² sr)`).
+    emission: its present RGB emission in the scene, in that unit.
+    form: its place and size, for people.
+    is_scalar: whether it can only be scaled as a whole, and has one weight for all channels.
+    is_fixed: whether it is what stays as it is: its weight is 1, whatever is painted.
+    members: names of the emitters it consists of; itself if none are given.
+    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
+    """
+
+    name: str
+    plugin: str
+    parameter: str
+    unit: str
+    emission: RGB
+    form: str = ""
+    is_scalar: bool = False
+    is_fixed: bool = False
+    members: tuple[str, ...] = ()
+    unit_flux: RGB | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.name) > MAX_NAME:
+            raise BasisError(f"a light has a name of more than {MAX_NAME} characters")
+        if not self.members:
+            object.__setattr__(self, "members", (self.name,))
+        if self.is_fixed and self.emission != (1, 1, 1):
+            raise BasisError(f"light {self.name!r} is kept, and its emission is not 1")
+        if not all(map(is_amount, self.emission)):
+            raise BasisError(
+                f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
+                f"from 0 to {BRIGHTEST:g}"
+            )
+        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
+            raise BasisError(
+                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: need "
+                f"three numbers from 0 to {BRIGHTEST:g}"
+            )
+
+    def __repr__(self) -> str:
+        emission = " ".join(f"{v:.4g}" for v in self.emission)
+        kept = ", kept" if self.is_fixed else ""
+        what = " ".join(filter(None, (self.plugin, self.parameter, emission, self.unit)))
+        return f"BasisLight({self.name!r}, {what}{kept})"
+
+
+@dataclass(frozen=True)
+class Lights(Sequence[BasisLight]):
+    """The ordered table of lights: their order is the order of weights, planes and sums.
+
+    each: the lights. asked: What the lights file of their scene asks of them, for whoever solves;
+    of memory only, since that file may change.
+    """
+
+    each: tuple[BasisLight, ...]
+    asked: Asked = field(default_factory=Asked)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "each", Listed(self.each))
+        if len(set(self.names)) != len(self.each):
+            raise BasisError(f"light names repeat: {some_names(self.names)}")
+
+    @classmethod
+    def of(cls, lights: Sequence[BasisLight]) -> "Lights":
+        """Return `lights` as such a table."""
+        return lights if isinstance(lights, Lights) else cls(tuple(lights))
+
+    def __repr__(self) -> str:
+        return repr(self.each)
+
+    def __len__(self) -> int:
+        return len(self.each)
+
+    def __iter__(self) -> Iterator[BasisLight]:
+        return iter(self.each)
+
+    @overload
+    def __getitem__(self, k: int) -> BasisLight: ...
+    @overload
+    def __getitem__(self, k: slice) -> tuple[BasisLight, ...]: ...
+    def __getitem__(self, k: int | slice) -> BasisLight | tuple[BasisLight, ...]:
+        return self.each[k]
+
+    def asking(self, asked: Asked) -> "Lights":
+        """Return these lights, of which that is asked."""
+        return self if self.asked == asked else replace(self, asked=asked)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(light.name for light in self.each)
+
+    @cached_property
+    def present_weights(self) -> Doubles:
+        """(n, 3) weights of the scene as it is."""
+        emission = [light.emission for light in self.each]
+        return read_only(np.array(emission, dtype=np.float64).reshape(-1, 3))
+
+    @cached_property
+    def is_fixed(self) -> Bools:
+        """(n,), which lights stay as they are, with weight 1."""
+        return read_only(np.array([light.is_fixed for light in self.each], dtype=bool))
+
+    @cached_property
+    def is_scalar(self) -> Bools:
+        """(n,), which lights have one weight for all channels."""
+        return read_only(np.array([light.is_scalar for light in self.each], dtype=bool))

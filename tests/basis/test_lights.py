@@ -1,0 +1,58 @@
+"""The table of lights: no pixels, one order, read only."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.errors import BasisError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit, resolve_fit
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.linear import solve_linear
+from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.sums import Sums, problem_of_sums
+from lightpaint.scene.lights_file import Asked
+
+
+def lamp(name: str, emission: float = 0.5, **about: bool) -> BasisLight:
+    return BasisLight(name, "point", "intensity", "W/sr", (emission,) * 3, **about)
+
+
+def test_it_is_a_sequence_in_one_order() -> None:
+    lights = Lights((lamp("a"), lamp("b", 1.0, is_fixed=True), lamp("c", 2.0, is_scalar=True)))
+    assert (len(lights), lights[1].name, [x.name for x in lights[1:]]) == (3, "b", ["b", "c"])
+    assert lights.names == ("a", "b", "c")
+    assert lights.present_weights.tolist() == [[0.5] * 3, [1.0] * 3, [2.0] * 3]
+    assert lights.is_fixed.tolist() == [False, True, False]
+    assert lights.is_scalar.tolist() == [False, False, True]
+    assert Lights.of(lights) is lights
+    assert Lights.of(list(lights)) == lights
+
+
+def test_nobody_changes_what_all_share() -> None:
+    lights = Lights((lamp("a"),))
+    with pytest.raises(ValueError, match="read-only"):
+        lights.present_weights[0] = 7
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        lights.each = ()  # type: ignore[misc]
+
+
+def test_names_do_not_repeat() -> None:
+    with pytest.raises(BasisError, match="repeat"):
+        Lights((lamp("a"), lamp("a")))
+
+
+def test_a_lighting_and_a_solve_need_no_pixel() -> None:
+    asked = Asked({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
+    lights = Lights((lamp("a"), lamp("b")), asked)
+    M = np.tile(np.diag([2.0, 3.0]), (3, 1, 1))
+    sums = Sums(NormalEquations(M, np.tile([4.0, 9.0], (3, 1)), np.full(3, 50.0)), np.ones((2, 3)))
+    problem = problem_of_sums(lights, "it", sums, constraints=Constraints(), fit=Fit(literal=True))
+    found = solve_linear(problem, problem.start)
+    np.testing.assert_allclose(found.weights, [[2.0] * 3, [0.25] * 3])
+    assert found.lighting.weights_for(lights).tolist() == found.weights.tolist()
+    assert Lighting.of_weights(lights, found.weights).emission == found.lighting.emission
+    assert len(reduced_by(Constraints(), lights, resolve_fit(Fit())).knobs) == 2
