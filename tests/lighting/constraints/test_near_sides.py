@@ -14,8 +14,8 @@ from lightpaint.lighting.constraints.on_locus import next_whites
 from lightpaint.lighting.constraints.reduced_problem import nearest, solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.normal_equations import NormalEquations
 
 SIZE = (9, 8)
 
